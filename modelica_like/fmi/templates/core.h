@@ -88,7 +88,7 @@ enum { N_SPECIALS = 6 }; /* of the first tapes of a model */
 #define FIELD(name, size) *name
 
 /* An impact: of all motions that modes hold, and its jump of the states. */
-#define STRIKE_NUMBERS(A) A(before, holds), A(approach, holds), A(impulse, holds), A(reaction, holds), A(jump, n_x)
+#define STRIKE_NUMBERS(A) A(before, holds), A(approach, holds), A(impulse, holds), A(reaction, holds), A(jump, n)
 /* knocked: let go in the impact itself */
 #define STRIKE_MARKS(A) A(entering, holds), A(loose, holds), A(held, holds), A(knocked, holds)
 typedef struct {
@@ -101,18 +101,18 @@ typedef struct {
  * `slots` (values) and `dots` (derivatives in either direction, or three Taylor coefficients), the integrator 8 stages
  * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
  * steady state began; `impact_x` are states before the first impact at an instant. */
-#define WORK_NUMBERS(A)                                                                                              \
-    A(slots, slots + left), A(dots, 3 * slots), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),                \
-        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),  \
-        A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),         \
-        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),         \
-        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS), \
-        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),            \
-        A(start_unknowns, system), A(start_values, starts), A(start_residual, larger(m->n_start_values, resets)),    \
-        A(begun, holds), A(d_before, n_d), A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets),              \
-        A(target_values, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n_x), A(x_kept, n_x),               \
-        A(impact_x, n_x), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z),    \
-        A(reactions, members), A(sizes, members), A(zeros, members)
+#define WORK_NUMBERS(A)                                                                                                \
+    A(slots, slots + left), A(dots, 3 * slots), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),                  \
+        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),    \
+        A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),           \
+        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),           \
+        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS),   \
+        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),              \
+        A(start_unknowns, system), A(start_values, starts), A(start_residual, larger(m->n_start_values, resets)),      \
+        A(begun, holds), A(d_before, n_d), A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets),                \
+        A(target_values, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), \
+        A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), \
+        A(sizes, members), A(zeros, members)
 /* order: pivots of the implicit equations */
 #define WORK_INDICES(A)                                                                                          \
     A(order, n_z), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), A(member, members), \

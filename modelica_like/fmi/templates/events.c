@@ -101,7 +101,6 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
 /* Fire transitions together; of one mode only the one declared first. An error if one of them ends the run. */
 static Result fire(Instance *c, const unsigned char *wanting) {
     const Model *m = c->model;
-    State *s = &c->state;
     Work *w = &c->work;
     double *values = w->reset_values, *d = w->d_fired;
     unsigned char *changed = memset(w->changed, 0, (size_t)m->n_modes);
@@ -113,9 +112,10 @@ static Result fire(Instance *c, const unsigned char *wanting) {
         if (!wanting[k] || changed[one->mode]) continue;
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
-        if (one->fails) return report(c, LOG_ERROR, RESULT_ERROR, "t = %.9g s: %s", s->t, text_of(m, one->notice));
+        if (one->fails)
+            return report(c, LOG_ERROR, RESULT_ERROR, "t = %.9g s: %s", c->state.t, text_of(m, one->notice));
         if (*text_of(m, one->notice))
-            report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, text_of(m, one->notice));
+            report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, text_of(m, one->notice));
         d[one->mode] = one->target;
         for (int r = one->first_reset; r < one->first_reset + one->n_resets; r++) {
             const Reset *reset = &m->resets[r];
@@ -203,16 +203,15 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
 /* Fire what wants to fire until nothing does. `wanting` holds the state events that were located, if `located`. */
 Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *before = c->work.d_before;
-    int changes = m->n_updates > 0, met;
+    int changes = m->n_updates > 0, rounds = ROUNDS + ALONE * (m->n_holds + m->n_ideals), met;
     c->work.struck = 0;
     memset(c->work.entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
         if (m->n_ideals > 0 && !pushed(c) && !meet(c, -1, &met)) return RESULT_ERROR;
         if (!crowded(c) || !share_anew(c, wanting)) return RESULT_ERROR;
     }
-    for (int round = 0; round < ROUNDS + ALONE * (m->n_holds + m->n_ideals); round++) {
+    for (int round = 0; round < rounds; round++) {
         int any = 0;
         if (!changes && (round > 0 || pushed(c)) && !any_of(wanting, m->n_transitions)) {
             if (!meet(c, -1, &met)) return RESULT_ERROR;
@@ -225,7 +224,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         if (!gradient_round(c, round, wanting, any | changes)) return RESULT_OK;
         any = any_of(wanting, m->n_transitions); /* it may have told others to fire */
         if (c->bounded && --c->budget < 1) {
-            s->at_event = 1; /* the rest comes at the beginning of the next step */
+            c->state.at_event = 1; /* the rest comes at the beginning of the next step */
             return RESULT_OK;
         }
         c->round = round;
@@ -246,10 +245,10 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             keep_wanting(c, c->work.guards, wanting);
         }
     }
-    if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", s->t);
+    if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", c->state.t);
     return fail(c,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        ROUNDS + ALONE * (m->n_holds + m->n_ideals), s->t);
+        rounds, c->state.t);
 }
 
 /* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if

@@ -75,8 +75,7 @@ static Result fire_here(Instance *c, int *fired) {
 
 /* Goes from the present point to `limit`, or to an event before it while the budget allows for one. */
 static Result go_on(Instance *c, double limit, int *fired) {
-    State *s = &c->state;
-    double *first = c->work.first, begin = s->t, error, part = QUIET;
+    double *first = c->work.first, begin = c->state.t, error, part = QUIET;
     int behind_event = *fired;
     *fired = 0;
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
@@ -85,7 +84,7 @@ static Result go_on(Instance *c, double limit, int *fired) {
             "The step from t = %.12g s gives values that are not finite, or singular equations. Take smaller steps.",
             begin);
     c->piece->end = limit;
-    if (c->budget < 2) s->looked = !(s->at_event = 1);
+    if (c->budget < 2) c->state.looked = !(c->state.at_event = 1);
     else if (c->model->n_guards > 0) part = first_crossing(c, behind_event);
     for (double before = 0, behind = 10 * BEHIND; part < 1 && c->budget > 1; c->budget--, behind *= 10) {
         double here = part;

@@ -5,6 +5,9 @@
 
 #include "core.h"
 
+/* Much of the standard is for what no model here has. */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+
 #define JOIN_(a, b) a##b
 #define JOIN(a, b) JOIN_(a, b)
 #define TEXT_(name) #name
@@ -65,6 +68,12 @@ static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what
             if (!(call)) return FMI(Error);         \
         return FMI(OK);                             \
     }
+/* A function without arguments. */
+#define DO(name, phases, call)         \
+    Status FMI(name)(void *instance) { \
+        ENTER(name, phases);           \
+        return status(call);           \
+    }
 /* A function that changes nothing but the phase. */
 #define CHANGE_PHASE(name, from, to, forbidden, why)          \
     Status FMI(name)(void *instance) {                        \
@@ -114,11 +123,7 @@ Status FMI(ExitInitializationMode)(void *instance) {
 CHANGE_PHASE(Terminate, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_FAILED, PHASE_TERMINATED,
     c->state.phase != PHASE_FAILED && !finish(c), ": its last event failed.")
 
-Status FMI(Reset)(void *instance) {
-    ENTER(Reset, ANY_PHASE);
-    instance_reset(c);
-    return FMI(OK);
-}
+DO(Reset, ANY_PHASE, (instance_reset(c), RESULT_OK))
 
 /* ---- Model Exchange --------------------------------------------------------------------------------------------- */
 
@@ -127,7 +132,6 @@ CHANGE_PHASE(EnterContinuousTimeMode, PHASE_EVENT, PHASE_CONTINUOUS, c->co_simul
 Status FMI(CompletedIntegratorStep)(void *instance, FMI(Boolean) noSetFMUStatePriorToCurrentPoint,
     FMI(Boolean) * enterEventMode, FMI(Boolean) * terminateSimulation) {
     ENTER(CompletedIntegratorStep, PHASE_CONTINUOUS);
-    (void)noSetFMUStatePriorToCurrentPoint;
     NEED(1, enterEventMode, terminateSimulation);
     if (!settle(c)) return FMI(Error);
     *enterEventMode = find_wanting(c, nothing_wanting(c), 1) != 0;

@@ -95,8 +95,7 @@ void gradient_move(Instance *c, double end) {
     if (!factor_implicit(c)) gradient_lose(c, "its equations are singular there", NULL);
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);
-        tangent_now(c, &m->tapes.rates, rates);
-        memcpy(g->tangents[j].stages, rates, m->n_x * sizeof(double));
+        tangent_now(c, &m->tapes.rates, g->tangents[j].stages);
     }
     for (int i = 1; i <= STEPS * (N_STAGES - 1); i++) {
         int stage = (i - 1) % (N_STAGES - 1) + 1;
@@ -131,8 +130,7 @@ static void find_shifts(Instance *c, Gradient *g) {
     double *values = tape == &c->model->tapes.moments ? c->work.guards : c->work.guards_before, speed = -1;
     for (int j = 0; j < g->n; j++) g->tangents[j].shift = 0;
     if (cause == NULL || !factor_implicit(c)) return;
-    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
-    memcpy(g->rates, c->work.rhs, c->model->n_x * sizeof(double));
+    evaluate_now(c, &c->model->tapes.rates, g->rates);
     evaluate_now(c, tape, values);
     if (!cause->timed) speed = values[c->model->n_guards + cause->index];
     for (int j = 0; j < g->n; j++) {
@@ -234,7 +232,6 @@ static void pass_tangents(Instance *c, Gradient *g, Result (*pass)(Instance *c))
 /* Passes the start, or an event, with the tangents. */
 Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
     Gradient *g = c->gradient;
-    Result result;
     if (g == NULL || g->passing) return pass(c);
     for (int j = 0; j < g->n && start; j++) {
         g->why = NULL;
@@ -245,7 +242,7 @@ Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
     if (!start && g->why == NULL) find_shifts(c, g);
     g->n_rounds = 0;
     if (!state_copy_out(c, &g->before)) return RESULT_ERROR;
-    result = pass(c);
+    Result result = pass(c);
     if (!result || g->why != NULL) return result;
     if (!state_copy_out(c, &g->behind)) return RESULT_ERROR;
     if (!start) check_shifts(c, g);
@@ -266,17 +263,17 @@ void gradient_end(Instance *c) {
 
 /* Room for derivatives by n values; NULL if there is no memory. */
 static Gradient *gradient_new(const Instance *c, size_t n) {
-    size_t own = sizeof(Gradient) / 8 + 1, n_x = (size_t)c->model->n_x, list = n * sizeof(Tangent) / 8 + 1;
-    size_t marks = MOST_ROUNDS * (size_t)c->model->n_transitions / 8 + 1, one = 2 * c->n_smooth + N_STAGES * n_x;
-    double *memory = n > MOST_TANGENTS ? NULL : c->allocate(own + n_x + marks + list + n * one, 8);
+    size_t own = sizeof(Gradient) / 8 + 1, n_y = (size_t)c->model->n_unknowns, list = n * sizeof(Tangent) / 8 + 1;
+    size_t marks = MOST_ROUNDS * (size_t)c->model->n_transitions / 8 + 1, one = 2 * c->n_smooth + N_STAGES * n_y;
+    double *memory = n > MOST_TANGENTS ? NULL : c->allocate(own + n_y + marks + list + n * one, 8);
     Gradient *g = (Gradient *)(void *)memory;
     if (g == NULL) return NULL;
     g->n = (int)n;
     g->rates = memory + own;
-    g->rounds = (unsigned char *)(g->rates + n_x);
-    g->tangents = (Tangent *)(void *)(g->rates + n_x + marks);
+    g->rounds = (unsigned char *)(g->rates + n_y);
+    g->tangents = (Tangent *)(void *)(g->rates + n_y + marks);
     for (size_t j = 0; j < n; j++) {
-        g->tangents[j].now = g->rates + n_x + marks + list + j * one;
+        g->tangents[j].now = g->rates + n_y + marks + list + j * one;
         g->tangents[j].next = g->tangents[j].now + c->n_smooth;
         g->tangents[j].stages = g->tangents[j].next + c->n_smooth;
     }

@@ -10,8 +10,8 @@
 #define TURNED 100.0
 
 void mark_held(const Instance *c, const Terms *terms, unsigned char *held) {
-    const Model *m = c->model;
-    for (int k = 0; k < m->n_holds; k++) held[k] = c->d[m->holds[k].mode] == m->holds[k].number && terms[k].gain != 0;
+    const Held *one = c->model->holds;
+    for (int k = 0; k < c->model->n_holds; k++, one++) held[k] = c->d[one->mode] == one->number && terms[k].gain != 0;
 }
 
 /* Terms of all motions that modes may hold at the present point; marks those that are held. */
@@ -31,10 +31,9 @@ double largest_like(const Model *m, const double *values, int node) {
 
 /* Set held motions within rounding of zero to zero, if they are states. */
 void rest(Instance *c) {
-    const double *values;
     if (c->model->n_holds == 0) return;
     find_held(c, c->work.terms, c->work.held);
-    values = variables_now(c);
+    const double *values = variables_now(c);
     for (int k = 0; k < c->model->n_holds; k++) {
         const Held *one = &c->model->holds[k];
         if (c->work.held[k] && one->state >= 0 &&
@@ -220,10 +219,9 @@ void share(Instance *c) {
     memcpy(weights, base, (size_t)m->n_holds * sizeof(double));
     for (int trial = 0; trial < SPLITS; trial++) {
         int shared = 0;
-        double worst;
         for (int i = 0; i < m->n_circuits; i++) shared |= share_circuit(c, &m->circuits[i], c->work.held, weights);
         if (c->bounded) return; /* the split by capacities, without asking whether all can bear it */
-        worst = shared ? use_of(c, terms, use) : 0;
+        double worst = shared ? use_of(c, terms, use) : 0;
         if (worst < least || trial == 0) memcpy(best, c->d, (size_t)m->n_d * sizeof(double));
         if (worst < least) least = worst;
         if (worst <= BEARABLE || !isfinite(worst)) break;

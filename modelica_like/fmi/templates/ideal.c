@@ -10,8 +10,7 @@
 
 /* Whether it is replaced, an impulse, whether by the norm or a derivative, the combination of equations. */
 static double *row_of(Instance *c, int element) {
-    const Model *m = c->model;
-    return c->d + m->settings->ideal + (size_t)element * (HEAD + m->n_z);
+    return c->d + c->model->settings->ideal + (size_t)element * (HEAD + c->model->n_z);
 }
 
 static int element_of(const Model *m, int row) {
@@ -88,10 +87,9 @@ static void push(Instance *c) {
     const Model *m = c->model;
     size_t size = (size_t)m->n_ideals * (HEAD + m->n_z) * sizeof(double);
     double *rows = row_of(c, 0), *kept = c->work.best, *z = c->work.kept_z, *left = c->work.residual;
-    const double *values;
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
     solve_now(c, 1);
-    values = variables_now(c);
+    const double *values = variables_now(c);
     memcpy(kept, rows, size);
     memset(rows, 0, size);
     evaluate_now(c, &m->tapes.alg, left);

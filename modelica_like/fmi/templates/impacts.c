@@ -9,13 +9,11 @@
 /* Rates, and reactions where they matter, at the present point, with or without the approaches. */
 static Result ask(Instance *c, const Strike *strike, int approaching, int unsolved, double *rates, double *reactions) {
     const Model *m = c->model;
-    const double *values;
     for (int k = 0; k < m->n_holds; k++) c->d[m->holds[k].approach] = approaching ? strike->approach[k] : 0;
     if (unsolved && !solve_now(c, 0)) return RESULT_ERROR;
-    evaluate_now(c, &m->tapes.rates, c->work.rhs);
-    memcpy(rates, c->work.rhs, m->n_x * sizeof(double));
+    evaluate_now(c, &m->tapes.rates, rates);
     if (!strike->hard) return RESULT_OK;
-    values = variables_now(c);
+    const double *values = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) reactions[k] = strike->held[k] ? values[m->holds[k].reaction] : 0;
     return RESULT_OK;
 }
@@ -25,7 +23,6 @@ static Result respond(Instance *c, Strike *strike) {
     const Model *m = c->model;
     double *d = c->work.respond_d, *z = c->work.respond_z, *rates = c->work.rates;
     int any = any_of(strike->loose, m->n_holds);
-    Result result;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
     for (int k = 0; k < m->n_holds; k++)
@@ -33,8 +30,8 @@ static Result respond(Instance *c, Strike *strike) {
     if (any || !c->bounded) share(c); /* else it has just been done, with the implicit equations solved */
     if (strike->hard) find_held(c, c->work.terms, strike->held);
     for (int k = 0; k < m->n_holds; k++) strike->held[k] &= !strike->loose[k] && m->holds[k].reaction >= 0;
-    result = ask(c, strike, 0, any || !c->bounded, rates, strike->reaction);
-    if (result) result = ask(c, strike, 1, 1, strike->jump, strike->impulse);
+    Result result = ask(c, strike, 0, any || !c->bounded, rates, strike->reaction) &&
+                    ask(c, strike, 1, 1, strike->jump, strike->impulse);
     for (int k = 0; k < m->n_x; k++) strike->jump[k] = INSTANT * (strike->jump[k] - rates[k]);
     for (int k = 0; k < m->n_holds; k++) strike->impulse[k] = INSTANT * (strike->impulse[k] - strike->reaction[k]);
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
@@ -62,12 +59,11 @@ static int let_go_unbearable(const Instance *c, Strike *strike, const Terms *ter
 static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
     double *x = c->work.x_kept;
-    const double *after;
     int any = 0;
     if (!any_of(strike->loose, m->n_holds)) return 0;
     memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
     for (int k = 0; k < m->n_x; k++) c->x[k] += strike->jump[k];
-    after = variables_now(c);
+    const double *after = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
         double motion = after[m->holds[k].motion];
         double against = motion > 0 ? terms[k].forward : terms[k].backward;

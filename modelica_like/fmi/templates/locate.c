@@ -206,11 +206,9 @@ static int behave(const Instance *c, const Look *before, const Look *middle, con
 
 static Found look_into(Instance *c, const Look *before, const Look *after, int depth) {
     Look middle = room_for_look(c, depth + 1);
-    int deeper;
-    Found found;
     if (!look_inside(c, before->t + MIDDLE * (after->t - before->t), &middle)) return TOO_LONG;
-    deeper = depth > 1 && !behave(c, before, &middle, after);
-    found = deeper ? look_into(c, before, &middle, depth - 1) : check_between(c, before, &middle);
+    int deeper = depth > 1 && !behave(c, before, &middle, after);
+    Found found = deeper ? look_into(c, before, &middle, depth - 1) : check_between(c, before, &middle);
     if (found != NOTHING) return found;
     return deeper ? look_into(c, &middle, after, depth - 1) : check_between(c, &middle, after);
 }
@@ -219,14 +217,13 @@ static Found look_into(Instance *c, const Look *before, const Look *after, int d
 int search_events(Instance *c) {
     Look before = room_for_look(c, 0), after = room_for_look(c, 1);
     const Piece *whole = memcpy(c->work.whole, c->piece, piece_size(c->model));
-    Found found;
     if (!c->look_valid && !look_inside(c, whole->begin, &before)) return 0;
     c->look_valid = 1;
     before.t = whole->begin;
     /* What the last event left positive did not want to fire: it is on its way down. */
     for (int g = 0; g < c->model->n_guards; g++) before.values[g] = fmin(before.values[g], 0);
     if (!look_inside(c, whole->end, &after)) return 0;
-    found = look_into(c, &before, &after, DEPTH);
+    Found found = look_into(c, &before, &after, DEPTH);
     if (found == NOTHING) memcpy(before.values, after.values, 2 * (size_t)c->model->n_guards * sizeof(double));
     else if (found == ENDED) c->look_valid = 0;
     return found != TOO_LONG;

@@ -91,18 +91,17 @@ Result solve_now(Instance *c, int quiet) { return solve_implicit(c, c->state.t, 
 
 Result check_singular(Instance *c) {
     const Model *m = c->model;
-    State *s = &c->state;
-    double *values = c->work.rhs;
+    double t = c->state.t, *values = c->work.rhs;
     evaluate_now(c, &m->tapes.determinants, values);
     for (int k = 0; k < m->n_determinants; k++)
-        if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, s->t, text_of(m, m->singular_names[k]));
+        if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, t, text_of(m, m->singular_names[k]));
     if (c->bounded) return RESULT_OK; /* the next step tells */
     tape_run(&m->tapes.rates, c->work.slots, values);
     for (int k = 0; k < m->n_x; k++)
         if (!isfinite(values[k]))
             return fail(c,
                 "The derivative of %s is not finite at t = %.9g s. Look for a mass, inertia or ratio of zero.",
-                text_of(m, m->state_names[k]), s->t);
+                text_of(m, m->state_names[k]), t);
     return RESULT_OK;
 }
 

@@ -103,10 +103,9 @@ static void write_special(Instance *c, Special *s, const Tape *tape, const unsig
 void run_special(Instance *c, const Tape *tape, double *outputs) {
     Work *w = &c->work;
     Special *s = special_of(c, tape);
-    int special;
     if (s->belongs_to != w->decided_by) s->uses = 0;
     s->belongs_to = w->decided_by;
-    special = s->uses > WORTH_IT && !c->bounded; /* where the work is bounded: working out costs more than a step */
+    int special = s->uses > WORTH_IT && !c->bounded; /* where the work is bounded: working out costs more than a step */
     tape_run(special ? &s->tape : tape, w->slots, outputs);
     if (special || c->bounded || ++s->uses <= WORTH_IT) return;
     work_out(c, tape, w->same, w->known_slots);

@@ -123,17 +123,16 @@ void mark_tuned(Instance *c, int parameter) {
 }
 
 static Result set_parameter(Instance *c, const Variable *v, double value) {
-    State *s = &c->state;
     double low = c->model->parameter_min[v->index], high = c->model->parameter_max[v->index];
-    if (!v->tunable && !before_start(s))
+    if (!v->tunable && !before_start(&c->state))
         return refuse_value(c, v, "it is a fixed parameter. Set it before the end of the initialization.");
-    if (v->tunable && s->phase == PHASE_CONTINUOUS)
+    if (v->tunable && c->state.phase == PHASE_CONTINUOUS)
         return refuse_value(c, v, "tunable parameters change in event mode only.");
     if (value < low || value > high)
         return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(c->model, v->name), value,
             value < low ? "least" : "most", value < low ? low : high);
     if (c->p[v->index] == value) return RESULT_OK;
-    if (!before_start(s)) mark_tuned(c, v->index);
+    if (!before_start(&c->state)) mark_tuned(c, v->index);
     c->p[v->index] = value;
     touch(c);
     return RESULT_OK;
