@@ -44,13 +44,13 @@ typedef struct {
 /* All variables that are asked for, now or at a time within the step that has just been taken. */
 static const double *variables_at(Batch *b, double t, int now) {
     Instance *c = b->c;
-    double *point = c->work.vector + c->model->n_z;
+    double *point = c->vector + c->model->n_z;
     if (now) memcpy(point, c->x, (size_t)c->model->n_unknowns * sizeof(double));
     else piece_at(c->model, c->piece, t, point);
     if (!solve_implicit(c, t, point, 1)) b->failed = 1;
     c->variables_valid = 0;
-    evaluate_special(c, &c->model->tapes.variables, t, point, c->work.variables);
-    return c->work.variables;
+    evaluate_special(c, &c->model->tapes.variables, t, point, c->variables);
+    return c->variables;
 }
 
 /* Takes a result. */

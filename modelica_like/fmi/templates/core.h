@@ -119,22 +119,10 @@ typedef struct {
         A(pivots, members), A(same, slots), A(places_of_slots, slots)
 /* open_rows: implicit equations that depend on others; asked: variables that somebody reads; tuned: parameters that
  * have changed in a run; entered: what has begun to hold at an instant */
-#define WORK_MARKS(A)                                                                                                \
-    A(known, n_x), A(decided, n_d), A(wanting, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
-        A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),   \
+#define WORK_MARKS(A)                                                                                               \
+    A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
+        A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
         A(tuned, m->n_p), A(entered, holds)
-
-typedef struct {
-    double WORK_NUMBERS(FIELD);
-    int WORK_INDICES(FIELD);
-    unsigned char WORK_MARKS(FIELD);
-    Piece *whole;
-    Terms *terms, *strike_terms;
-    Strike strike;
-    int struck; /* something has been stopped at the present instant */
-    Special special[N_SPECIALS];
-    uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
-} Work;
 
 typedef struct Gradient Gradient; /* see gradient.c */
 
@@ -154,7 +142,17 @@ typedef struct Instance {
     Piece *piece;
     double *end_look; /* guards and their rates at the end of the last fixed step */
     double *z;        /* in x: together they are a point */
-    Work work;
+
+    double WORK_NUMBERS(FIELD);
+    int WORK_INDICES(FIELD);
+    unsigned char WORK_MARKS(FIELD);
+    Piece *whole;
+    Terms *terms, *strike_terms;
+    Strike strike;
+    int stopped; /* something has been stopped at the present instant */
+    Special special[N_SPECIALS];
+    uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
+
     const char *name;
     void *environment;
     AnyFunction logger, intermediate_update;
@@ -183,8 +181,8 @@ void tape_tangent(const Tape *tape, const double *slots, double *dots, double *o
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars);
 void slopes(int operation, double a, double b, double f, double *by_left, double *by_right);
 /* linear.c */
-int qr_factor(const QrPattern *pattern, const double *values, Work *work);
-void qr_solve(const QrPattern *pattern, const Work *work, double *x);
+int qr_factor(const QrPattern *pattern, const double *values, Instance *c);
+void qr_solve(const QrPattern *pattern, const Instance *c, double *x);
 int lu_factor(int n, double *matrix, int *order);
 void lu_solve(int n, const double *matrix, const int *order, double *x);
 void lu_solve_transposed(int n, const double *matrix, const int *order, double *x);

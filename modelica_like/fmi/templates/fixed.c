@@ -17,7 +17,7 @@
  * or a parabola where no rates are known at the begin. */
 static double first_zero(const Instance *c, const double *first, int rates_known) {
     int n = c->model->n_guards;
-    const double *last = c->work.looks;
+    const double *last = c->looks;
     double part = 1, h = c->piece->end - c->piece->begin;
     for (int g = 0; g < n; g++) {
         double g0, r0, r1 = isfinite(last[n + g]) ? h * last[n + g] : 0;
@@ -26,7 +26,7 @@ static double first_zero(const Instance *c, const double *first, int rates_known
         r0 = rates_known ? h * first[n + g] : 2 * (last[g] - g0) - r1;
         part = fmin(part, cubic_guess(g0, isfinite(r0) ? r0 : 0, last[g], r1) + BEHIND);
     }
-    memcpy(c->work.looks + 2 * n, first, (size_t)n * sizeof(double));
+    memcpy(c->looks + 2 * n, first, (size_t)n * sizeof(double));
     return part;
 }
 
@@ -34,7 +34,7 @@ static double first_zero(const Instance *c, const double *first, int rates_known
  * the end. */
 static double next_zero(Instance *c, double before, double part, double behind) {
     int n = c->model->n_guards;
-    double *last = c->work.looks, *first = last + 2 * n, *now = c->work.guards, next = 1;
+    double *last = c->looks, *first = last + 2 * n, *now = c->guards, next = 1;
     for (int g = 0; g < n; g++) {
         double v0 = fmin(number_or_false(first[g]), 0), v1 = fmin(number_or_false(now[g]), 0), slope, bend, zero;
         if (!guard_active(c, g) || !(number_or_false(last[g]) > 0)) continue;
@@ -52,10 +52,10 @@ static double next_zero(Instance *c, double before, double part, double behind) 
 static double first_crossing(Instance *c, int behind_event) {
     Piece *piece = c->piece;
     int n = c->model->n_guards, any = 0;
-    double *last = c->work.looks;
+    double *last = c->looks;
     evaluate(c, &c->model->tapes.guards, piece->end, last_of(c->model, piece), last);
     for (int g = 0; g < n; g++) any |= guard_active(c, g) && number_or_false(last[g]) > 0;
-    if (any && behind_event) return first_zero(c, c->work.guards, 0); /* as the last round has left them */
+    if (any && behind_event) return first_zero(c, c->guards, 0); /* as the last round has left them */
     if (any && !c->state.looked) evaluate(c, &c->model->tapes.guards, piece->begin, piece->points, c->end_look);
     if (any) return first_zero(c, c->end_look, 1);
     memcpy(c->end_look, last, 2 * (size_t)n * sizeof(double));
@@ -75,7 +75,7 @@ static Result fire_here(Instance *c, int *fired) {
 
 /* Goes from the present point to `limit`, or to an event before it while the budget allows for one. */
 static Result go_on(Instance *c, double limit, int *fired) {
-    double *first = c->work.first, begin = c->state.t, error, part = QUIET;
+    double *first = c->first, begin = c->state.t, error, part = QUIET;
     int behind_event = *fired;
     *fired = 0;
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));

@@ -61,7 +61,7 @@ static double *part_of(const Instance *c, const Tangent *one, const double *valu
  * has been called) also states, with the implicit unknowns. */
 static void load_tangent(Instance *c, const Tangent *one, int moving) {
     const Model *m = c->model;
-    double *dots = memset(c->work.dots, 0, m->slot_results * sizeof(double));
+    double *dots = memset(c->dots, 0, m->slot_results * sizeof(double));
     memcpy(dots + m->slot_p, part_of(c, one, c->p), m->n_p * sizeof(double));
     memcpy(dots + m->slot_u, part_of(c, one, c->u), m->n_u * sizeof(double));
     memcpy(dots + m->slot_d, part_of(c, one, c->d), m->n_d * sizeof(double));
@@ -73,15 +73,15 @@ static void load_tangent(Instance *c, const Tangent *one, int moving) {
 static void take_stage(Instance *c, Tangent *one, int i, double h) {
     const Model *m = c->model;
     int n_x = m->n_x;
-    double *solved = c->work.vector, *begin = c->work.point, *x = part_of(c, one, c->x);
+    double *solved = c->vector, *begin = c->point, *x = part_of(c, one, c->x);
     load_tangent(c, one, 0);
-    tape_tangent(&m->tapes.rates, c->work.slots, c->work.dots, solved);
+    tape_tangent(&m->tapes.rates, c->slots, c->dots, solved);
     for (int k = 0; k < n_x; k++) {
         begin[k] = x[k];
         for (int j = 0; j < i; j++) begin[k] += h * WEIGHTS[i][j] * one->stages[j * n_x + k];
         solved[k] += 4 / h * begin[k];
     }
-    qr_solve(&m->step, &c->work, solved);
+    qr_solve(&m->step, c, solved);
     for (int k = 0; k < n_x; k++) one->stages[i * n_x + k] = 4 / h * (solved[k] - begin[k]);
     if (i == N_STAGES - 1) memcpy(x, solved, n_x * sizeof(double));
 }
@@ -90,7 +90,7 @@ static void take_stage(Instance *c, Tangent *one, int i, double h) {
 void gradient_move(Instance *c, double end) {
     Gradient *g = c->gradient;
     const Model *m = c->model;
-    double begin = c->state.t, h = (end - begin) / STEPS, *rates = c->work.rhs;
+    double begin = c->state.t, h = (end - begin) / STEPS, *rates = c->rhs;
     if (g == NULL || g->why != NULL || h <= 0) return;
     if (!factor_implicit(c)) gradient_lose(c, "its equations are singular there", NULL);
     for (int j = 0; j < g->n; j++) {
@@ -100,10 +100,10 @@ void gradient_move(Instance *c, double end) {
     for (int i = 1; i <= STEPS * (N_STAGES - 1); i++) {
         int stage = (i - 1) % (N_STAGES - 1) + 1;
         double t = begin + h * ((i - 1) / (N_STAGES - 1) + NODES[stage]);
-        piece_at(m, c->piece, t, c->work.point);
-        evaluate(c, &m->tapes.jacobian, t, c->work.point, c->work.jacobian);
+        piece_at(m, c->piece, t, c->point);
+        evaluate(c, &m->tapes.jacobian, t, c->point, c->jacobian);
         if (!factor_step(c, 4 / h)) gradient_lose(c, "its equations are singular there", NULL);
-        evaluate(c, &m->tapes.rates, t, c->work.point, rates);
+        evaluate(c, &m->tapes.rates, t, c->point, rates);
         for (int j = 0; j < g->n; j++) {
             double *stages = g->tangents[j].stages;
             if (stage == 1 && i > 1) memcpy(stages, stages + (N_STAGES - 1) * m->n_x, m->n_x * sizeof(double));
@@ -117,7 +117,7 @@ void gradient_move(Instance *c, double end) {
 /* The transition whose guard, or moment, tells when the present instant is; NULL: its time is given. */
 static const Transition *find_cause(Instance *c) {
     const unsigned char *wanting = c->state.event_pending ? c->wanting : nothing_wanting(c);
-    if (!c->state.event_pending) find_wanting(c, c->work.wanting, 0);
+    if (!c->state.event_pending) find_wanting(c, c->wishes, 0);
     for (int k = 0; k < c->model->n_transitions; k++)
         if (wanting[k] && c->state.n_steps > 0) return &c->model->transitions[k];
     return NULL;
@@ -127,7 +127,7 @@ static const Transition *find_cause(Instance *c) {
 static void find_shifts(Instance *c, Gradient *g) {
     const Transition *cause = find_cause(c);
     const Tape *tape = cause != NULL && cause->timed ? &c->model->tapes.moments : &c->model->tapes.guards;
-    double *values = tape == &c->model->tapes.moments ? c->work.guards : c->work.guards_before, speed = -1;
+    double *values = tape == &c->model->tapes.moments ? c->guards : c->guards_before, speed = -1;
     for (int j = 0; j < g->n; j++) g->tangents[j].shift = 0;
     if (cause == NULL || !factor_implicit(c)) return;
     evaluate_now(c, &c->model->tapes.rates, g->rates);
@@ -143,9 +143,9 @@ static void find_shifts(Instance *c, Gradient *g) {
 /* Leaves the instant where it is if it makes no difference when it is: rounding may decide that, and no guard. */
 static void check_shifts(Instance *c, Gradient *g) {
     const Model *m = c->model;
-    const double *x = copied(c, g->before, c->x), *d = copied(c, g->before, c->d), *rates = c->work.rhs;
+    const double *x = copied(c, g->before, c->x), *d = copied(c, g->before, c->d), *rates = c->rhs;
     int matters = 0;
-    evaluate_now(c, &m->tapes.rates, c->work.rhs);
+    evaluate_now(c, &m->tapes.rates, c->rhs);
     for (int k = 0; k < m->n_x; k++) {
         double change = fmax(fabs(c->x[k] - x[k]), fabs(rates[k] - g->rates[k]));
         matters |= !(change <= FELT_CHANGE * (fabs(x[k]) + fabs(rates[k]) + m->nominals[k]));
@@ -225,8 +225,8 @@ static void pass_tangents(Instance *c, Gradient *g, Result (*pass)(Instance *c))
     c->noted = whole.noted;
     c->struck = whole.struck;
     if (other != NULL) gradient_lose(c, "a small change of it leads to other modes there", other);
-    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
-    move_on(c, g, c->work.rhs, -1);
+    evaluate_now(c, &c->model->tapes.rates, c->rhs);
+    move_on(c, g, c->rhs, -1);
 }
 
 /* Passes the start, or an event, with the tangents. */
@@ -286,7 +286,7 @@ static double *value_of(Instance *c, const Variable *v) {
     if (v->kind == KIND_PARAMETER) mark_tuned(c, v->index);
     if (v->kind == KIND_PARAMETER) return &c->p[v->index];
     start_values(c);
-    c->start_value[v->start] = c->work.start_values[v->start];
+    c->start_value[v->start] = c->start_values[v->start];
     c->start_given[v->start] = 1;
     return &c->start_value[v->start];
 }

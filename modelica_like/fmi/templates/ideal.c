@@ -37,8 +37,8 @@ static int place_of(Instance *c, int row, int second) {
 static void eliminate_rows(Instance *c, int second, double *turns, double *sizes, unsigned char *dependent) {
     const Model *m = c->model;
     int n = m->n_z;
-    double *a = c->work.dense_matrix;
-    evaluate_special(c, &m->tapes.alg, c->state.t, c->x, c->work.vector);
+    double *a = c->dense_matrix;
+    evaluate_special(c, &m->tapes.alg, c->state.t, c->x, c->vector);
     run_special(c, &m->tapes.alg_jacobian, a);
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
@@ -74,7 +74,7 @@ static void eliminate_rows(Instance *c, int second, double *turns, double *sizes
 /* The combination of replaced rows that says nothing: what it leaves open gets the least norm. */
 static void leave_open(Instance *c, int element, const double *turns) {
     const Model *m = c->model;
-    double *total = memset(c->work.vector, 0, (size_t)m->n_z * sizeof(double));
+    double *total = memset(c->vector, 0, (size_t)m->n_z * sizeof(double));
     for (int k = 0; k < m->n_ideals; k++)
         for (int j = 0; j < m->n_z; j++)
             total[j] += turns[m->ideals[element].row + m->n_z * m->ideals[k].row] * row_of(c, k)[HEAD + j];
@@ -86,7 +86,7 @@ static void leave_open(Instance *c, int element, const double *turns) {
 static void push(Instance *c) {
     const Model *m = c->model;
     size_t size = (size_t)m->n_ideals * (HEAD + m->n_z) * sizeof(double);
-    double *rows = row_of(c, 0), *kept = c->work.best, *z = c->work.kept_z, *left = c->work.residual;
+    double *rows = row_of(c, 0), *kept = c->best, *z = c->kept_z, *left = c->residual;
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
     solve_now(c, 1);
     const double *values = variables_now(c);
@@ -105,8 +105,8 @@ static void push(Instance *c) {
 void replace_dependent(Instance *c) {
     const Model *m = c->model;
     int n = m->n_z, any = 0;
-    double *turns = c->work.square, *sizes = turns + (size_t)n * n, *least = sizes + n;
-    unsigned char *dependent = c->work.open_rows;
+    double *turns = c->square, *sizes = turns + (size_t)n * n, *least = sizes + n;
+    unsigned char *dependent = c->open_rows;
     if (m->n_ideals == 0) return;
     memset(row_of(c, 0), 0, (size_t)m->n_ideals * (HEAD + n) * sizeof(double));
     memset(sizes, 0, (size_t)n * sizeof(double));
@@ -141,7 +141,7 @@ Result meet(Instance *c, double keep, int *any) {
     const Model *m = c->model;
     const double *values = variables_now(c);
     double limit = keep < 0 ? LOST : keep;
-    int *nodes = c->work.places;
+    int *nodes = c->places;
     *any = 0;
     for (int k = 0; k < m->n_ideals; k++) {
         int node = zero_of(c, k), met;

@@ -21,14 +21,14 @@ static Result ask(Instance *c, const Strike *strike, int approaching, int unsolv
 /* Jump of the states, impulses and finite reactions of all that holds, with what is loose let go. */
 static Result respond(Instance *c, Strike *strike) {
     const Model *m = c->model;
-    double *d = c->work.respond_d, *z = c->work.respond_z, *rates = c->work.rates;
+    double *d = c->respond_d, *z = c->respond_z, *rates = c->rates;
     int any = any_of(strike->loose, m->n_holds);
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
     for (int k = 0; k < m->n_holds; k++)
         if (strike->loose[k]) c->d[m->holds[k].mode] = m->holds[k].loose;
     if (any || !c->bounded) share(c); /* else it has just been done, with the implicit equations solved */
-    if (strike->hard) find_held(c, c->work.terms, strike->held);
+    if (strike->hard) find_held(c, c->terms, strike->held);
     for (int k = 0; k < m->n_holds; k++) strike->held[k] &= !strike->loose[k] && m->holds[k].reaction >= 0;
     Result result = ask(c, strike, 0, any || !c->bounded, rates, strike->reaction) &&
                     ask(c, strike, 1, 1, strike->jump, strike->impulse);
@@ -58,7 +58,7 @@ static int let_go_unbearable(const Instance *c, Strike *strike, const Terms *ter
 /* Puts back what was let go and would now move on against what nothing limits; tells whether anything would. */
 static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
-    double *x = c->work.x_kept;
+    double *x = c->x_kept;
     int any = 0;
     if (!any_of(strike->loose, m->n_holds)) return 0;
     memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
@@ -79,7 +79,7 @@ static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms)
 /* Marks as loose also what bounces, or was moved in passing. */
 static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
-    unsigned char *held = c->work.held;
+    unsigned char *held = c->held;
     const double *after = variables_now(c);
     double largest = 0;
     mark_held(c, terms, held);
@@ -108,8 +108,8 @@ static void book(Instance *c, const Strike *strike, int first) {
 /* Carries out the impact; `loose` then tells what was knocked loose, bounces, or was moved in passing. */
 static Result carry_out(Instance *c, Strike *strike, int first) {
     const Model *m = c->model;
-    Terms *terms = c->work.strike_terms;
-    if (strike->hard) find_held(c, terms, c->work.held);
+    Terms *terms = c->strike_terms;
+    if (strike->hard) find_held(c, terms, c->held);
     for (int k = 0; k < m->n_holds && !strike->hard; k++) terms[k].restitution = 0; /* rounding does not rebound */
     for (int trial = 0; trial < TRIALS && !(trial > 0 && c->bounded && c->budget < 1); trial++) {
         c->budget--;
@@ -137,15 +137,15 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
 /* What the impact knocks loose takes the mode that its start would take. */
 static void choose_again(Instance *c, const Strike *strike) {
     const Model *m = c->model;
-    double *d = c->work.respond_d;
-    unsigned char *decided = c->work.decided;
+    double *d = c->respond_d;
+    unsigned char *decided = c->decided;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memset(decided, 1, (size_t)m->n_d);
-    evaluate_now(c, &m->tapes.discrete_starts, c->work.guards);
+    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
     for (int k = 0; k < m->n_holds; k++) {
         int mode = m->holds[k].mode;
         if (!strike->loose[k]) continue;
-        c->d[mode] = c->work.guards[mode];
+        c->d[mode] = c->guards[mode];
         decided[mode] = 0;
     }
     choose_modes(c, decided);
@@ -188,11 +188,11 @@ static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
  * instant are one, from the speeds before the first. */
 Result stop_motions(Instance *c, const double *before) {
     const Model *m = c->model;
-    Strike *strike = &c->work.strike;
-    Terms *terms = c->work.strike_terms;
-    unsigned char *entered = c->work.entered;
-    double *x = c->work.impact_x;
-    int first = !c->work.struck;
+    Strike *strike = &c->strike;
+    Terms *terms = c->strike_terms;
+    unsigned char *entered = c->entered;
+    double *x = c->impact_x;
+    int first = !c->stopped;
     if (m->n_holds == 0) return RESULT_OK;
     memset(strike->loose, 0, (size_t)m->n_holds);
     find_held(c, terms, strike->entering);
@@ -202,7 +202,7 @@ Result stop_motions(Instance *c, const double *before) {
     if (strike->hard) {
         for (int k = 0; k < m->n_holds; k++) strike->entering[k] = entered[k] |= strike->entering[k];
         if (first) memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
-        c->work.struck = 1;
+        c->stopped = 1;
         memcpy(c->x, x, (size_t)m->n_x * sizeof(double));
         if (!hold_again(c, entered)) return RESULT_ERROR;
         begin_strike(c, strike, terms);

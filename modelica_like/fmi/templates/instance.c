@@ -58,8 +58,7 @@ static void *take(double *memory, uint64_t *used, uint64_t size, uint64_t bytes)
 /* Lays out everything in one block, the state first; returns its size in doubles. */
 static uint64_t lay_out(Instance *c, double *memory) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    Strike *strike = &w->strike;
+    Strike *strike = &c->strike;
     uint64_t n = m->n_unknowns, n_x = m->n_x, n_z = m->n_z, n_d = m->n_d, holds = m->n_holds, guards = m->n_guards;
     uint64_t starts = m->n_starts, slots = m->n_slots, steady = m->settings->steady ? m->n_steady : 0;
     uint64_t members = m->most_members + 1, ideal = m->n_ideals > 0 ? n_z : 0, dense = n_z * n_z;
@@ -71,7 +70,6 @@ static uint64_t lay_out(Instance *c, double *memory) {
     uint64_t square = larger(larger(2 * steady * steady, resets * n_x), members * (n_x + 3 * members));
     square = larger(square, ideal * (ideal + 2));
 #define OF_INSTANCE(name, size) TAKE(c->name, size)
-#define OF_WORK(name, size) TAKE(w->name, size)
 #define OF_STRIKE(name, size) TAKE(strike->name, size)
     SMOOTH_NUMBERS(OF_INSTANCE);
     c->n_smooth = (size_t)used;
@@ -81,7 +79,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
     c->n_numbers = (size_t)used;
     for (int k = 0; k < N_SPECIALS; k++) {
         const Tape *tape = tapes_of(m) + k;
-        Special *s = &w->special[k];
+        Special *s = &c->special[k];
         uint64_t operations = tape->n_operations;
         TAKE(s->runs, operations);
         TAKE(s->operands, operations);
@@ -90,11 +88,11 @@ static uint64_t lay_out(Instance *c, double *memory) {
         s->first_known = (int)(slots + left); /* among the slots, behind all others */
         left += operations;
     }
-    w->whole = take(memory, &used, piece_size(m), 1);
-    TAKE(w->terms, holds);
-    TAKE(w->strike_terms, holds);
+    c->whole = take(memory, &used, piece_size(m), 1);
+    TAKE(c->terms, holds);
+    TAKE(c->strike_terms, holds);
     STRIKE_NUMBERS(OF_STRIKE), STRIKE_MARKS(OF_STRIKE);
-    WORK_NUMBERS(OF_WORK), WORK_INDICES(OF_WORK), WORK_MARKS(OF_WORK);
+    WORK_NUMBERS(OF_INSTANCE), WORK_INDICES(OF_INSTANCE), WORK_MARKS(OF_INSTANCE);
     return used;
 }
 
@@ -126,7 +124,7 @@ static Instance *instance_make(const Instance *bare) {
     c->numbers = (double *)(void *)c + head;
     lay_out(c, c->numbers);
     c->z = c->x + m->n_x;
-    memcpy(c->work.slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
+    memcpy(c->slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
     return c;
 }

@@ -31,7 +31,7 @@ static double least_step(const State *s) { return 1e-15 * fmax(1, fabs(s->t)); }
 /* Takes one step from the present point towards `limit`, shorter where accuracy or an event asks for it. */
 static Result take_step(Instance *c, double limit) {
     State *s = &c->state;
-    double *first = c->work.first, wished = s->step > 0 ? s->step : first_step(c);
+    double *first = c->first, wished = s->step > 0 ? s->step : first_step(c);
     double least = least_step(s);
     int rejected = 0;
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
@@ -94,7 +94,7 @@ static Result pass_event(Instance *c) {
     unsigned char *wanting = nothing_wanting(c);
     int located = s->event_pending, ticks = c->model->n_moments > 0 && !located;
     size_t size = (size_t)c->model->n_x * sizeof(double);
-    double *x = c->work.first, *rates = c->work.first_rates, step = s->step;
+    double *x = c->first, *rates = c->first_rates, step = s->step;
     if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
@@ -106,8 +106,8 @@ static Result pass_event(Instance *c) {
     if (!iterate_events(c, wanting, located)) return RESULT_ERROR;
     s->z_valid = 1;
     if (!ticks || memcmp(x, c->x, size) != 0) return RESULT_OK;
-    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
-    if (memcmp(rates, c->work.rhs, size) == 0) s->step = step; /* a tick without effect on what moves */
+    evaluate_now(c, &c->model->tapes.rates, c->rhs);
+    if (memcmp(rates, c->rhs, size) == 0) s->step = step; /* a tick without effect on what moves */
     return RESULT_OK;
 }
 

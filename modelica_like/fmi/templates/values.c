@@ -27,19 +27,18 @@ const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) 
 
 /* Values that a tape gives, each computed once per point; NULL if there are none. */
 static const double *seen(Instance *c, const Variable *v) {
-    Work *w = &c->work;
-    const double *values = v->kind == KIND_DERIVED      ? w->seen_derived
-                           : v->kind == KIND_DERIVATIVE ? w->seen_rates
-                           : v->kind == KIND_GUARD      ? w->seen_indicators
-                                                        : w->variables;
+    const double *values = v->kind == KIND_DERIVED      ? c->seen_derived
+                           : v->kind == KIND_DERIVATIVE ? c->seen_rates
+                           : v->kind == KIND_GUARD      ? c->seen_indicators
+                                                        : c->variables;
     if (v->kind == KIND_VARIABLE) ask_for(c, v->index);
     if (c->variables_valid & 1 << v->kind) return values;
     if (v->kind != KIND_DERIVED && !settle(c)) return NULL;
     switch (v->kind) {
-        case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, w->seen_derived); break;
-        case KIND_DERIVATIVE: evaluate_special(c, &c->model->tapes.rates, c->state.t, c->x, w->seen_rates); break;
-        case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
-        default: evaluate_special(c, &c->model->tapes.variables, c->state.t, c->x, w->variables);
+        case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, c->seen_derived); break;
+        case KIND_DERIVATIVE: evaluate_special(c, &c->model->tapes.rates, c->state.t, c->x, c->seen_rates); break;
+        case KIND_GUARD: get_indicators(c, c->seen_indicators); break;
+        default: evaluate_special(c, &c->model->tapes.variables, c->state.t, c->x, c->variables);
     }
     c->variables_valid |= 1 << v->kind;
     return values;
@@ -75,8 +74,8 @@ Result make_consistent(Instance *c) {
 }
 
 void get_derivatives(Instance *c, double *derivatives) {
-    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
-    memcpy(derivatives, c->work.rhs, c->model->n_x * sizeof(double));
+    evaluate_now(c, &c->model->tapes.rates, c->rhs);
+    memcpy(derivatives, c->rhs, c->model->n_x * sizeof(double));
     rest_rates(c, derivatives);
 }
 
@@ -86,7 +85,7 @@ void get_derivatives(Instance *c, double *derivatives) {
  * an offset. It shifts no event, as it is gone above zero; its size is that of rounding, and products of it do not
  * underflow, by whose sign root finders judge. */
 void get_indicators(Instance *c, double *indicators) {
-    double *values = c->work.guards;
+    double *values = c->guards;
     evaluate_now(c, &c->model->tapes.guards_soon, values);
     drop_balanced(c, values);
     for (int k = 0; k < c->model->n_guards; k++) {
@@ -118,8 +117,8 @@ static int before_start(const State *s) {
 
 /* From now on tapes are not specialised for the value of a parameter. */
 void mark_tuned(Instance *c, int parameter) {
-    c->work.decided_by += !c->work.tuned[parameter];
-    c->work.tuned[parameter] = 1;
+    c->decided_by += !c->tuned[parameter];
+    c->tuned[parameter] = 1;
 }
 
 static Result set_parameter(Instance *c, const Variable *v, double value) {
