@@ -207,7 +207,6 @@ Result check_singular(Instance *c);
 Result settle(Instance *c);
 double input_at(const Instance *c, int k, double t);
 /* start.c */
-void start_defaults(Instance *c);
 void start_values(Instance *c);
 Result start_solve(Instance *c);
 void choose_modes(Instance *c, unsigned char *decided);
@@ -313,7 +312,6 @@ Result set_experiment(
     Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined, double stop);
 Result state_copy_out(Instance *c, void **copy);
 Result state_copy_in(Instance *c, const void *copy);
-const double *copied(const Instance *c, const void *copy, const double *values);
 Result state_release(Instance *c, void **copy);
 size_t state_size(const Instance *c);
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size);

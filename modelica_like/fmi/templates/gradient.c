@@ -55,6 +55,11 @@ static double *part_of(const Instance *c, const Tangent *one, const double *valu
     return one->now + (values - c->numbers);
 }
 
+/* Where numbers of the state lie in a copy. */
+static const double *copied(const Instance *c, const void *copy, const double *values) {
+    return (const double *)(const void *)((const char *)copy + sizeof(State)) + (values - c->numbers);
+}
+
 /* ---- steps ------------------------------------------------------------------------------------------------------ */
 
 /* Parameters, inputs and discrete values move along a tangent; if `moving` (at the present point, where factor_implicit

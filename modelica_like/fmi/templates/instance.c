@@ -102,14 +102,17 @@ static void set_tolerance(State *s, const Model *m, double relative) {
 }
 
 void instance_reset(Instance *c) {
+    const Model *m = c->model;
     State *s = &c->state;
     memset(s, 0, sizeof *s);
     memset(c->numbers, 0, c->n_numbers * sizeof(double));
     s->phase = PHASE_INSTANTIATED;
-    set_tolerance(s, c->model, c->model->settings->default_tolerance);
+    set_tolerance(s, m, m->settings->default_tolerance);
     c->variables_valid = c->look_valid = 0;
     gradient_end(c);
-    start_defaults(c);
+    memcpy(c->p, m->parameters, m->n_p * sizeof(double));
+    memcpy(c->u, m->inputs, m->n_u * sizeof(double));
+    memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
 }
 
 static Instance *instance_make(const Instance *bare) {
@@ -153,7 +156,6 @@ Instance *instance_for(const Model *m, void *environment) {
 /* The same with a model of its own: the one that is compiled in, or else the one in the folder of resources. */
 Instance *instance_open(Instance bare, const char *token, const char *location) {
     char message[MESSAGE_LENGTH];
-    Instance *c;
     Model *own = model_data_size > 0 ? model_read((const unsigned char *)model_data, model_data_size, bare.allocate,
                                            bare.release, message)
                                      : model_open(location, bare.allocate, bare.release, message);
@@ -163,17 +165,16 @@ Instance *instance_open(Instance bare, const char *token, const char *location) 
         return NULL;
     }
     bare.model = own;
-    c = instance_new(bare, token);
+    Instance *c = instance_new(bare, token);
     if (c == NULL) model_free(own);
     else c->own_model = own;
     return c;
 }
 
 void instance_free(Instance *c) {
-    Release release = c->release;
     gradient_end(c);
     if (c->own_model != NULL) model_free(c->own_model);
-    release(c);
+    c->release(c);
 }
 
 Result set_experiment(
@@ -201,28 +202,16 @@ typedef struct {
 static size_t copy_size(const Instance *c) { return sizeof(State) + c->n_numbers * sizeof(double); }
 
 static Header header_of(const Instance *c, const void *copy) {
-    Header h = {"MLSTAT3", copy_size(c), 0, 0};
-    h.model = crc32_of((const unsigned char *)c->model->token, strlen(c->model->token));
-    h.check = crc32_of(copy, copy_size(c));
-    return h;
-}
-
-static Result room_for_copy(Instance *c, void **copy) {
-    if (*copy == NULL) *copy = c->allocate(1, copy_size(c));
-    if (*copy != NULL) return RESULT_OK;
-    return fail(c, "There is not enough memory for a copy of the state.");
+    const unsigned char *token = (const unsigned char *)c->model->token;
+    return (Header){"MLSTAT3", copy_size(c), crc32_of(token, (size_t)c->model->n_token), crc32_of(copy, copy_size(c))};
 }
 
 Result state_copy_out(Instance *c, void **copy) {
-    if (!room_for_copy(c, copy)) return RESULT_ERROR;
+    if (*copy == NULL) *copy = c->allocate(1, copy_size(c));
+    if (*copy == NULL) return fail(c, "There is not enough memory for a copy of the state.");
     memcpy(*copy, &c->state, sizeof(State));
     memcpy((char *)*copy + sizeof(State), c->numbers, c->n_numbers * sizeof(double));
     return RESULT_OK;
-}
-
-/* Where numbers of the state lie in a copy. */
-const double *copied(const Instance *c, const void *copy, const double *values) {
-    return (const double *)(const void *)((const char *)copy + sizeof(State)) + (values - c->numbers);
 }
 
 Result state_copy_in(Instance *c, const void *copy) {
@@ -250,14 +239,12 @@ Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t s
 }
 
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy) {
-    Header h, expected;
     if (size != state_size(c)) return fail(c, "A state of this model has %zu bytes, not %zu.", state_size(c), size);
-    memcpy(&h, bytes, sizeof h);
-    expected = header_of(c, bytes + sizeof h);
-    if (memcmp(&h, &expected, sizeof h) != 0)
+    Header h = header_of(c, bytes + sizeof h);
+    if (memcmp(&h, bytes, sizeof h) != 0)
         return fail(c, "These bytes are not a state of this model: it is another model's, or they are damaged.");
     *copy = NULL;
-    if (!room_for_copy(c, copy)) return RESULT_ERROR;
+    if (!state_copy_out(c, copy)) return RESULT_ERROR;
     memcpy(*copy, bytes + sizeof h, copy_size(c));
     return RESULT_OK;
 }

@@ -6,13 +6,6 @@
 #define CONSISTENT 1e-8
 #define AT_REST (-1) /* in place of a start value: the variable is zero */
 
-void start_defaults(Instance *c) {
-    const Model *m = c->model;
-    memcpy(c->p, m->parameters, m->n_p * sizeof(double));
-    memcpy(c->u, m->inputs, m->n_u * sizeof(double));
-    memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
-}
-
 /* Start values as the model says, or as they were given. */
 void start_values(Instance *c) {
     evaluate_now(c, &c->model->tapes.start_values, c->start_values);
