@@ -163,13 +163,6 @@ static int choose_start_modes(Instance *c, const double *begun) {
     return memcmp(c->d_before, c->d, (size_t)m->n_d * sizeof(double)) != 0;
 }
 
-static void start_discretes(Instance *c) {
-    double *values = c->guards;
-    evaluate_now(c, &c->model->tapes.discrete_starts, values);
-    for (int k = 0; k < c->model->n_d; k++)
-        if (!c->mode_given[k]) c->d[k] = values[k];
-}
-
 /* The steady state of the present modes, in which what they hold stands still; held motions become what they were. */
 static Result find_steady(Instance *c, double *begun) {
     const Model *m = c->model;
@@ -189,7 +182,7 @@ static Result find_steady(Instance *c, double *begun) {
 /* Surfaces that stick against too large a torque are not in equilibrium. */
 static Result check_modes_hold(Instance *c) {
     const Model *m = c->model;
-    double *guards = c->guards;
+    double *guards = c->guards_before;
     if (m->n_guards == 0 || !m->settings->steady) return RESULT_OK;
     evaluate_now(c, &m->tapes.guards, guards);
     for (int k = 0; k < m->n_guards; k++) {
@@ -203,24 +196,26 @@ static Result check_modes_hold(Instance *c) {
 
 static Result pass_start(Instance *c) {
     const Model *m = c->model;
-    double *begun = c->begun;
+    double *begun = m->settings->steady ? c->begun : NULL;
     int round;
     if (!check_tables(c)) return RESULT_ERROR;
     memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
-    start_discretes(c);
+    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
+    for (int k = 0; k < m->n_d; k++)
+        if (!c->mode_given[k]) c->d[k] = c->guards[k];
     share(c);
     start_values(c);
     apply(c, m->start_guess, m->n_start_guess);
-    if (m->settings->steady) {
+    if (begun) {
         apply(c, m->start_default, m->n_start_default);
         if (!apply_direct(c, c->start_values)) return RESULT_ERROR;
         choose_start_modes(c, NULL);
         share(c);
     }
     for (round = 0; round < MODE_ROUNDS; round++) {
-        if (!(m->settings->steady ? find_steady(c, begun) : solve_states(c))) return RESULT_ERROR;
-        if (!choose_start_modes(c, m->settings->steady ? begun : NULL)) break;
+        if (!(begun ? find_steady(c, begun) : solve_states(c))) return RESULT_ERROR;
+        if (!choose_start_modes(c, begun)) break;
         share(c);
     }
     if (round == MODE_ROUNDS)
@@ -229,8 +224,7 @@ static Result pass_start(Instance *c) {
     replace_dependent(c);
     if (!solve_now(c, 0) || !check_singular(c) || !check_modes_hold(c)) return RESULT_ERROR;
     c->state.z_valid = c->state.solved = 1;
-    c->state.piece_valid = c->state.event_pending = 0;
-    c->variables_valid = 0;
+    c->state.piece_valid = c->state.event_pending = c->variables_valid = 0;
     return RESULT_OK;
 }
 

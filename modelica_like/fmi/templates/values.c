@@ -45,17 +45,15 @@ static const double *seen(Instance *c, const Variable *v) {
 }
 
 /* In initialization mode, whatever was set since the last time must have its effect before anything is read. */
-static Result make_ready(Instance *c, const Variable *v) {
-    if (c->state.phase != PHASE_INITIALIZATION || c->state.solved || v->kind == KIND_PARAMETER ||
-        v->kind == KIND_INPUT || v->kind == KIND_TIME || v->kind == KIND_DERIVED)
-        return RESULT_OK;
-    return start_solve(c);
+static Result make_ready(Instance *c) {
+    return c->state.phase != PHASE_INITIALIZATION || c->state.solved || start_solve(c);
 }
 
 /* Of a variable that is known, or NULL: then its reference was wrong. */
 Result get_value(Instance *c, const Variable *v, double *value) {
-    const double *values;
-    if (v == NULL || !make_ready(c, v)) return RESULT_ERROR;
+    const int known = 1 << KIND_PARAMETER | 1 << KIND_INPUT | 1 << KIND_TIME | 1 << KIND_DERIVED;
+    const double *values = NULL;
+    if (v == NULL || (!(known & 1 << v->kind) && !make_ready(c))) return RESULT_ERROR;
     switch (v->kind) {
         case KIND_TIME: *value = c->state.t; return RESULT_OK;
         case KIND_STATE: *value = c->x[v->index]; return RESULT_OK;
@@ -65,13 +63,11 @@ Result get_value(Instance *c, const Variable *v, double *value) {
         default: values = seen(c, v);
     }
     if (values != NULL) *value = values[v->index];
-    return values != NULL ? RESULT_OK : RESULT_ERROR;
+    return values != NULL;
 }
 
 /* Solves what getting a value from the present point needs. */
-Result make_consistent(Instance *c) {
-    return (c->state.phase != PHASE_INITIALIZATION || c->state.solved || start_solve(c)) && settle(c);
-}
+Result make_consistent(Instance *c) { return make_ready(c) && settle(c); }
 
 void get_derivatives(Instance *c, double *derivatives) {
     evaluate_now(c, &c->model->tapes.rates, c->rhs);
@@ -140,12 +136,10 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
 /* Columns of tables must rise; they are set number by number, so this is asked where they are needed. */
 Result check_tables(Instance *c) {
     const Model *m = c->model;
-    for (int k = 0; k < m->n_rising; k++) {
-        const Rising *one = &m->rising[k];
+    for (const Rising *one = m->rising; one < m->rising + m->n_rising; one++)
         if (!(c->p[one->below] < c->p[one->above]))
             return fail(c, "%s = %g is not above %s = %g: this column of the table must rise.",
                 text_of(m, one->above_name), c->p[one->above], text_of(m, one->below_name), c->p[one->below]);
-    }
     return RESULT_OK;
 }
 
