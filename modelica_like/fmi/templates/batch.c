@@ -44,13 +44,13 @@ typedef struct {
 /* All variables that are asked for, now or at a time within the step that has just been taken. */
 static const double *variables_at(Batch *b, double t, int now) {
     Instance *c = b->c;
-    double *point = c->work.vector + c->model->n_z;
+    double *point = c->vector + c->model->n_z;
     if (now) memcpy(point, c->x, (size_t)c->model->n_unknowns * sizeof(double));
     else piece_at(c->model, c->piece, t, point);
-    if (solve_implicit(c, t, point, 1) != RESULT_OK) b->failed = 1;
+    if (!solve_implicit(c, t, point, 1)) b->failed = 1;
     c->variables_valid = 0;
-    evaluate_special(c, SPECIAL_VARIABLES, t, point, c->work.variables);
-    return c->work.variables;
+    evaluate_special(c, &c->model->tapes.variables, t, point, c->variables);
+    return c->variables;
 }
 
 /* Takes a result. */
@@ -152,9 +152,9 @@ static void set_numbers(Batch *b, int64_t run) {
 
 static int start_run(Batch *b, int64_t run) {
     const NativeBatch *a = b->asked;
-    if (instance_prepare(b->c, a->start, a->end, a->rtol, a->atol) != RESULT_OK) return 0;
+    if (!instance_prepare(b->c, a->start, a->end, a->rtol, a->atol)) return 0;
     set_numbers(b, run);
-    return start_solve(b->c) == RESULT_OK && instance_begin(b->c) == RESULT_OK;
+    return start_solve(b->c) && instance_begin(b->c);
 }
 
 /* Returns 0 if the run cannot go on. */
@@ -163,7 +163,7 @@ static int run_to_end(Batch *b) {
     State *s = &c->state;
     while ((s->t < b->asked->end || s->at_event) && !b->failed && !*b->asked->stop) {
         if (s->at_event) {
-            if (handle_event(c) != RESULT_OK || b->events > b->asked->most_events) return 0;
+            if (!handle_event(c) || b->events > b->asked->most_events) return 0;
         } else switch (integrate_to(c, b->asked->end, 1)) {
                 case FAILED: return 0;
                 case AT_EVENT: read_piece(b); break;
@@ -209,7 +209,7 @@ EXPORTED int64_t native_batch(const Model *m, const NativeBatch *asked) {
     if (begin_batch(&b, m))
         for (run = 0; run < asked->n_runs && !*asked->stop; run++) {
             begin_readings(&b, run);
-            asked->failed[run] = !start_run(&b, run) || !run_to_end(&b) || finish(b.c) != RESULT_OK;
+            asked->failed[run] = !start_run(&b, run) || !run_to_end(&b) || !finish(b.c);
             if (!asked->failed[run] && !*asked->stop) read_end(&b);
             if (*asked->stop) break;
         }

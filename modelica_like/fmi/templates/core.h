@@ -31,7 +31,8 @@ OLD(fmod);
 #define NOISE 1e-30           /* a decaying signal ends by swinging around zero with such values; that is no event */
 #define CROWD 24              /* further instants in a short time follow each other ever faster */
 
-typedef enum { RESULT_OK, RESULT_DISCARD, RESULT_ERROR } Result;
+/* Zero is failure: results are asked for and joined like conditions. */
+typedef enum { RESULT_ERROR, RESULT_OK, RESULT_DISCARD } Result;
 
 /* ---- state and instance ----------------------------------------------------------------------------------------- */
 
@@ -74,30 +75,6 @@ typedef struct {
     double gain, forward, backward, restitution;
 } Terms; /* of a motion that modes hold */
 
-typedef struct { /* an impact: of all motions that modes hold */
-    double *before, *approach, *impulse, *reaction;
-    unsigned char *entering, *loose, *held;
-    unsigned char *knocked; /* let go in the impact itself */
-    double *jump;           /* of the states */
-    int hard;               /* what nothing limits stops more than what rounding leaves */
-} Strike;
-
-typedef struct { /* at one instant: what has been stopped, and the states before the first impact */
-    int struck;
-    double *x;
-    unsigned char *entered;
-} Impacts;
-
-typedef enum {
-    SPECIAL_RATES,
-    SPECIAL_JACOBIAN,
-    SPECIAL_ALG,
-    SPECIAL_ALG_JACOBIAN,
-    SPECIAL_VARIABLES,
-    SPECIAL_GUARDS,
-    N_SPECIALS
-} SpecialTape;
-
 typedef struct { /* a tape for the present modes, see special.c */
     Tape tape;
     Run *runs;
@@ -106,35 +83,54 @@ typedef struct { /* a tape for the present modes, see special.c */
     int first_known, uses;
     uint64_t belongs_to;
 } Special;
+enum { N_SPECIALS = 6 }; /* of the first tapes of a model */
 
-/* Arrays of the model's sizes. Those of single functions are named after them; a function that calls another one does
- * not share with it. */
+/* Arrays with their sizes, for which lay_out has short names. */
+#define FIELD(name, size) *name
+
+/* An impact: of all motions that modes hold, and its jump of the states. */
+#define STRIKE_NUMBERS(A) A(before, holds), A(approach, holds), A(impulse, holds), A(reaction, holds), A(jump, n)
+/* knocked: let go in the impact itself */
+#define STRIKE_MARKS(A) A(entering, holds), A(loose, holds), A(held, holds), A(knocked, holds)
 typedef struct {
-    double *slots, *dots; /* values, and derivatives in either direction or three Taylor coefficients, of tape slots */
-    double *jacobian, *matrix, *qr_v, *qr_r, *qr_beta, *qr_work, *dense_matrix, *square, *vector, *residual, *rhs;
-    double *stages, *point, *first, *first_rates; /* of the integrator: 8 stages, a point; where the step begins */
-    double *variables, *guards, *guards_before, *looks, *seen_rates, *seen_indicators, *seen_derived;
-    double *start_unknowns, *start_values, *start_residual;
-    double *delayed, *series; /* values and delays; terms of two series per delay */
-    double *begun;            /* motions that may be held, where the search for a steady state began */
-    double *d_before, *d_earlier, *d_fired, *reset_values, *target_values, *respond_d, *respond_z, *rates, *x_kept;
-    double *weights, *base_weights, *use, *best, *kept_z, *reactions, *sizes, *zeros;
-    int *order; /* pivots of the implicit equations */
-    int *targets, *standing, *places, *member, *pivots, *same, *places_of_slots, *special_outputs;
-    unsigned char *known, *decided, *wanting, *changed, *kinds, *held, *other, *known_slots, *needed_slots;
-    unsigned char *open_rows;     /* implicit equations that depend on others */
-    unsigned char *asked, *tuned; /* variables that somebody reads; parameters that have changed in a run */
-    Piece *whole;
-    Terms *terms, *strike_terms;
-    Strike strike;
-    Impacts impacts;
-    Special special[N_SPECIALS];
-    Run *special_runs;
-    Operands *special_operands;
-    uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
-} Work;
+    double STRIKE_NUMBERS(FIELD);
+    unsigned char STRIKE_MARKS(FIELD);
+    int hard; /* what nothing limits stops more than what rounding leaves */
+} Strike;
+
+/* Those of single functions are named after them; a function that calls another one does not share with it. Tapes have
+ * `slots` (values) and `dots` (derivatives in either direction, or three Taylor coefficients), the integrator 8 stages
+ * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
+ * steady state began; `impact_x` are states before the first impact at an instant. */
+#define WORK_NUMBERS(A)                                                                                              \
+    A(slots, slots + left), A(dots, 3 * slots), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),                \
+        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),  \
+        A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),         \
+        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),         \
+        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS), \
+        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),            \
+        A(start_unknowns, system), A(start_values, starts), A(start_residual, larger(m->n_start_values, resets)),    \
+        A(delayed, 2 * delays), A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(d_before, n_d),              \
+        A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets), A(respond_d, n_d),    \
+        A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(weights, holds), A(base_weights, holds), \
+        A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), A(sizes, members), A(zeros, members)
+/* order: pivots of the implicit equations */
+#define WORK_INDICES(A)                                                                                          \
+    A(order, n_z), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), A(member, members), \
+        A(pivots, members), A(same, slots), A(places_of_slots, slots)
+/* open_rows: implicit equations that depend on others; asked: variables that somebody reads; tuned: parameters that
+ * have changed in a run; entered: what has begun to hold at an instant */
+#define WORK_MARKS(A)                                                                                               \
+    A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
+        A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
+        A(tuned, m->n_p), A(entered, holds)
 
 typedef struct Gradient Gradient; /* see gradient.c */
+
+/* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns. */
+#define SMOOTH_NUMBERS(A) A(x, n), A(p, m->n_p), A(u, m->n_u), A(u_rate, m->n_u), A(d, n_d), A(start_value, starts)
+/* wanting: transitions that fire at the end of the piece */
+#define STATE_MARKS(A) A(mode_given, n_d), A(start_given, starts), A(wanting, m->n_transitions)
 
 typedef struct Instance {
     const Model *model;
@@ -142,15 +138,23 @@ typedef struct Instance {
     State state;
     double *numbers;            /* the rest of the state: the arrays that follow */
     size_t n_numbers, n_smooth; /* how many; the first ones, of which the rest of the run is a function */
-    double *x, *z, *p, *u, *d;  /* z stands behind x: together they are a point */
-    double *u_rate;             /* inputs are u + u_rate * (t - u_time) */
-    double *start_value;
-    unsigned char *start_given, *mode_given;
-    unsigned char *wanting; /* transitions that fire at the end of the piece */
+    double SMOOTH_NUMBERS(FIELD);
+    unsigned char STATE_MARKS(FIELD);
     Piece *piece;
     double *past, *past_sizes; /* what delayed values were, see delay.c; their sizes */
     double *end_look;          /* guards and their rates at the end of the last fixed step */
-    Work work;
+    double *z;                 /* in x: together they are a point */
+
+    double WORK_NUMBERS(FIELD);
+    int WORK_INDICES(FIELD);
+    unsigned char WORK_MARKS(FIELD);
+    Piece *whole;
+    Terms *terms, *strike_terms;
+    Strike strike;
+    int stopped; /* something has been stopped at the present instant */
+    Special special[N_SPECIALS];
+    uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
+
     const char *name;
     void *environment;
     AnyFunction logger, intermediate_update;
@@ -179,8 +183,8 @@ void tape_tangent(const Tape *tape, const double *slots, double *dots, double *o
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars);
 void slopes(int operation, double a, double b, double f, double *by_left, double *by_right);
 /* linear.c */
-int qr_factor(const QrPattern *pattern, const double *values, Work *work);
-void qr_solve(const QrPattern *pattern, const Work *work, double *x);
+int qr_factor(const QrPattern *pattern, const double *values, Instance *c);
+void qr_solve(const QrPattern *pattern, const Instance *c, double *x);
 int lu_factor(int n, double *matrix, int *order);
 void lu_solve(int n, const double *matrix, const int *order, double *x);
 void lu_solve_transposed(int n, const double *matrix, const int *order, double *x);
@@ -189,9 +193,8 @@ double make_orthogonal(int rows, int columns, double *a, double *turns, double *
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
 /* special.c */
-const Tape *full_tape(const Model *m, SpecialTape which);
-void run_special(Instance *c, SpecialTape which, double *outputs);
-void evaluate_special(Instance *c, SpecialTape which, double t, const double *point, double *outputs);
+void run_special(Instance *c, const Tape *tape, double *outputs);
+void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
 /* point.c */
 void load(Instance *c, double t, const double *point);
@@ -206,7 +209,6 @@ Result check_singular(Instance *c);
 Result settle(Instance *c);
 double input_at(const Instance *c, int k, double t);
 /* start.c */
-void start_defaults(Instance *c);
 void start_values(Instance *c);
 Result start_solve(Instance *c);
 void choose_modes(Instance *c, unsigned char *decided);
@@ -218,6 +220,7 @@ void find_held(Instance *c, Terms *terms, unsigned char *held);
 double largest_like(const Model *m, const double *values, int node);
 int anything_shared(const Instance *c);
 void share(Instance *c);
+Result share_and_solve(Instance *c);
 void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
 /* ideal.c */
@@ -228,7 +231,7 @@ Result meet(Instance *c, double keep, int *any);
 Result renew(Instance *c);
 int same_modes(const Instance *c, const double *before);
 /* impacts.c */
-Result stop_motions(Instance *c, const double *before, Impacts *impacts);
+Result stop_motions(Instance *c, const double *before);
 /* delay.c */
 #define MOST_PAST 8192 /* rows */
 void keep_past(Instance *c, double t, const double *point, double order);
@@ -294,10 +297,11 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
     const double *seed, double *result);
 Result check_knowns(Instance *c, const uint32_t *knowns, size_t n);
 Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n);
-void tangent_of_implicit(Instance *c, const int *order);
+void tangent_now(Instance *c, const Tape *tape, double *results);
+void tangent_of_implicit(Instance *c);
 void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
-Result factor_implicit(Instance *c, int *order);
+Result factor_implicit(Instance *c);
 /* native.c */
 Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol);
 Result instance_begin(Instance *c);
@@ -319,7 +323,6 @@ Result set_experiment(
     Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined, double stop);
 Result state_copy_out(Instance *c, void **copy);
 Result state_copy_in(Instance *c, const void *copy);
-const double *copied(const Instance *c, const void *copy, const double *values);
 Result state_release(Instance *c, void **copy);
 size_t state_size(const Instance *c);
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size);

@@ -35,7 +35,7 @@ static void forget(Instance *c, const double *delayed) {
 /* Notes what is delayed, as a new row behind a jump or kink of an order, or -1. */
 void keep_past(Instance *c, double t, const double *point, double order) {
     State *s = &c->state;
-    double *delayed = c->work.delayed;
+    double *delayed = c->delayed;
     Row *row;
     if (c->model->n_delays == 0 || (s->n_past == 0 && order < 0)) return;
     while (s->n_past > 1 && last_row(c)->t > t) s->n_past--;
@@ -88,7 +88,7 @@ static double allowed_of(const Instance *c, int which) {
 
 /* Do rows tell what is delayed along the present piece, in the middle of two of its n parts? */
 static int is_told(Instance *c, double begin, double end, int n) {
-    double *point = c->work.vector + c->model->n_z, *delayed = c->work.delayed;
+    double *point = c->vector + c->model->n_z, *delayed = c->delayed;
     for (int part = 0; part < n; part += n / 2) {
         double t = begin + (end - begin) * (part + 0.5) / n;
         piece_at(c->model, c->piece, t, point);
@@ -101,7 +101,7 @@ static int is_told(Instance *c, double begin, double end, int n) {
 
 /* Notes what is delayed along the present piece, in as many parts as it takes. */
 void keep_piece(Instance *c, double end) {
-    double *point = c->work.vector + c->model->n_z, begin;
+    double *point = c->vector + c->model->n_z, begin;
     if (c->model->n_delays == 0 || c->state.n_past == 0) return;
     begin = last_row(c)->t;
     if (!(begin < end)) return;
@@ -119,7 +119,7 @@ void keep_piece(Instance *c, double end) {
 void keep_before_change(Instance *c) {
     if (c->state.n_past == 0) return;
     if (c->state.piece_valid) keep_piece(c, c->state.t);
-    else if (c->state.phase == PHASE_EVENT && settle(c) == RESULT_OK) keep_past(c, c->state.t, c->x, -1);
+    else if (c->state.phase == PHASE_EVENT && settle(c)) keep_past(c, c->state.t, c->x, -1);
 }
 
 /* The series of all delays for a time ahead; returns its last terms in tolerances. */
@@ -155,7 +155,7 @@ static double resolved(Instance *c, double half, const double *delayed, double *
 static Result renew_delays(Instance *c) {
     const Model *m = c->model;
     State *s = &c->state;
-    double *delayed = c->work.delayed, *terms = c->work.series, end = INFINITY, half, order = INFINITY;
+    double *delayed = c->delayed, *terms = c->series, end = INFINITY, half, order = INFINITY;
     double resolution = just_after(s) - s->t;
     evaluate_now(c, &m->tapes.delays, delayed);
     for (int k = 0; k < m->n_delays; k++) {
@@ -182,7 +182,7 @@ static Result renew_delays(Instance *c) {
     }
     s->delayed_until = s->t + 2 * half;
     c->variables_valid = 0;
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
+    if (!solve_now(c, 0)) return RESULT_ERROR;
     if (isinf(order)) return RESULT_OK;
     evaluate_now(c, &m->tapes.delays, delayed);
     for (int k = 0; k < m->n_delays; k++)

@@ -4,13 +4,8 @@
 
 /* Slot of what derivatives are taken by. */
 static int known_slot(const Model *m, const Variable *v) {
-    switch (v->kind) {
-        case KIND_TIME: return 0;
-        case KIND_STATE: return m->slot_x + v->index;
-        case KIND_PARAMETER: return m->slot_p + v->index;
-        case KIND_INPUT: return m->slot_u + v->index;
-        default: return -1;
-    }
+    const int first[N_KINDS] = {[KIND_STATE] = m->slot_x, [KIND_PARAMETER] = m->slot_p, [KIND_INPUT] = m->slot_u};
+    return v->kind == KIND_TIME ? 0 : first[v->kind] > 0 ? first[v->kind] + v->index : -1;
 }
 
 /* Before the end of the initialization start values are known instead of states. */
@@ -41,72 +36,71 @@ Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
 }
 
 /* Factorises the Jacobian of the implicit equations at the present point, with the slots of m->tapes.rates filled. */
-Result factor_implicit(Instance *c, int *order) {
-    if (settle(c) != RESULT_OK) return RESULT_ERROR;
-    evaluate_now(c, &c->model->tapes.alg_jacobian, c->work.dense_matrix);
-    if (!lu_factor(c->model->n_z, c->work.dense_matrix, order))
+Result factor_implicit(Instance *c) {
+    if (!settle(c)) return RESULT_ERROR;
+    evaluate_now(c, &c->model->tapes.alg_jacobian, c->dense_matrix);
+    if (!lu_factor(c->model->n_z, c->dense_matrix, c->order))
         return fail(c, "The implicit equations are singular at t = %.9g s.", c->state.t);
     return RESULT_OK;
 }
 
+/* Derivatives of what a tape gives at the present point, with the dots of its arguments given. */
+void tangent_now(Instance *c, const Tape *tape, double *results) {
+    evaluate_now(c, tape, results);
+    tape_tangent(tape, c->slots, c->dots, results);
+}
+
 /* With the dots of the arguments given, fills those of z. */
-void tangent_of_implicit(Instance *c, const int *order) {
+void tangent_of_implicit(Instance *c) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    double *dots = w->dots;
+    double *dots = c->dots;
     if (m->n_z == 0) return;
     memset(dots + m->slot_z, 0, m->n_z * sizeof(double));
-    evaluate_now(c, &m->tapes.alg, w->vector);
-    tape_tangent(&m->tapes.alg, w->slots, dots, w->vector);
-    lu_solve(m->n_z, w->dense_matrix, order, w->vector);
-    for (int k = 0; k < m->n_z; k++) dots[m->slot_z + k] = -w->vector[k];
+    tangent_now(c, &m->tapes.alg, c->vector);
+    lu_solve(m->n_z, c->dense_matrix, c->order, c->vector);
+    for (int k = 0; k < m->n_z; k++) dots[m->slot_z + k] = -c->vector[k];
 }
 
 static void seed_knowns(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
     for (size_t k = 0; k < n; k++) {
         const Variable *v = find_variable(c->model, knowns[k]);
-        if (!is_start(c, v)) c->work.dots[known_slot(c->model, v)] += seed[k];
+        if (!is_start(c, v)) c->dots[known_slot(c->model, v)] += seed[k];
     }
 }
 
 /* Newton's last step once more, with what the start equations change by instead of what they lack. */
 static Result start_system_tangent(Instance *c, const double *start_dots) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    double *step = w->start_unknowns;
-    evaluate_now(c, &m->tapes.start_system, w->start_residual);
-    tape_run(&m->tapes.start_jacobian, w->slots, w->jacobian);
-    if (!qr_factor(&m->start, w->jacobian, w))
+    double *step = c->start_unknowns;
+    evaluate_now(c, &m->tapes.start_system, c->start_residual);
+    tape_run(&m->tapes.start_jacobian, c->slots, c->jacobian);
+    if (!qr_factor(&m->start, c->jacobian, c))
         return fail(c, "The start equations are singular at t = %.9g s.", c->state.t);
-    evaluate_now(c, &m->tapes.start_system, w->start_residual);
-    tape_tangent(&m->tapes.start_system, w->slots, w->dots, w->start_residual);
+    tangent_now(c, &m->tapes.start_system, c->start_residual);
     for (int k = 0; k < m->n_start_unknowns; k++) {
         int start = m->start_rows[k].start;
-        step[k] = (start < 0 ? 0 : start_dots[start]) - w->start_residual[m->start_rows[k].row];
+        step[k] = (start < 0 ? 0 : start_dots[start]) - c->start_residual[m->start_rows[k].row];
     }
-    qr_solve(&m->start, w, step);
+    qr_solve(&m->start, c, step);
     for (int k = 0; k < m->n_start_unknowns; k++)
-        if (m->start_columns[k] < m->n_x) w->dots[m->slot_x + m->start_columns[k]] = step[k];
+        if (m->start_columns[k] < m->n_x) c->dots[m->slot_x + m->start_columns[k]] = step[k];
     return RESULT_OK;
 }
 
 /* What states change by with parameters, inputs and start values: through the start equations, in the modes found. */
 static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    double *dots = w->dots, *starts = w->start_values;
+    double *dots = c->dots, *starts = c->start_values;
     c->state.solved = 0;
-    if (start_solve(c) != RESULT_OK) return RESULT_ERROR;
+    if (!start_solve(c)) return RESULT_ERROR;
     if (m->settings->steady || anything_shared(c))
         return fail(
             c, "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
     memset(dots, 0, m->slot_results * sizeof(double));
     seed_knowns(c, knowns, n, seed);
-    evaluate_now(c, &m->tapes.discrete_starts, w->guards);
-    tape_tangent(&m->tapes.discrete_starts, w->slots, dots, w->guards);
-    for (int k = 0; k < m->n_d; k++) dots[m->slot_d + k] = c->mode_given[k] ? 0 : w->guards[k];
-    evaluate_now(c, &m->tapes.start_values, starts);
-    tape_tangent(&m->tapes.start_values, w->slots, dots, starts);
+    tangent_now(c, &m->tapes.discrete_starts, c->guards);
+    for (int k = 0; k < m->n_d; k++) dots[m->slot_d + k] = c->mode_given[k] ? 0 : c->guards[k];
+    tangent_now(c, &m->tapes.start_values, starts);
     for (int k = 0; k < m->n_starts; k++) starts[k] = c->start_given[k] ? 0 : starts[k];
     for (size_t k = 0; k < n; k++) {
         const Variable *v = find_variable(m, knowns[k]);
@@ -117,104 +111,84 @@ static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const
     return m->n_start_unknowns > 0 ? start_system_tangent(c, starts) : RESULT_OK;
 }
 
-/* A tape that gives values of one kind of variables, and room for them. */
-typedef struct {
-    const Tape *tape;
-    double *room;
-} Given;
-
-static void find_given(const Instance *c, Given *by_kind) {
-    const Model *m = c->model;
-    const Work *w = &c->work;
-    memset(by_kind, 0, N_KINDS * sizeof *by_kind);
-    by_kind[KIND_DERIVATIVE] = (Given){&m->tapes.rates, w->rhs};
-    by_kind[KIND_VARIABLE] = (Given){&m->tapes.variables, w->variables};
-    by_kind[KIND_DERIVED] = (Given){&m->tapes.derived, w->guards};
-    by_kind[KIND_GUARD] = (Given){&m->tapes.guards, w->guards_before};
+/* The tape that gives values of a kind of variables, or NULL. */
+static const Tape *tape_of(const Model *m, int kind) {
+    if (kind == KIND_DERIVATIVE) return &m->tapes.rates;
+    if (kind == KIND_VARIABLE) return &m->tapes.variables;
+    return kind == KIND_DERIVED ? &m->tapes.derived : kind == KIND_GUARD ? &m->tapes.guards : NULL;
 }
+
+static int is_idle(const Instance *c, const Variable *v) { return v->kind == KIND_GUARD && !guard_active(c, v->index); }
 
 /* Reads derivatives off the tangents of all arguments. */
 void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride) {
-    Work *w = &c->work;
-    Given given[N_KINDS];
-    find_given(c, given);
-    c->variables_valid = 0;
-    for (int k = 0; k < N_KINDS; k++) {
-        if (given[k].tape == NULL) continue;
-        evaluate_now(c, given[k].tape, given[k].room);
-        tape_tangent(given[k].tape, w->slots, w->dots, given[k].room);
-    }
-    for (size_t k = 0; k < n; k++) {
-        const Variable *v = find_variable(c->model, unknowns[k]);
-        const double *room = given[v->kind].room;
-        if (v->kind == KIND_GUARD && !guard_active(c, v->index)) result[k * stride] = 0;
-        else result[k * stride] = room == NULL ? w->dots[known_slot(c->model, v)] : room[v->index];
+    const Model *m = c->model;
+    double *dots = c->dots, *values = c->outputs;
+    for (int kind = 0; kind < N_KINDS; kind++) {
+        const Tape *tape = tape_of(m, kind);
+        if (tape != NULL) tangent_now(c, tape, values);
+        for (size_t k = 0; k < n; k++) {
+            const Variable *v = find_variable(m, unknowns[k]);
+            if (v->kind != kind) continue;
+            result[k * stride] = is_idle(c, v) ? 0 : tape != NULL ? values[v->index] : dots[known_slot(m, v)];
+        }
     }
 }
 
 Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result) {
-    Work *w = &c->work;
-    if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
-        return RESULT_ERROR;
+    if (!check_unknowns(c, unknowns, n_unknowns) || !check_knowns(c, knowns, n_knowns)) return RESULT_ERROR;
     if (c->state.phase != PHASE_INITIALIZATION) {
-        memset(w->dots, 0, c->model->slot_results * sizeof(double));
+        memset(c->dots, 0, c->model->slot_results * sizeof(double));
         seed_knowns(c, knowns, n_knowns, seed);
-    } else if (start_tangent(c, knowns, n_knowns, seed) != RESULT_OK) return RESULT_ERROR;
-    if (factor_implicit(c, w->order) != RESULT_OK) return RESULT_ERROR;
-    tangent_of_implicit(c, w->order);
+    } else if (!start_tangent(c, knowns, n_knowns, seed)) return RESULT_ERROR;
+    if (!factor_implicit(c)) return RESULT_ERROR;
+    tangent_of_implicit(c);
     read_tangents(c, unknowns, n_unknowns, result, 1);
     return RESULT_OK;
 }
 
-/* From bars of z to bars of the arguments, through the implicit equations; order NULL: they are singular. */
-static void adjoint_of_implicit(Instance *c, const int *order) {
+/* From bars of z to bars of the arguments, through the implicit equations. */
+static void adjoint_of_implicit(Instance *c, int regular) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    double *residual = w->residual;
+    double *residual = c->residual;
     if (m->n_z == 0) return;
-    for (int k = 0; k < m->n_z; k++) w->vector[k] = -w->dots[m->slot_z + k];
-    if (order != NULL) lu_solve_transposed(m->n_z, w->dense_matrix, order, w->vector);
+    for (int k = 0; k < m->n_z; k++) c->vector[k] = -c->dots[m->slot_z + k];
+    if (regular) lu_solve_transposed(m->n_z, c->dense_matrix, c->order, c->vector);
     else {
-        memcpy(residual, w->vector, m->n_z * sizeof(double));
-        evaluate_now(c, &m->tapes.alg_jacobian, w->dense_matrix);
-        least_squares(m->n_z, m->n_z, w->dense_matrix, residual, w->vector);
+        memcpy(residual, c->vector, m->n_z * sizeof(double));
+        evaluate_now(c, &m->tapes.alg_jacobian, c->dense_matrix);
+        least_squares(m->n_z, m->n_z, c->dense_matrix, residual, c->vector);
     }
-    memset(w->dots + m->slot_z, 0, m->n_z * sizeof(double));
+    memset(c->dots + m->slot_z, 0, m->n_z * sizeof(double));
     evaluate_now(c, &m->tapes.alg, residual);
-    tape_adjoint(&m->tapes.alg, w->slots, w->dots, w->vector);
+    tape_adjoint(&m->tapes.alg, c->slots, c->dots, c->vector);
 }
 
 Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    int *order = c->work.order;
-    Given given[N_KINDS];
-    if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
+    if (!check_unknowns(c, unknowns, n_unknowns) || !check_knowns(c, knowns, n_knowns) || !factor_implicit(c))
         return RESULT_ERROR;
-    if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
-    memset(w->dots, 0, m->slot_results * sizeof(double));
+    memset(c->dots, 0, m->slot_results * sizeof(double));
     for (size_t k = 0; k < n_unknowns; k++) {
         int slot = known_slot(m, find_variable(m, unknowns[k]));
-        if (slot >= 0) w->dots[slot] += seed[k];
+        if (slot >= 0) c->dots[slot] += seed[k];
     }
-    c->variables_valid = 0;
-    find_given(c, given);
     for (int kind = 0; kind < N_KINDS; kind++) {
-        const Tape *tape = given[kind].tape;
-        double *bars = given[kind].room;
+        const Tape *tape = tape_of(m, kind);
+        double *bars = c->outputs;
         if (tape == NULL) continue;
         evaluate_now(c, tape, bars);
         memset(bars, 0, (size_t)tape->n_outputs * sizeof(double));
         for (size_t k = 0; k < n_unknowns; k++) {
             const Variable *v = find_variable(m, unknowns[k]);
-            if (v->kind == kind && (v->kind != KIND_GUARD || guard_active(c, v->index))) bars[v->index] += seed[k];
+            if (v->kind == kind && !is_idle(c, v)) bars[v->index] += seed[k];
         }
-        tape_adjoint(tape, w->slots, w->dots, bars);
+        tape_adjoint(tape, c->slots, c->dots, bars);
     }
-    adjoint_of_implicit(c, order);
-    for (size_t k = 0; k < n_knowns; k++) result[k] = w->dots[known_slot(m, find_variable(m, knowns[k]))];
+    adjoint_of_implicit(c, 1);
+    for (size_t k = 0; k < n_knowns; k++) result[k] = c->dots[known_slot(m, find_variable(m, knowns[k]))];
     return RESULT_OK;
 }
 
@@ -222,19 +196,18 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
  * equations for z singular; what depends on them is left out. `again`: at the same point as the call before. */
 void slope_of_node(Instance *c, int node, int again, double *by_state) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    int *order = w->order, follows = 0;
-    memset(w->dots, 0, m->slot_results * sizeof(double));
-    c->variables_valid = 0;
-    if (!again) evaluate_now(c, &m->tapes.variables, w->variables);
-    memset(w->variables, 0, m->n_nodes * sizeof(double));
-    w->variables[node] = 1;
-    tape_adjoint(&m->tapes.variables, w->slots, w->dots, w->variables);
-    for (int k = 0; k < m->n_z; k++) follows |= w->dots[m->slot_z + k] != 0;
+    double *bars = c->outputs;
+    int follows = 0;
+    memset(c->dots, 0, m->slot_results * sizeof(double));
+    if (!again) evaluate_now(c, &m->tapes.variables, bars);
+    memset(bars, 0, m->n_nodes * sizeof(double));
+    bars[node] = 1;
+    tape_adjoint(&m->tapes.variables, c->slots, c->dots, bars);
+    for (int k = 0; k < m->n_z; k++) follows |= c->dots[m->slot_z + k] != 0;
     if (follows) {
-        evaluate_now(c, &m->tapes.alg_jacobian, w->dense_matrix);
-        adjoint_of_implicit(c, lu_factor(m->n_z, w->dense_matrix, order) ? order : NULL);
-        evaluate_now(c, &m->tapes.variables, w->variables);
+        evaluate_now(c, &m->tapes.alg_jacobian, c->dense_matrix);
+        adjoint_of_implicit(c, lu_factor(m->n_z, c->dense_matrix, c->order));
+        evaluate_now(c, &m->tapes.variables, bars);
     }
-    memcpy(by_state, w->dots + m->slot_x, m->n_x * sizeof(double));
+    memcpy(by_state, c->dots + m->slot_x, m->n_x * sizeof(double));
 }

@@ -24,12 +24,12 @@ int guard_active(const Instance *c, int guard) {
 }
 
 /* Room for a mark per transition; none wants to fire yet. */
-unsigned char *nothing_wanting(Instance *c) { return memset(c->work.wanting, 0, (size_t)c->model->n_transitions); }
+unsigned char *nothing_wanting(Instance *c) { return memset(c->wishes, 0, (size_t)c->model->n_transitions); }
 
 double just_after(const State *s) { return s->t + SAME_TIME * fmax(1, fabs(s->t)); }
 
 double next_moment(Instance *c) {
-    double *moments = c->work.guards, next = c->model->n_delays > 0 ? c->state.delayed_until : INFINITY;
+    double *moments = c->guards, next = c->model->n_delays > 0 ? c->state.delayed_until : INFINITY;
     if (c->model->n_moments == 0) return next;
     evaluate_now(c, &c->model->tapes.moments, moments);
     for (int k = 0; k < c->model->n_transitions; k++) {
@@ -43,7 +43,7 @@ double next_moment(Instance *c) {
 /* Adds time events that are due and, unless they were found already, state events that are positive or about to be. */
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
     const Model *m = c->model;
-    double *values = c->work.guards;
+    double *values = c->guards;
     int any = 0;
     if (m->n_moments > 0) {
         evaluate_now(c, &m->tapes.moments, values);
@@ -66,7 +66,7 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
    edge, and would see them switch back and forth. They come a little later: after a switch nobody wants them, and
    indicators have to agree. `soon` has the guards at that end, and gets those of now instead. */
 void drop_balanced(Instance *c, double *soon) {
-    double *now = c->work.guards_before;
+    double *now = c->guards_before;
     int any = 0;
     for (int k = 0; k < c->model->n_guards; k++) any |= number_or_false(soon[k]) > 0 && guard_active(c, k);
     if (!any) return;
@@ -77,9 +77,9 @@ void drop_balanced(Instance *c, double *soon) {
 
 /* Move the states as little as possible, so that variables that follow from them take new values, or vanish. */
 void move_states(Instance *c, const int *nodes, const double *values, int count) {
-    double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
+    double *slopes = c->square, *change = c->start_residual, *step = c->point;
     variables_now(c);
-    for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->work.variables[nodes[k]];
+    for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->variables[nodes[k]];
     for (int k = 0; k < count; k++) slope_of_node(c, nodes[k], k > 0, slopes + (size_t)k * c->model->n_x);
     least_squares(count, c->model->n_x, slopes, change, step);
     for (int k = 0; k < c->model->n_x; k++) c->x[k] += step[k];
@@ -99,12 +99,10 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
 }
 
 /* Fire transitions together; of one mode only the one declared first. An error if one of them ends the run. */
-static Result fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
+static Result fire(Instance *c, const unsigned char *wanting) {
     const Model *m = c->model;
-    State *s = &c->state;
-    Work *w = &c->work;
-    double *values = w->reset_values, *d = w->d_fired;
-    unsigned char *changed = memset(w->changed, 0, (size_t)m->n_modes);
+    double *values = c->reset_values, *d = c->d_fired;
+    unsigned char *changed = memset(c->changed, 0, (size_t)m->n_modes);
     int count = 0;
     evaluate_now(c, &m->tapes.resets, values);
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
@@ -113,32 +111,32 @@ static Result fire(Instance *c, const unsigned char *wanting, Impacts *impacts) 
         if (!wanting[k] || changed[one->mode]) continue;
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
-        if (one->fails) return report(c, LOG_ERROR, RESULT_ERROR, "t = %.9g s: %s", s->t, text_of(m, one->notice));
+        if (one->fails)
+            return report(c, LOG_ERROR, RESULT_ERROR, "t = %.9g s: %s", c->state.t, text_of(m, one->notice));
         if (*text_of(m, one->notice))
-            report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, text_of(m, one->notice));
+            report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, text_of(m, one->notice));
         d[one->mode] = one->target;
         for (int r = one->first_reset; r < one->first_reset + one->n_resets; r++) {
             const Reset *reset = &m->resets[r];
             if (reset->kind == RESET_STATE) {
-                impacts->struck = 0;
+                c->stopped = 0;
                 c->x[reset->index] = values[reset->value] / reset->factor;
             } else if (reset->kind == RESET_DISCRETE) d[reset->index] = values[reset->value];
             else {
-                w->targets[count] = m->reset_nodes[reset->target];
-                w->target_values[count++] = values[reset->value];
+                c->targets[count] = m->reset_nodes[reset->target];
+                c->target_values[count++] = values[reset->value];
             }
         }
     }
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
-    if (count > 0) move_states(c, w->targets, w->target_values, count);
+    if (count > 0) move_states(c, c->targets, c->target_values, count);
     return RESULT_OK;
 }
 
 /* Evaluate the discrete equations once; tells whether something changes. */
-static Result update_once(Instance *c, Impacts *impacts, int *changes) {
+static Result update_once(Instance *c, int *changes) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    double *values = w->reset_values;
+    double *values = c->reset_values;
     int count = 0;
     *changes = 0;
     if (m->n_updates == 0) return RESULT_OK;
@@ -149,10 +147,10 @@ static Result update_once(Instance *c, Impacts *impacts, int *changes) {
             one->kind == RESET_DISCRETE ? &c->d[one->index] : &c->x[one->kind == RESET_STATE ? one->index : 0];
         double value = values[k] / one->factor;
         if (one->kind != RESET_DISCRETE && isinf(value)) continue; /* nothing sets it now */
-        if (one->kind != RESET_DISCRETE) impacts->struck = 0;
+        if (one->kind != RESET_DISCRETE) c->stopped = 0;
         if (one->kind == RESET_VALUE) {
-            w->targets[count] = m->reset_nodes[one->target];
-            w->target_values[count++] = value;
+            c->targets[count] = m->reset_nodes[one->target];
+            c->target_values[count++] = value;
         } else if (*place != value) {
             *place = value;
             *changes = 1;
@@ -161,11 +159,8 @@ static Result update_once(Instance *c, Impacts *impacts, int *changes) {
     if (count == 0 && !*changes) return RESULT_OK;
     *changes = 1;
     c->state.n_events++;
-    if (count > 0) move_states(c, w->targets, w->target_values, count);
-    share(c);
-    c->variables_valid = 0;
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
-    return check_singular(c);
+    if (count > 0) move_states(c, c->targets, c->target_values, count);
+    return share_and_solve(c) && check_singular(c);
 }
 
 /* Notes an instant. Where the last ones came ever faster, impacts end in contact if the model asks for it; an error
@@ -195,11 +190,9 @@ static void keep_wanting(Instance *c, const double *soon, unsigned char *wanting
 
 /* Before one of several that hold a motion gives way, let the others take more. */
 static Result share_anew(Instance *c, unsigned char *wanting) {
-    double *soon = c->work.guards;
+    double *soon = c->guards;
     if (!anything_shared(c)) return RESULT_OK;
-    share(c);
-    c->variables_valid = 0;
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
+    if (!share_and_solve(c)) return RESULT_ERROR;
     evaluate_now(c, &c->model->tapes.guards_soon, soon);
     keep_wanting(c, soon, wanting);
     return RESULT_OK;
@@ -208,20 +201,18 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
 /* Fire what wants to fire until nothing does. `wanting` holds the state events that were located, if `located`. */
 Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     const Model *m = c->model;
-    State *s = &c->state;
-    Impacts *impacts = &c->work.impacts;
-    double *before = c->work.d_before;
-    int changes = m->n_updates > 0, met;
-    impacts->struck = 0;
-    memset(impacts->entered, 0, (size_t)m->n_holds);
+    double *before = c->d_before;
+    int changes = m->n_updates > 0, rounds = ROUNDS + ALONE * (m->n_holds + m->n_ideals), met;
+    c->stopped = 0;
+    memset(c->entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
-        if (m->n_ideals > 0 && !pushed(c) && meet(c, -1, &met) != RESULT_OK) return RESULT_ERROR;
-        if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
+        if (m->n_ideals > 0 && !pushed(c) && !meet(c, -1, &met)) return RESULT_ERROR;
+        if (!crowded(c) || !share_anew(c, wanting)) return RESULT_ERROR;
     }
-    for (int round = 0; round < ROUNDS + ALONE * (m->n_holds + m->n_ideals); round++) {
+    for (int round = 0; round < rounds; round++) {
         int any = 0;
         if (!changes && (round > 0 || pushed(c)) && !any_of(wanting, m->n_transitions)) {
-            if (meet(c, -1, &met) != RESULT_OK) return RESULT_ERROR;
+            if (!meet(c, -1, &met)) return RESULT_ERROR;
             if (met) find_wanting(c, wanting, 1);
         }
         for (int k = 0; k < m->n_transitions; k++) {
@@ -231,33 +222,31 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         if (!gradient_round(c, round, wanting, any | changes)) return RESULT_OK;
         any = any_of(wanting, m->n_transitions); /* it may have told others to fire */
         if (c->bounded && --c->budget < 1) {
-            s->at_event = 1; /* the rest comes at the beginning of the next step */
+            c->state.at_event = 1; /* the rest comes at the beginning of the next step */
             return RESULT_OK;
         }
         c->round = round;
-        memcpy(c->work.d_earlier, before, (size_t)m->n_d * sizeof(double));
+        memcpy(c->d_earlier, before, (size_t)m->n_d * sizeof(double));
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
-        if (any && fire(c, wanting, impacts) != RESULT_OK) return RESULT_ERROR;
+        if (any && !fire(c, wanting)) return RESULT_ERROR;
         if (any) share(c);
         c->variables_valid = 0;
-        if (any && (solve_now(c, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
-                       check_singular(c) != RESULT_OK))
-            return RESULT_ERROR;
+        if (any && (!solve_now(c, 0) || !stop_motions(c, before) || !check_singular(c))) return RESULT_ERROR;
         if (any && m->n_ideals > 0) {
-            double keep = round > 0 && same_modes(c, c->work.d_earlier) ? GIVEN_BACK : 0;
-            if (meet(c, keep, &met) != RESULT_OK) return RESULT_ERROR;
+            double keep = round > 0 && same_modes(c, c->d_earlier) ? GIVEN_BACK : 0;
+            if (!meet(c, keep, &met)) return RESULT_ERROR;
         }
-        if (update_once(c, impacts, &changes) != RESULT_OK) return RESULT_ERROR;
+        if (!update_once(c, &changes)) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) {
-            drop_balanced(c, c->work.guards);
-            keep_wanting(c, c->work.guards, wanting);
+            drop_balanced(c, c->guards);
+            keep_wanting(c, c->guards, wanting);
         }
     }
-    if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", s->t);
+    if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", c->state.t);
     return fail(c,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        ROUNDS + ALONE * (m->n_holds + m->n_ideals), s->t);
+        rounds, c->state.t);
 }
 
 /* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if
@@ -266,9 +255,9 @@ Result update_discrete(Instance *c, int *restart, double *next) {
     double before = c->state.n_events;
     int changed = c->state.inputs_changed;
     *restart = changed | delays_due(c);
-    if (changed && (check_tables(c) != RESULT_OK || renew(c) != RESULT_OK)) return RESULT_ERROR;
+    if (changed && (!check_tables(c) || !renew(c))) return RESULT_ERROR;
     c->state.inputs_changed = 0;
-    if (handle_event(c) != RESULT_OK || (changed && leave_instant(c, 1) != RESULT_OK)) return RESULT_ERROR;
+    if (!handle_event(c) || (changed && !leave_instant(c, 1))) return RESULT_ERROR;
     *restart |= c->state.n_events != before;
     *next = next_moment(c);
     return RESULT_OK;

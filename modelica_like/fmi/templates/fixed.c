@@ -17,7 +17,7 @@
  * or a parabola where no rates are known at the begin. */
 static double first_zero(const Instance *c, const double *first, int rates_known) {
     int n = c->model->n_guards;
-    const double *last = c->work.looks;
+    const double *last = c->looks;
     double part = 1, h = c->piece->end - c->piece->begin;
     for (int g = 0; g < n; g++) {
         double g0, r0, r1 = isfinite(last[n + g]) ? h * last[n + g] : 0;
@@ -26,7 +26,7 @@ static double first_zero(const Instance *c, const double *first, int rates_known
         r0 = rates_known ? h * first[n + g] : 2 * (last[g] - g0) - r1;
         part = fmin(part, cubic_guess(g0, isfinite(r0) ? r0 : 0, last[g], r1) + BEHIND);
     }
-    memcpy(c->work.looks + 2 * n, first, (size_t)n * sizeof(double));
+    memcpy(c->looks + 2 * n, first, (size_t)n * sizeof(double));
     return part;
 }
 
@@ -34,7 +34,7 @@ static double first_zero(const Instance *c, const double *first, int rates_known
  * the end. */
 static double next_zero(Instance *c, double before, double part, double behind) {
     int n = c->model->n_guards;
-    double *last = c->work.looks, *first = last + 2 * n, *now = c->work.guards, next = 1;
+    double *last = c->looks, *first = last + 2 * n, *now = c->guards, next = 1;
     for (int g = 0; g < n; g++) {
         double v0 = fmin(number_or_false(first[g]), 0), v1 = fmin(number_or_false(now[g]), 0), slope, bend, zero;
         if (!guard_active(c, g) || !(number_or_false(last[g]) > 0)) continue;
@@ -52,10 +52,10 @@ static double next_zero(Instance *c, double before, double part, double behind) 
 static double first_crossing(Instance *c, int behind_event) {
     Piece *piece = c->piece;
     int n = c->model->n_guards, any = 0;
-    double *last = c->work.looks;
+    double *last = c->looks;
     evaluate(c, &c->model->tapes.guards, piece->end, last_of(c->model, piece), last);
     for (int g = 0; g < n; g++) any |= guard_active(c, g) && number_or_false(last[g]) > 0;
-    if (any && behind_event) return first_zero(c, c->work.guards, 0); /* as the last round has left them */
+    if (any && behind_event) return first_zero(c, c->guards, 0); /* as the last round has left them */
     if (any && !c->state.looked) evaluate(c, &c->model->tapes.guards, piece->begin, piece->points, c->end_look);
     if (any) return first_zero(c, c->end_look, 1);
     memcpy(c->end_look, last, 2 * (size_t)n * sizeof(double));
@@ -75,8 +75,7 @@ static Result fire_here(Instance *c, int *fired) {
 
 /* Goes from the present point to `limit`, or to an event before it while the budget allows for one. */
 static Result go_on(Instance *c, double limit, int *fired) {
-    State *s = &c->state;
-    double *first = c->work.first, begin = s->t, error, part = QUIET;
+    double *first = c->first, begin = c->state.t, error, part = QUIET;
     int behind_event = *fired;
     *fired = 0;
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
@@ -85,12 +84,11 @@ static Result go_on(Instance *c, double limit, int *fired) {
             "The step from t = %.12g s gives values that are not finite, or singular equations. Take smaller steps.",
             begin);
     c->piece->end = limit;
-    if (c->budget < 2) s->looked = !(s->at_event = 1);
+    if (c->budget < 2) c->state.looked = !(c->state.at_event = 1);
     else if (c->model->n_guards > 0) part = first_crossing(c, behind_event);
     for (double before = 0, behind = 10 * BEHIND; part < 1 && c->budget > 1; c->budget--, behind *= 10) {
         double here = part;
-        if (move_to(c, begin + part * (limit - begin)) != RESULT_OK || fire_here(c, fired) != RESULT_OK)
-            return RESULT_ERROR;
+        if (!move_to(c, begin + part * (limit - begin)) || !fire_here(c, fired)) return RESULT_ERROR;
         if (*fired) {
             c->budget--;
             return RESULT_OK;
@@ -99,7 +97,7 @@ static Result go_on(Instance *c, double limit, int *fired) {
         before = here;
     }
     /* What is not met is taken at the end. */
-    if (move_to(c, limit) != RESULT_OK) return RESULT_ERROR;
+    if (!move_to(c, limit)) return RESULT_ERROR;
     return part == QUIET ? RESULT_OK : fire_here(c, fired);
 }
 
@@ -107,14 +105,14 @@ static Result one_step(Instance *c, double end) {
     State *s = &c->state;
     int fired = 0, event;
     c->budget = BUDGET;
-    if (take_changes(c, &event) != RESULT_OK) return RESULT_ERROR;
+    if (!take_changes(c, &event)) return RESULT_ERROR;
     s->at_event |= event;
-    if (s->at_event && fire_here(c, &fired) != RESULT_OK) return RESULT_ERROR;
+    if (s->at_event && !fire_here(c, &fired)) return RESULT_ERROR;
     while (s->t < end) {
         double moment = c->budget >= 2 ? next_moment(c) : INFINITY;
-        if (go_on(c, fmin(end, moment), &fired) != RESULT_OK) return RESULT_ERROR;
+        if (!go_on(c, fmin(end, moment), &fired)) return RESULT_ERROR;
         if (fired || s->at_event || !is_due(c)) continue;
-        if (fire_here(c, &fired) != RESULT_OK) return RESULT_ERROR;
+        if (!fire_here(c, &fired)) return RESULT_ERROR;
         c->budget -= s->t < end;
     }
     s->n_steps++;
@@ -127,7 +125,7 @@ Arrival step_fixed(Instance *c, double target) {
     int n = (int)(0.5 + (target - begin) / h), done = 1;
     c->bounded = 1;
     for (int k = 1; k <= n && done && c->state.t < until; k++) {
-        done = one_step(c, k < n ? begin + k * h : target) == RESULT_OK;
+        done = one_step(c, k < n ? begin + k * h : target);
         if (done && c->step_finished != NULL) until = fmin(until, c->step_finished(c));
     }
     c->bounded = 0;

@@ -5,6 +5,9 @@
 
 #include "core.h"
 
+/* Much of the standard is for what no model here has. */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+
 #define JOIN_(a, b) a##b
 #define JOIN(a, b) JOIN_(a, b)
 #define TEXT_(name) #name
@@ -19,7 +22,7 @@
 /* Refuses calls without an instance, or in a state in which the standard does not allow them. */
 #define ENTER(name, phases) \
     Instance *c = instance; \
-    if (c == NULL || allowed(c, TEXT(FMI(name)), phases) != RESULT_OK) return FMI(Error)
+    if (c == NULL || !allowed(c, TEXT(FMI(name)), phases)) return FMI(Error)
 
 /* Are arguments what they must be: no null pointers where n > 0, the right sizes? If not, it is told. */
 #define GIVEN(n, ...) ((n) == 0 || all_given(c, (const void *const[]){__VA_ARGS__}, TEXT((__VA_ARGS__))))
@@ -30,8 +33,7 @@
 typedef FMI(Status) Status;
 
 static inline Status status(Result result) {
-    if (result == RESULT_OK) return FMI(OK);
-    return result == RESULT_DISCARD ? FMI(Discard) : FMI(Error);
+    return result == RESULT_OK ? FMI(OK) : result == RESULT_DISCARD ? FMI(Discard) : FMI(Error);
 }
 
 static inline Status refuse(Instance *c, const char *why) { return status(fail(c, "%s", why)); }
@@ -40,14 +42,14 @@ static inline Status refuse(Instance *c, const char *why) { return status(fail(c
 static inline int all_given(Instance *c, const void *const *given, const char *names) {
     for (; *names != ')'; given++) {
         size_t length = strcspn(++names, ",)");
-        if (*given == NULL) return fail(c, "The argument %.*s is a null pointer.", (int)length, names) == RESULT_OK;
+        if (*given == NULL) return fail(c, "The argument %.*s is a null pointer.", (int)length, names);
         names += length + strspn(names + length, ", ") - (names[length] == ',');
     }
     return 1;
 }
 
 static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what) {
-    return n == wanted || fail(c, "There must be %zu %s, not %zu.", wanted, what, n) == RESULT_OK;
+    return n == wanted || fail(c, "There must be %zu %s, not %zu.", wanted, what, n);
 }
 
 /* A function whose work is one call of the run-time, if arguments are what it needs. */
@@ -58,13 +60,19 @@ static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what
         return status(call);                        \
     }
 /* A function that does the same for everything that it is given. */
-#define EACH(name, phases, n, needs, call, ...)         \
-    Status FMI(name)(void *instance, __VA_ARGS__) {     \
-        ENTER(name, phases);                            \
-        if (!(needs)) return FMI(Error);                \
-        for (size_t k = 0; k < (n); k++)                \
-            if ((call) != RESULT_OK) return FMI(Error); \
-        return FMI(OK);                                 \
+#define EACH(name, phases, n, needs, call, ...)     \
+    Status FMI(name)(void *instance, __VA_ARGS__) { \
+        ENTER(name, phases);                        \
+        if (!(needs)) return FMI(Error);            \
+        for (size_t k = 0; k < (n); k++)            \
+            if (!(call)) return FMI(Error);         \
+        return FMI(OK);                             \
+    }
+/* A function without arguments. */
+#define DO(name, phases, call)         \
+    Status FMI(name)(void *instance) { \
+        ENTER(name, phases);           \
+        return status(call);           \
     }
 /* A function that changes nothing but the phase. */
 #define CHANGE_PHASE(name, from, to, forbidden, why)          \
@@ -83,7 +91,7 @@ static inline Status failed(Instance *c) {
 static inline Result get_mode(Instance *c, uint32_t reference, INTEGER *value) {
     double number = 0;
     Result result = get_value(c, known_variable(c, reference, TYPE_ENUMERATION), &number);
-    if (result == RESULT_OK) *value = (INTEGER)number;
+    if (result) *value = (INTEGER)number;
     return result;
 }
 
@@ -99,27 +107,23 @@ Status FMI(SetDebugLogging)(
     ENTER(SetDebugLogging, ANY_PHASE);
     NEED(nCategories, categories);
     for (size_t k = 0; k < nCategories || k == 0; k++)
-        if (set_log_category(c, nCategories > 0 ? categories[k] : NULL, loggingOn) != RESULT_OK) result = RESULT_ERROR;
+        if (!set_log_category(c, nCategories > 0 ? categories[k] : NULL, loggingOn)) result = RESULT_ERROR;
     return status(result);
 }
 
 Status FMI(ExitInitializationMode)(void *instance) {
     ENTER(ExitInitializationMode, PHASE_INITIALIZATION);
-    if (!c->state.solved && start_solve(c) != RESULT_OK) return failed(c);
+    if (!c->state.solved && !start_solve(c)) return failed(c);
     c->state.inputs_changed = 0;
     c->state.phase = c->co_simulation && !c->event_mode_used ? PHASE_STEP : PHASE_EVENT;
-    if (c->state.phase == PHASE_STEP && handle_event(c) != RESULT_OK) return failed(c);
+    if (c->state.phase == PHASE_STEP && !handle_event(c)) return failed(c);
     return FMI(OK);
 }
 
 CHANGE_PHASE(Terminate, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_FAILED, PHASE_TERMINATED,
-    c->state.phase != PHASE_FAILED && finish(c) != RESULT_OK, ": its last event failed.")
+    c->state.phase != PHASE_FAILED && !finish(c), ": its last event failed.")
 
-Status FMI(Reset)(void *instance) {
-    ENTER(Reset, ANY_PHASE);
-    instance_reset(c);
-    return FMI(OK);
-}
+DO(Reset, ANY_PHASE, (instance_reset(c), RESULT_OK))
 
 /* ---- Model Exchange --------------------------------------------------------------------------------------------- */
 
@@ -128,9 +132,8 @@ CHANGE_PHASE(EnterContinuousTimeMode, PHASE_EVENT, PHASE_CONTINUOUS, c->co_simul
 Status FMI(CompletedIntegratorStep)(void *instance, FMI(Boolean) noSetFMUStatePriorToCurrentPoint,
     FMI(Boolean) * enterEventMode, FMI(Boolean) * terminateSimulation) {
     ENTER(CompletedIntegratorStep, PHASE_CONTINUOUS);
-    (void)noSetFMUStatePriorToCurrentPoint;
     NEED(1, enterEventMode, terminateSimulation);
-    if (settle(c) != RESULT_OK) return FMI(Error);
+    if (!settle(c)) return FMI(Error);
     keep_past(c, c->state.t, c->x, -1);
     *enterEventMode = find_wanting(c, nothing_wanting(c), 1) != 0;
     *terminateSimulation = 0;
@@ -141,9 +144,8 @@ CALL(SetTime, PHASE_EVENT | PHASE_CONTINUOUS, 1, set_time(c, time), double time)
 CALL(SetContinuousStates, PHASE_EVENT | PHASE_CONTINUOUS, SIZED(n, c->model->n_x, "continuous states") && GIVEN(n, x),
     set_states(c, x), const double x[], size_t n)
 
-#define GET_ALL(name, array, phases, count, what, action)                                                       \
-    CALL(name, phases,                                                                                          \
-        SIZED(n, count, what) && GIVEN(n, array) && ((phases) == ANY_PHASE || make_consistent(c) == RESULT_OK), \
+#define GET_ALL(name, array, phases, count, what, action)                                                         \
+    CALL(name, phases, SIZED(n, count, what) && GIVEN(n, array) && ((phases) == ANY_PHASE || make_consistent(c)), \
         (action, RESULT_OK), double array[], size_t n)
 #define GET_STATES(name, array, phases, action) GET_ALL(name, array, phases, c->model->n_x, "continuous states", action)
 

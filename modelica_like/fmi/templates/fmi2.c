@@ -29,7 +29,6 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions, fmi2Boolean visible,
     fmi2Boolean loggingOn) {
     Instance bare = {.name = instanceName, .log_enabled = loggingOn, .co_simulation = fmuType == fmi2CoSimulation};
-    (void)visible;
     if (functions == NULL || (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation)) return NULL;
     bare.environment = functions->componentEnvironment;
     bare.logger = (AnyFunction)functions->logger;
@@ -49,9 +48,9 @@ CHANGE_PHASE(EnterEventMode, PHASE_CONTINUOUS | PHASE_EVENT, PHASE_EVENT, 0, "")
 
 #define REFERENCES const fmi2ValueReference vr[], size_t nvr
 #define VALUES(name, phases, type, call) EACH(name, phases, nvr, GIVEN(nvr, vr, value), call, REFERENCES, type value[])
-#define NO_VALUES(name, phases, type, kind)        \
-    CALL(name, phases, ((void)vr, (void)value, 1), \
-        nvr == 0 ? RESULT_OK : fail(c, "This model has no variables of type " kind "."), REFERENCES, type value[])
+#define NO_VALUES(name, phases, type, kind)                                                                            \
+    CALL(name, phases, 1, nvr == 0 ? RESULT_OK : fail(c, "This model has no variables of type " kind "."), REFERENCES, \
+        type value[])
 
 VALUES(GetReal, READABLE, fmi2Real, get_value(c, known_variable(c, vr[k], TYPE_FLOAT64), &value[k]))
 VALUES(SetReal, SETTABLE, const fmi2Real, set_value(c, known_variable(c, vr[k], TYPE_FLOAT64), value[k]))
@@ -74,7 +73,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInf
     int restart;
     ENTER(NewDiscreteStates, PHASE_EVENT);
     NEED(1, eventInfo);
-    if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
+    if (!update_discrete(c, &restart, &next)) return failed(c);
     eventInfo->newDiscreteStatesNeeded = fmi2False;
     eventInfo->terminateSimulation = fmi2False;
     eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
@@ -95,15 +94,12 @@ fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint
     fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
     double target;
     ENTER(DoStep, PHASE_STEP);
-    (void)noSetFMUStatePriorToCurrentPoint;
-    if (check_step(c, currentCommunicationPoint, communicationStepSize, &target) != RESULT_OK) return fmi2Error;
+    if (!check_step(c, currentCommunicationPoint, communicationStepSize, &target)) return fmi2Error;
     return integrate_to(c, target, 0) == FAILED ? failed(c) : fmi2OK;
 }
 
-fmi2Status fmi2CancelStep(fmi2Component instance) {
-    ENTER(CancelStep, ANY_PHASE);
-    return refuse(c, "fmi2CancelStep: there is no step to cancel, as fmi2DoStep returns when its step is done.");
-}
+DO(CancelStep, ANY_PHASE,
+    fail(c, "fmi2CancelStep: there is no step to cancel, as fmi2DoStep returns when its step is done."))
 
 /* fmi2DoStep is never pending or discarded, so little is told about it. */
 #define GET_STATUS(name, type, told, answer)                                                                       \

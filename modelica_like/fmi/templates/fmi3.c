@@ -23,7 +23,6 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
     bare.environment = instanceEnvironment;
     bare.logger = (AnyFunction)logMessage;
     bare.log = logMessage ? log_fmi3 : NULL;
-    (void)visible;
     return instance_open(bare, instantiationToken, resourcePath);
 }
 
@@ -60,8 +59,6 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate, fmi3LockPreemptionCallback lockPreemption,
     fmi3UnlockPreemptionCallback unlockPreemption) {
-    (void)instanceName, (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
-    (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
     if (logMessage != NULL)
         logMessage(instanceEnvironment, fmi3Error, "logStatusError", "This model has no scheduled execution.");
     return NULL;
@@ -70,8 +67,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
     fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
     ENTER(EnterInitializationMode, PHASE_INSTANTIATED);
-    if (set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime) != RESULT_OK)
-        return fmi3Error;
+    if (!set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime)) return fmi3Error;
     c->state.phase = PHASE_INITIALIZATION;
     return fmi3OK;
 }
@@ -104,7 +100,7 @@ static size_t elements(const Instance *c, fmi3ValueReference reference, fmi3Valu
         NEED(nValues, values);                                                                      \
         for (size_t k = 0; k < nValueReferences; k++)                                               \
             for (count = elements(c, valueReferences[k], &r); count > 0; count--, r++, values++)    \
-                if ((done) != RESULT_OK) return fmi3Error;                                          \
+                if (!(done)) return fmi3Error;                                                      \
         return fmi3OK;                                                                              \
     }
 
@@ -114,16 +110,13 @@ VALUES(GetInt64, READABLE, fmi3Int64, get_mode(c, r, values))
 VALUES(SetInt64, SETTABLE, const fmi3Int64, set_value(c, known_variable(c, r, TYPE_ENUMERATION), (double)*values))
 
 /* Functions for what no model has: other types, clocks, parts. They refuse every call that asks for something. */
-#define NOTHING(name, phases, what, unused, ...)           \
-    CALL(name, phases, (unused, (void)valueReferences, 1), \
-        nValueReferences == 0 ? RESULT_OK : fail(c, "This model has no " what "."), REFERENCES, __VA_ARGS__)
-#define NO_VALUES(type)                                                                                    \
-    NOTHING(Get##type, READABLE, "variables of type " #type, ((void)a, (void)n), fmi3##type a[], size_t n) \
-    NOTHING(Set##type, SETTABLE, "variables of type " #type, ((void)a, (void)n), const fmi3##type a[], size_t n)
-#define NO_BINARIES(name, phases, size, type) \
-    NOTHING(name, phases, "variables of type Binary", ((void)s, (void)a, (void)n), size s[], type a[], size_t n)
-#define NO_CLOCK(name, type) NOTHING(name, ANY_PHASE, "clocks", (void)a, type a[])
-#define NO_PAIRS(name, type, other) NOTHING(name, ANY_PHASE, "clocks", ((void)a, (void)b), type a[], other b[])
+#define NOTHING(name, phases, what, ...)                                                                          \
+    CALL(name, phases, 1, nValueReferences == 0 ? RESULT_OK : fail(c, "This model has no " what "."), REFERENCES, \
+        __VA_ARGS__)
+#define NO_VALUES(type)                                                                \
+    NOTHING(Get##type, READABLE, "variables of type " #type, fmi3##type a[], size_t n) \
+    NOTHING(Set##type, SETTABLE, "variables of type " #type, const fmi3##type a[], size_t n)
+#define NO_CLOCK(name, ...) NOTHING(name, ANY_PHASE, "clocks", __VA_ARGS__)
 
 NO_VALUES(Float32)
 NO_VALUES(Int8)
@@ -135,28 +128,26 @@ NO_VALUES(UInt32)
 NO_VALUES(UInt64)
 NO_VALUES(Boolean)
 NO_VALUES(String)
-NO_BINARIES(GetBinary, READABLE, size_t, fmi3Binary)
-NO_BINARIES(SetBinary, SETTABLE, const size_t, const fmi3Binary)
-NO_CLOCK(GetClock, fmi3Clock)
-NO_CLOCK(SetClock, const fmi3Clock)
-NO_CLOCK(GetShiftDecimal, fmi3Float64)
-NO_CLOCK(SetShiftDecimal, const fmi3Float64)
-NO_CLOCK(SetIntervalDecimal, const fmi3Float64)
-NO_PAIRS(GetIntervalDecimal, fmi3Float64, fmi3IntervalQualifier)
-NO_PAIRS(GetShiftFraction, fmi3UInt64, fmi3UInt64)
-NO_PAIRS(SetShiftFraction, const fmi3UInt64, const fmi3UInt64)
-NO_PAIRS(SetIntervalFraction, const fmi3UInt64, const fmi3UInt64)
-NOTHING(GetIntervalFraction, ANY_PHASE, "clocks", ((void)a, (void)b, (void)q), fmi3UInt64 a[], fmi3UInt64 b[],
-    fmi3IntervalQualifier q[])
+NOTHING(GetBinary, READABLE, "variables of type Binary", size_t s[], fmi3Binary a[], size_t n)
+NOTHING(SetBinary, SETTABLE, "variables of type Binary", const size_t s[], const fmi3Binary a[], size_t n)
+NO_CLOCK(GetClock, fmi3Clock a[])
+NO_CLOCK(SetClock, const fmi3Clock a[])
+NO_CLOCK(GetShiftDecimal, fmi3Float64 a[])
+NO_CLOCK(SetShiftDecimal, const fmi3Float64 a[])
+NO_CLOCK(SetIntervalDecimal, const fmi3Float64 a[])
+NO_CLOCK(GetIntervalDecimal, fmi3Float64 a[], fmi3IntervalQualifier q[])
+NO_CLOCK(GetShiftFraction, fmi3UInt64 a[], fmi3UInt64 b[])
+NO_CLOCK(SetShiftFraction, const fmi3UInt64 a[], const fmi3UInt64 b[])
+NO_CLOCK(SetIntervalFraction, const fmi3UInt64 a[], const fmi3UInt64 b[])
+NO_CLOCK(GetIntervalFraction, fmi3UInt64 a[], fmi3UInt64 b[], fmi3IntervalQualifier q[])
 
 /* Dependencies stand in the description, which does not announce these (providesPerElementDependencies). */
-#define REFUSED(name, why, unused, ...) CALL(name, ANY_PHASE, (unused, 1), fail(c, why), __VA_ARGS__)
-REFUSED(ActivateModelPartition, "This model has no scheduled execution.", ((void)k, (void)t), fmi3ValueReference k,
-    fmi3Float64 t)
+#define REFUSED(name, why, ...) CALL(name, ANY_PHASE, 1, fail(c, why), __VA_ARGS__)
+REFUSED(ActivateModelPartition, "This model has no scheduled execution.", fmi3ValueReference k, fmi3Float64 t)
 #define SEE_DESCRIPTION "The model description lists the dependencies of variables."
-REFUSED(GetNumberOfVariableDependencies, SEE_DESCRIPTION, ((void)v, (void)n), fmi3ValueReference v, size_t *n)
-REFUSED(GetVariableDependencies, SEE_DESCRIPTION, ((void)v, (void)a, (void)r, (void)b, (void)k, (void)n),
-    fmi3ValueReference v, size_t a[], fmi3ValueReference r[], size_t b[], fmi3DependencyKind k[], size_t n)
+REFUSED(GetNumberOfVariableDependencies, SEE_DESCRIPTION, fmi3ValueReference v, size_t *n)
+REFUSED(GetVariableDependencies, SEE_DESCRIPTION, fmi3ValueReference v, size_t a[], fmi3ValueReference r[], size_t b[],
+    fmi3DependencyKind k[], size_t n)
 
 /* ---- derivatives ------------------------------------------------------------------------------------------------ */
 
@@ -174,10 +165,7 @@ CALL(GetAdjointDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_T
 
 /* ---- events ----------------------------------------------------------------------------------------------------- */
 
-fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
-    ENTER(EvaluateDiscreteStates, PHASE_INITIALIZATION | PHASE_EVENT);
-    return status(make_consistent(c));
-}
+DO(EvaluateDiscreteStates, PHASE_INITIALIZATION | PHASE_EVENT, make_consistent(c))
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
     fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
@@ -187,7 +175,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     ENTER(UpdateDiscreteStates, PHASE_EVENT);
     NEED(1, discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
         valuesOfContinuousStatesChanged, nextEventTimeDefined, nextEventTime);
-    if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
+    if (!update_discrete(c, &restart, &next)) return failed(c);
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = fmi3False;
     *valuesOfContinuousStatesChanged = restart != 0;
     *nextEventTimeDefined = isfinite(next);
@@ -211,14 +199,12 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
     fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
     double target;
-    Arrival arrival;
     ENTER(DoStep, PHASE_STEP);
-    (void)noSetFMUStatePriorToCurrentPoint;
     NEED(1, eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime);
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = c->state.t;
-    if (check_step(c, currentCommunicationPoint, communicationStepSize, &target) != RESULT_OK) return fmi3Error;
-    arrival = integrate_to(c, target, c->event_mode_used && c->early_return_allowed);
+    if (!check_step(c, currentCommunicationPoint, communicationStepSize, &target)) return fmi3Error;
+    Arrival arrival = integrate_to(c, target, c->event_mode_used && c->early_return_allowed);
     *lastSuccessfulTime = c->state.t;
     *eventHandlingNeeded = arrival == AT_EVENT;
     *earlyReturn = c->state.t < target;

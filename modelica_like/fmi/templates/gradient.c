@@ -55,33 +55,38 @@ static double *part_of(const Instance *c, const Tangent *one, const double *valu
     return one->now + (values - c->numbers);
 }
 
+/* Where numbers of the state lie in a copy. */
+static const double *copied(const Instance *c, const void *copy, const double *values) {
+    return (const double *)(const void *)((const char *)copy + sizeof(State)) + (values - c->numbers);
+}
+
 /* ---- steps ------------------------------------------------------------------------------------------------------ */
 
 /* Parameters, inputs and discrete values move along a tangent; if `moving` (at the present point, where factor_implicit
  * has been called) also states, with the implicit unknowns. */
 static void load_tangent(Instance *c, const Tangent *one, int moving) {
     const Model *m = c->model;
-    double *dots = memset(c->work.dots, 0, m->slot_results * sizeof(double));
+    double *dots = memset(c->dots, 0, m->slot_results * sizeof(double));
     memcpy(dots + m->slot_p, part_of(c, one, c->p), m->n_p * sizeof(double));
     memcpy(dots + m->slot_u, part_of(c, one, c->u), m->n_u * sizeof(double));
     memcpy(dots + m->slot_d, part_of(c, one, c->d), m->n_d * sizeof(double));
     if (moving) memcpy(dots + m->slot_x, part_of(c, one, c->x), m->n_x * sizeof(double));
-    if (moving) tangent_of_implicit(c, c->work.order);
+    if (moving) tangent_of_implicit(c);
 }
 
 /* Stage i of a step: (M/(h gamma) - J) s = M/(h gamma) begin + b; the matrix is factorised, the rates' tape has run. */
 static void take_stage(Instance *c, Tangent *one, int i, double h) {
     const Model *m = c->model;
     int n_x = m->n_x;
-    double *solved = c->work.vector, *begin = c->work.point, *x = part_of(c, one, c->x);
+    double *solved = c->vector, *begin = c->point, *x = part_of(c, one, c->x);
     load_tangent(c, one, 0);
-    tape_tangent(&m->tapes.rates, c->work.slots, c->work.dots, solved);
+    tape_tangent(&m->tapes.rates, c->slots, c->dots, solved);
     for (int k = 0; k < n_x; k++) {
         begin[k] = x[k];
         for (int j = 0; j < i; j++) begin[k] += h * WEIGHTS[i][j] * one->stages[j * n_x + k];
         solved[k] += 4 / h * begin[k];
     }
-    qr_solve(&m->step, &c->work, solved);
+    qr_solve(&m->step, c, solved);
     for (int k = 0; k < n_x; k++) one->stages[i * n_x + k] = 4 / h * (solved[k] - begin[k]);
     if (i == N_STAGES - 1) memcpy(x, solved, n_x * sizeof(double));
 }
@@ -90,22 +95,20 @@ static void take_stage(Instance *c, Tangent *one, int i, double h) {
 void gradient_move(Instance *c, double end) {
     Gradient *g = c->gradient;
     const Model *m = c->model;
-    double begin = c->state.t, h = (end - begin) / STEPS, *rates = c->work.rhs;
+    double begin = c->state.t, h = (end - begin) / STEPS, *rates = c->rhs;
     if (g == NULL || g->why != NULL || h <= 0) return;
-    if (factor_implicit(c, c->work.order) != RESULT_OK) gradient_lose(c, "its equations are singular there", NULL);
+    if (!factor_implicit(c)) gradient_lose(c, "its equations are singular there", NULL);
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);
-        evaluate_now(c, &m->tapes.rates, rates);
-        tape_tangent(&m->tapes.rates, c->work.slots, c->work.dots, rates);
-        memcpy(g->tangents[j].stages, rates, m->n_x * sizeof(double));
+        tangent_now(c, &m->tapes.rates, g->tangents[j].stages);
     }
     for (int i = 1; i <= STEPS * (N_STAGES - 1); i++) {
         int stage = (i - 1) % (N_STAGES - 1) + 1;
         double t = begin + h * ((i - 1) / (N_STAGES - 1) + NODES[stage]);
-        piece_at(m, c->piece, t, c->work.point);
-        evaluate(c, &m->tapes.jacobian, t, c->work.point, c->work.jacobian);
+        piece_at(m, c->piece, t, c->point);
+        evaluate(c, &m->tapes.jacobian, t, c->point, c->jacobian);
         if (!factor_step(c, 4 / h)) gradient_lose(c, "its equations are singular there", NULL);
-        evaluate(c, &m->tapes.rates, t, c->work.point, rates);
+        evaluate(c, &m->tapes.rates, t, c->point, rates);
         for (int j = 0; j < g->n; j++) {
             double *stages = g->tangents[j].stages;
             if (stage == 1 && i > 1) memcpy(stages, stages + (N_STAGES - 1) * m->n_x, m->n_x * sizeof(double));
@@ -119,7 +122,7 @@ void gradient_move(Instance *c, double end) {
 /* The transition whose guard, or moment, tells when the present instant is; NULL: its time is given. */
 static const Transition *find_cause(Instance *c) {
     const unsigned char *wanting = c->state.event_pending ? c->wanting : nothing_wanting(c);
-    if (!c->state.event_pending) find_wanting(c, c->work.wanting, 0);
+    if (!c->state.event_pending) find_wanting(c, c->wishes, 0);
     for (int k = 0; k < c->model->n_transitions; k++)
         if (wanting[k] && c->state.n_steps > 0) return &c->model->transitions[k];
     return NULL;
@@ -129,17 +132,15 @@ static const Transition *find_cause(Instance *c) {
 static void find_shifts(Instance *c, Gradient *g) {
     const Transition *cause = find_cause(c);
     const Tape *tape = cause != NULL && cause->timed ? &c->model->tapes.moments : &c->model->tapes.guards;
-    double *values = tape == &c->model->tapes.moments ? c->work.guards : c->work.guards_before, speed = -1;
+    double *values = tape == &c->model->tapes.moments ? c->guards : c->guards_before, speed = -1;
     for (int j = 0; j < g->n; j++) g->tangents[j].shift = 0;
-    if (cause == NULL || factor_implicit(c, c->work.order) != RESULT_OK) return;
-    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
-    memcpy(g->rates, c->work.rhs, c->model->n_x * sizeof(double));
+    if (cause == NULL || !factor_implicit(c)) return;
+    evaluate_now(c, &c->model->tapes.rates, g->rates);
     evaluate_now(c, tape, values);
     if (!cause->timed) speed = values[c->model->n_guards + cause->index];
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);
-        evaluate_now(c, tape, values);
-        tape_tangent(tape, c->work.slots, c->work.dots, values);
+        tangent_now(c, tape, values);
         g->tangents[j].shift = -values[cause->index] / speed;
     }
 }
@@ -147,9 +148,9 @@ static void find_shifts(Instance *c, Gradient *g) {
 /* Leaves the instant where it is if it makes no difference when it is: rounding may decide that, and no guard. */
 static void check_shifts(Instance *c, Gradient *g) {
     const Model *m = c->model;
-    const double *x = copied(c, g->before, c->x), *d = copied(c, g->before, c->d), *rates = c->work.rhs;
+    const double *x = copied(c, g->before, c->x), *d = copied(c, g->before, c->d), *rates = c->rhs;
     int matters = 0;
-    evaluate_now(c, &m->tapes.rates, c->work.rhs);
+    evaluate_now(c, &m->tapes.rates, c->rhs);
     for (int k = 0; k < m->n_x; k++) {
         double change = fmax(fabs(c->x[k] - x[k]), fabs(rates[k] - g->rates[k]));
         matters |= !(change <= FELT_CHANGE * (fabs(x[k]) + fabs(rates[k]) + m->nominals[k]));
@@ -194,7 +195,7 @@ static int difference(Instance *c, const Gradient *g, Tangent *one, Result (*pas
         state_copy_in(c, g->before);
         for (size_t k = 0; k < c->n_smooth; k++) c->numbers[k] += side * part * one->now[k];
         c->state.t += side * part * one->shift;
-        same &= pass(c) == RESULT_OK;
+        same &= pass(c);
         for (int k = 0; k < c->model->n_modes; k++) same &= c->model->modes[k].n_names == 0 || c->d[k] == modes[k];
         for (size_t k = 0; k < c->n_smooth; k++) next[k] += side * c->numbers[k] / (2 * part);
     }
@@ -229,14 +230,13 @@ static void pass_tangents(Instance *c, Gradient *g, Result (*pass)(Instance *c))
     c->noted = whole.noted;
     c->struck = whole.struck;
     if (other != NULL) gradient_lose(c, "a small change of it leads to other modes there", other);
-    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
-    move_on(c, g, c->work.rhs, -1);
+    evaluate_now(c, &c->model->tapes.rates, c->rhs);
+    move_on(c, g, c->rhs, -1);
 }
 
 /* Passes the start, or an event, with the tangents. */
 Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
     Gradient *g = c->gradient;
-    Result result;
     if (g == NULL || g->passing) return pass(c);
     for (int j = 0; j < g->n && start; j++) {
         g->why = NULL;
@@ -246,10 +246,10 @@ Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
     }
     if (!start && g->why == NULL) find_shifts(c, g);
     g->n_rounds = 0;
-    if (state_copy_out(c, &g->before) != RESULT_OK) return RESULT_ERROR;
-    result = pass(c);
-    if (result != RESULT_OK || g->why != NULL) return result;
-    if (state_copy_out(c, &g->behind) != RESULT_OK) return RESULT_ERROR;
+    if (!state_copy_out(c, &g->before)) return RESULT_ERROR;
+    Result result = pass(c);
+    if (!result || g->why != NULL) return result;
+    if (!state_copy_out(c, &g->behind)) return RESULT_ERROR;
     if (!start) check_shifts(c, g);
     if (g->why == NULL) pass_tangents(c, g, pass);
     return RESULT_OK;
@@ -268,17 +268,17 @@ void gradient_end(Instance *c) {
 
 /* Room for derivatives by n values; NULL if there is no memory. */
 static Gradient *gradient_new(const Instance *c, size_t n) {
-    size_t own = sizeof(Gradient) / 8 + 1, n_x = (size_t)c->model->n_x, list = n * sizeof(Tangent) / 8 + 1;
-    size_t marks = MOST_ROUNDS * (size_t)c->model->n_transitions / 8 + 1, one = 2 * c->n_smooth + N_STAGES * n_x;
-    double *memory = n > MOST_TANGENTS ? NULL : c->allocate(own + n_x + marks + list + n * one, 8);
+    size_t own = sizeof(Gradient) / 8 + 1, n_y = (size_t)c->model->n_unknowns, list = n * sizeof(Tangent) / 8 + 1;
+    size_t marks = MOST_ROUNDS * (size_t)c->model->n_transitions / 8 + 1, one = 2 * c->n_smooth + N_STAGES * n_y;
+    double *memory = n > MOST_TANGENTS ? NULL : c->allocate(own + n_y + marks + list + n * one, 8);
     Gradient *g = (Gradient *)(void *)memory;
     if (g == NULL) return NULL;
     g->n = (int)n;
     g->rates = memory + own;
-    g->rounds = (unsigned char *)(g->rates + n_x);
-    g->tangents = (Tangent *)(void *)(g->rates + n_x + marks);
+    g->rounds = (unsigned char *)(g->rates + n_y);
+    g->tangents = (Tangent *)(void *)(g->rates + n_y + marks);
     for (size_t j = 0; j < n; j++) {
-        g->tangents[j].now = g->rates + n_x + marks + list + j * one;
+        g->tangents[j].now = g->rates + n_y + marks + list + j * one;
         g->tangents[j].next = g->tangents[j].now + c->n_smooth;
         g->tangents[j].stages = g->tangents[j].next + c->n_smooth;
     }
@@ -291,17 +291,17 @@ static double *value_of(Instance *c, const Variable *v) {
     if (v->kind == KIND_PARAMETER) mark_tuned(c, v->index);
     if (v->kind == KIND_PARAMETER) return &c->p[v->index];
     start_values(c);
-    c->start_value[v->start] = c->work.start_values[v->start];
+    c->start_value[v->start] = c->start_values[v->start];
     c->start_given[v->start] = 1;
     return &c->start_value[v->start];
 }
 
 static Result begin(Instance *c, const uint32_t by[], size_t n) {
-    if (allowed(c, "modelica_like_gradient_start", PHASE_INITIALIZATION) != RESULT_OK) return RESULT_ERROR;
+    if (!allowed(c, "modelica_like_gradient_start", PHASE_INITIALIZATION)) return RESULT_ERROR;
     if (!c->co_simulation || c->model->settings->fixed_step > 0)
         return fail(c, "Derivatives of a run need Co-Simulation with adaptive steps.");
     if (by == NULL && n > 0) return fail(c, "The argument by is a null pointer.");
-    if (check_knowns(c, by, n) != RESULT_OK) return RESULT_ERROR;
+    if (!check_knowns(c, by, n)) return RESULT_ERROR;
     gradient_end(c);
     if (n > 0 && (c->gradient = gradient_new(c, n)) == NULL) return fail(c, "There is not enough memory.");
     for (size_t j = 0; j < n; j++) {
@@ -313,18 +313,17 @@ static Result begin(Instance *c, const uint32_t by[], size_t n) {
 }
 
 int modelica_like_gradient_start(void *instance, const uint32_t by[], size_t n) {
-    return instance == NULL || begin(instance, by, n) != RESULT_OK;
+    return instance == NULL || !begin(instance, by, n);
 }
 
 static Result read_gradient(Instance *c, const uint32_t of[], size_t n, double gradient[]) {
     const Gradient *g = c->gradient;
-    if (allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED) != RESULT_OK)
-        return RESULT_ERROR;
+    if (!allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED)) return RESULT_ERROR;
     if (g == NULL || of == NULL || gradient == NULL)
         return fail(c, "An argument is a null pointer, or modelica_like_gradient_start has not been called.");
     if (g->why != NULL)
         return fail(c, "There are no derivatives with respect to %s after t = %.9g s: %s.", g->by, g->lost_at, g->why);
-    if (check_unknowns(c, of, n) != RESULT_OK || factor_implicit(c, c->work.order) != RESULT_OK) return RESULT_ERROR;
+    if (!check_unknowns(c, of, n) || !factor_implicit(c)) return RESULT_ERROR;
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);
         read_tangents(c, of, n, gradient + j, (size_t)g->n);
@@ -333,5 +332,5 @@ static Result read_gradient(Instance *c, const uint32_t of[], size_t n, double g
 }
 
 int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, double gradient[]) {
-    return instance == NULL || read_gradient(instance, of, n_of, gradient) != RESULT_OK;
+    return instance == NULL || !read_gradient(instance, of, n_of, gradient);
 }

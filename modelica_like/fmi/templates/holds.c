@@ -10,8 +10,8 @@
 #define TURNED 100.0
 
 void mark_held(const Instance *c, const Terms *terms, unsigned char *held) {
-    const Model *m = c->model;
-    for (int k = 0; k < m->n_holds; k++) held[k] = c->d[m->holds[k].mode] == m->holds[k].number && terms[k].gain != 0;
+    const Held *one = c->model->holds;
+    for (int k = 0; k < c->model->n_holds; k++, one++) held[k] = c->d[one->mode] == one->number && terms[k].gain != 0;
 }
 
 /* Terms of all motions that modes may hold at the present point; marks those that are held. */
@@ -31,13 +31,12 @@ double largest_like(const Model *m, const double *values, int node) {
 
 /* Set held motions within rounding of zero to zero, if they are states. */
 void rest(Instance *c) {
-    const double *values;
     if (c->model->n_holds == 0) return;
-    find_held(c, c->work.terms, c->work.held);
-    values = variables_now(c);
+    find_held(c, c->terms, c->held);
+    const double *values = variables_now(c);
     for (int k = 0; k < c->model->n_holds; k++) {
         const Held *one = &c->model->holds[k];
-        if (c->work.held[k] && one->state >= 0 &&
+        if (c->held[k] && one->state >= 0 &&
             fabs(values[one->motion]) <= ROUNDING * largest_like(c->model, values, one->motion))
             c->x[one->state] = 0;
     }
@@ -49,10 +48,10 @@ void rest_rates(Instance *c, double *rates) {
     const Model *m = c->model;
     double largest = fmax(largest_of(m->n_x, rates), largest_of(m->n_z, c->z));
     if (m->n_holds == 0) return;
-    find_held(c, c->work.terms, c->work.held);
+    find_held(c, c->terms, c->held);
     for (int k = 0; k < m->n_holds; k++) {
         int state = m->holds[k].state;
-        if (c->work.held[k] && state >= 0 && fabs(rates[state]) <= CANCELLED * largest) rates[state] = 0;
+        if (c->held[k] && state >= 0 && fabs(rates[state]) <= CANCELLED * largest) rates[state] = 0;
     }
 }
 
@@ -98,8 +97,8 @@ static void weigh(const Model *m, const Terms *terms, double *weights) {
 /* Dependences among n held motions of a circuit become the rows of `silent`; returns their number. */
 static int dependences(Instance *c, const int *member, int n, double *silent) {
     const Model *m = c->model;
-    double *slopes = c->work.square, *turns = slopes + (size_t)m->most_members * m->n_x;
-    double *sizes = c->work.sizes, *nothing = c->work.zeros;
+    double *slopes = c->square, *turns = slopes + (size_t)m->most_members * m->n_x;
+    double *sizes = c->sizes, *nothing = c->zeros;
     int rows = 0;
     memset(nothing, 0, (size_t)n * sizeof(double));
     for (int i = 0; i < n; i++) {
@@ -139,18 +138,18 @@ int anything_shared(const Instance *c) {
 static void yield_to_contradiction(Instance *c, const Circuit *one) {
     const Model *m = c->model;
     const int *member = m->members + one->first_member;
-    double *z = c->work.kept_z, *reaction = c->work.reactions, inertia = 0, stiff;
-    unsigned char *other = c->work.other;
+    double *z = c->kept_z, *reaction = c->reactions, inertia = 0, stiff;
+    unsigned char *other = c->other;
     int solved = 1;
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
     for (int k = 0; k < one->n_members; k++) other[k] = c->d[one->first + k] == 0 && shares_in(c, one, k);
     for (int asked = 0; asked < 2; asked++) {
         for (int k = 0; k < one->n_members; k++)
             if (other[k]) c->d[m->holds[member[k]].approach] = asked;
-        solved = solved && solve_now(c, 1) == RESULT_OK;
+        solved = solved && solve_now(c, 1);
         variables_now(c);
         for (int k = 0; k < one->n_members; k++) {
-            double now = c->work.variables[m->holds[member[k]].reaction];
+            double now = c->variables[m->holds[member[k]].reaction];
             if (asked && other[k]) inertia = fmax(inertia, fabs(now - reaction[k]));
             reaction[k] = now;
         }
@@ -167,8 +166,8 @@ static void yield_to_contradiction(Instance *c, const Circuit *one) {
 /* Writes switches and shares of a circuit; tells whether anything is shared. */
 static int share_circuit(Instance *c, const Circuit *one, const unsigned char *held, const double *weights) {
     const Model *m = c->model;
-    int *place = c->work.places, *member = c->work.member, n = 0, rows = 0, moved = 0;
-    double *silent = c->work.square + (size_t)m->most_members * (m->n_x + m->most_members);
+    int *place = c->places, *member = c->member, n = 0, rows = 0, moved = 0;
+    double *silent = c->square + (size_t)m->most_members * (m->n_x + m->most_members);
     double *weighted = silent + (size_t)m->most_members * m->most_members;
     for (int k = 0; k < one->n_members; k++) {
         member[n] = m->members[one->first_member + k];
@@ -178,7 +177,7 @@ static int share_circuit(Instance *c, const Circuit *one, const unsigned char *h
     if (n > 1) rows = dependences(c, member, n, silent);
     for (int k = 0; k < rows * n; k++) weighted[k] = silent[k] * weights[member[k % n]];
     memset(c->d + one->first, 0, (size_t)one->n_members * (size_t)(1 + one->n_members) * sizeof(double));
-    eliminate(c->work.pivots, rows, n, silent, weighted, place, one->n_members, c->d + one->first);
+    eliminate(c->pivots, rows, n, silent, weighted, place, one->n_members, c->d + one->first);
     for (int k = 0; k < n; k++) moved |= m->holds[member[k]].moved;
     if (rows > 0 && moved) yield_to_contradiction(c, one);
     return rows > 0;
@@ -187,15 +186,15 @@ static int share_circuit(Instance *c, const Circuit *one, const unsigned char *h
 /* Reactions over what can be borne, of the elements that share; returns the largest. */
 static double use_of(Instance *c, const Terms *terms, double *use) {
     const Model *m = c->model;
-    double *z = c->work.kept_z, worst = 0;
+    double *z = c->kept_z, worst = 0;
     memset(use, 0, m->n_holds * sizeof(double));
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
-    if (solve_now(c, 1) != RESULT_OK) worst = INFINITY;
+    if (!solve_now(c, 1)) worst = INFINITY;
     variables_now(c);
     for (int i = 0; i < m->n_circuits; i++)
         for (int place = 0; place < m->circuits[i].n_members; place++) {
             int k = m->members[m->circuits[i].first_member + place];
-            double reaction = c->work.variables[m->holds[k].reaction];
+            double reaction = c->variables[m->holds[k].reaction];
             double limit = reaction > 0 ? terms[k].forward : terms[k].backward;
             if (!shares_in(c, &m->circuits[i], place) || !(limit > 0) || limit >= UNLIMITED) continue;
             use[k] = fabs(reaction) / limit;
@@ -210,20 +209,19 @@ static double use_of(Instance *c, const Terms *terms, double *use) {
  * more, as far as they can. */
 void share(Instance *c) {
     const Model *m = c->model;
-    Terms *terms = c->work.terms;
-    double *weights = c->work.weights, *base = c->work.base_weights, *use = c->work.use;
-    double *best = c->work.best, least = INFINITY;
+    Terms *terms = c->terms;
+    double *weights = c->weights, *base = c->base_weights, *use = c->use;
+    double *best = c->best, least = INFINITY;
     replace_dependent(c);
     if (m->n_circuits == 0) return;
-    find_held(c, terms, c->work.held);
+    find_held(c, terms, c->held);
     weigh(m, terms, base);
     memcpy(weights, base, (size_t)m->n_holds * sizeof(double));
     for (int trial = 0; trial < SPLITS; trial++) {
         int shared = 0;
-        double worst;
-        for (int i = 0; i < m->n_circuits; i++) shared |= share_circuit(c, &m->circuits[i], c->work.held, weights);
+        for (int i = 0; i < m->n_circuits; i++) shared |= share_circuit(c, &m->circuits[i], c->held, weights);
         if (c->bounded) return; /* the split by capacities, without asking whether all can bear it */
-        worst = shared ? use_of(c, terms, use) : 0;
+        double worst = shared ? use_of(c, terms, use) : 0;
         if (worst < least || trial == 0) memcpy(best, c->d, (size_t)m->n_d * sizeof(double));
         if (worst < least) least = worst;
         if (worst <= BEARABLE || !isfinite(worst)) break;
@@ -231,4 +229,10 @@ void share(Instance *c) {
             weights[k] = use[k] > 0 ? fmin(fmax(weights[k] * use[k], base[k] / TURNED), base[k] * TURNED) : base[k];
     }
     memcpy(c->d, best, (size_t)m->n_d * sizeof(double));
+}
+
+Result share_and_solve(Instance *c) {
+    share(c);
+    c->variables_valid = 0;
+    return solve_now(c, 0);
 }

@@ -10,8 +10,7 @@
 
 /* Whether it is replaced, an impulse, whether by the norm or a derivative, the combination of equations. */
 static double *row_of(Instance *c, int element) {
-    const Model *m = c->model;
-    return c->d + m->settings->ideal + (size_t)element * (HEAD + m->n_z);
+    return c->d + c->model->settings->ideal + (size_t)element * (HEAD + c->model->n_z);
 }
 
 static int element_of(const Model *m, int row) {
@@ -36,10 +35,11 @@ static int place_of(Instance *c, int row, int second) {
 
 /* Gaussian elimination, row by row; `turns` becomes the combinations of rows, and `dependent` marks what vanishes. */
 static void eliminate_rows(Instance *c, int second, double *turns, double *sizes, unsigned char *dependent) {
-    int n = c->model->n_z;
-    double *a = c->work.dense_matrix;
-    evaluate_special(c, SPECIAL_ALG, c->state.t, c->x, c->work.vector);
-    run_special(c, SPECIAL_ALG_JACOBIAN, a);
+    const Model *m = c->model;
+    int n = m->n_z;
+    double *a = c->dense_matrix;
+    evaluate_special(c, &m->tapes.alg, c->state.t, c->x, c->vector);
+    run_special(c, &m->tapes.alg_jacobian, a);
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
             if (fabs(a[i + n * j]) > sizes[i]) sizes[i] = fabs(a[i + n * j]);
@@ -74,7 +74,7 @@ static void eliminate_rows(Instance *c, int second, double *turns, double *sizes
 /* The combination of replaced rows that says nothing: what it leaves open gets the least norm. */
 static void leave_open(Instance *c, int element, const double *turns) {
     const Model *m = c->model;
-    double *total = memset(c->work.vector, 0, (size_t)m->n_z * sizeof(double));
+    double *total = memset(c->vector, 0, (size_t)m->n_z * sizeof(double));
     for (int k = 0; k < m->n_ideals; k++)
         for (int j = 0; j < m->n_z; j++)
             total[j] += turns[m->ideals[element].row + m->n_z * m->ideals[k].row] * row_of(c, k)[HEAD + j];
@@ -86,11 +86,10 @@ static void leave_open(Instance *c, int element, const double *turns) {
 static void push(Instance *c) {
     const Model *m = c->model;
     size_t size = (size_t)m->n_ideals * (HEAD + m->n_z) * sizeof(double);
-    double *rows = row_of(c, 0), *kept = c->work.best, *z = c->work.kept_z, *left = c->work.residual;
-    const double *values;
+    double *rows = row_of(c, 0), *kept = c->best, *z = c->kept_z, *left = c->residual;
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
     solve_now(c, 1);
-    values = variables_now(c);
+    const double *values = variables_now(c);
     memcpy(kept, rows, size);
     memset(rows, 0, size);
     evaluate_now(c, &m->tapes.alg, left);
@@ -106,8 +105,8 @@ static void push(Instance *c) {
 void replace_dependent(Instance *c) {
     const Model *m = c->model;
     int n = m->n_z, any = 0;
-    double *turns = c->work.square, *sizes = turns + (size_t)n * n, *least = sizes + n;
-    unsigned char *dependent = c->work.open_rows;
+    double *turns = c->square, *sizes = turns + (size_t)n * n, *least = sizes + n;
+    unsigned char *dependent = c->open_rows;
     if (m->n_ideals == 0) return;
     memset(row_of(c, 0), 0, (size_t)m->n_ideals * (HEAD + n) * sizeof(double));
     memset(sizes, 0, (size_t)n * sizeof(double));
@@ -142,7 +141,7 @@ Result meet(Instance *c, double keep, int *any) {
     const Model *m = c->model;
     const double *values = variables_now(c);
     double limit = keep < 0 ? LOST : keep;
-    int *nodes = c->work.places;
+    int *nodes = c->places;
     *any = 0;
     for (int k = 0; k < m->n_ideals; k++) {
         int node = zero_of(c, k), met;

@@ -9,13 +9,11 @@
 /* Rates, and reactions where they matter, at the present point, with or without the approaches. */
 static Result ask(Instance *c, const Strike *strike, int approaching, int unsolved, double *rates, double *reactions) {
     const Model *m = c->model;
-    const double *values;
     for (int k = 0; k < m->n_holds; k++) c->d[m->holds[k].approach] = approaching ? strike->approach[k] : 0;
-    if (unsolved && solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
-    evaluate_now(c, &m->tapes.rates, c->work.rhs);
-    memcpy(rates, c->work.rhs, m->n_x * sizeof(double));
+    if (unsolved && !solve_now(c, 0)) return RESULT_ERROR;
+    evaluate_now(c, &m->tapes.rates, rates);
     if (!strike->hard) return RESULT_OK;
-    values = variables_now(c);
+    const double *values = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) reactions[k] = strike->held[k] ? values[m->holds[k].reaction] : 0;
     return RESULT_OK;
 }
@@ -23,18 +21,17 @@ static Result ask(Instance *c, const Strike *strike, int approaching, int unsolv
 /* Jump of the states, impulses and finite reactions of all that holds, with what is loose let go. */
 static Result respond(Instance *c, Strike *strike) {
     const Model *m = c->model;
-    double *d = c->work.respond_d, *z = c->work.respond_z, *rates = c->work.rates;
+    double *d = c->respond_d, *z = c->respond_z, *rates = c->rates;
     int any = any_of(strike->loose, m->n_holds);
-    Result result;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
     for (int k = 0; k < m->n_holds; k++)
         if (strike->loose[k]) c->d[m->holds[k].mode] = m->holds[k].loose;
     if (any || !c->bounded) share(c); /* else it has just been done, with the implicit equations solved */
-    if (strike->hard) find_held(c, c->work.terms, strike->held);
+    if (strike->hard) find_held(c, c->terms, strike->held);
     for (int k = 0; k < m->n_holds; k++) strike->held[k] &= !strike->loose[k] && m->holds[k].reaction >= 0;
-    result = ask(c, strike, 0, any || !c->bounded, rates, strike->reaction);
-    if (result == RESULT_OK) result = ask(c, strike, 1, 1, strike->jump, strike->impulse);
+    Result result = ask(c, strike, 0, any || !c->bounded, rates, strike->reaction) &&
+                    ask(c, strike, 1, 1, strike->jump, strike->impulse);
     for (int k = 0; k < m->n_x; k++) strike->jump[k] = INSTANT * (strike->jump[k] - rates[k]);
     for (int k = 0; k < m->n_holds; k++) strike->impulse[k] = INSTANT * (strike->impulse[k] - strike->reaction[k]);
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
@@ -61,13 +58,12 @@ static int let_go_unbearable(const Instance *c, Strike *strike, const Terms *ter
 /* Puts back what was let go and would now move on against what nothing limits; tells whether anything would. */
 static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
-    double *x = c->work.x_kept;
-    const double *after;
+    double *x = c->x_kept;
     int any = 0;
     if (!any_of(strike->loose, m->n_holds)) return 0;
     memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
     for (int k = 0; k < m->n_x; k++) c->x[k] += strike->jump[k];
-    after = variables_now(c);
+    const double *after = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
         double motion = after[m->holds[k].motion];
         double against = motion > 0 ? terms[k].forward : terms[k].backward;
@@ -83,7 +79,7 @@ static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms)
 /* Marks as loose also what bounces, or was moved in passing. */
 static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
-    unsigned char *held = c->work.held;
+    unsigned char *held = c->held;
     const double *after = variables_now(c);
     double largest = 0;
     mark_held(c, terms, held);
@@ -112,8 +108,8 @@ static void book(Instance *c, const Strike *strike, int first) {
 /* Carries out the impact; `loose` then tells what was knocked loose, bounces, or was moved in passing. */
 static Result carry_out(Instance *c, Strike *strike, int first) {
     const Model *m = c->model;
-    Terms *terms = c->work.strike_terms;
-    if (strike->hard) find_held(c, terms, c->work.held);
+    Terms *terms = c->strike_terms;
+    if (strike->hard) find_held(c, terms, c->held);
     for (int k = 0; k < m->n_holds && !strike->hard; k++) terms[k].restitution = 0; /* rounding does not rebound */
     for (int trial = 0; trial < TRIALS && !(trial > 0 && c->bounded && c->budget < 1); trial++) {
         c->budget--;
@@ -121,7 +117,7 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
             strike->approach[k] = strike->entering[k] && !strike->loose[k]
                                       ? -(1 + terms[k].restitution) * strike->before[k] / INSTANT
                                       : 0;
-        if (respond(c, strike) != RESULT_OK) return RESULT_ERROR;
+        if (!respond(c, strike)) return RESULT_ERROR;
         if (strike->hard && let_go_unbearable(c, strike, terms)) continue;
         if (!put_back_approaching(c, strike, terms)) break;
     }
@@ -132,7 +128,7 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
         if (strike->entering[k] && !strike->loose[k] && one->state >= 0)
             c->x[one->state] = -terms[k].restitution * strike->before[k] / one->factor;
     }
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
+    if (!solve_now(c, 0)) return RESULT_ERROR;
     if (strike->hard && c->struck != NULL) book(c, strike, first);
     if (strike->hard) mark_moved(c, strike, terms);
     return RESULT_OK;
@@ -141,15 +137,15 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
 /* What the impact knocks loose takes the mode that its start would take. */
 static void choose_again(Instance *c, const Strike *strike) {
     const Model *m = c->model;
-    double *d = c->work.respond_d;
-    unsigned char *decided = c->work.decided;
+    double *d = c->respond_d;
+    unsigned char *decided = c->decided;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memset(decided, 1, (size_t)m->n_d);
-    evaluate_now(c, &m->tapes.discrete_starts, c->work.guards);
+    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
     for (int k = 0; k < m->n_holds; k++) {
         int mode = m->holds[k].mode;
         if (!strike->loose[k]) continue;
-        c->d[mode] = c->work.guards[mode];
+        c->d[mode] = c->guards[mode];
         decided[mode] = 0;
     }
     choose_modes(c, decided);
@@ -170,8 +166,7 @@ static Result hold_again(Instance *c, const unsigned char *entered) {
         note_change(c, one->name, -1, one->mode, one->number);
         c->d[one->mode] = one->number;
     }
-    share(c);
-    return solve_now(c, 0);
+    return share_and_solve(c);
 }
 
 /* Speeds before an impact, and whether it is one. Friction stops nothing at once; where an importer lets it overrun
@@ -191,11 +186,13 @@ static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
 
 /* Stop what modes have begun to hold since `before`, by an impulse that all other components pass on. All impacts at an
  * instant are one, from the speeds before the first. */
-Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
+Result stop_motions(Instance *c, const double *before) {
     const Model *m = c->model;
-    Strike *strike = &c->work.strike;
-    Terms *terms = c->work.strike_terms;
-    int first = !impacts->struck;
+    Strike *strike = &c->strike;
+    Terms *terms = c->strike_terms;
+    unsigned char *entered = c->entered;
+    double *x = c->impact_x;
+    int first = !c->stopped;
     if (m->n_holds == 0) return RESULT_OK;
     memset(strike->loose, 0, (size_t)m->n_holds);
     find_held(c, terms, strike->entering);
@@ -203,17 +200,16 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
     if (!any_of(strike->entering, m->n_holds)) return RESULT_OK;
     begin_strike(c, strike, terms);
     if (strike->hard) {
-        for (int k = 0; k < m->n_holds; k++) strike->entering[k] = impacts->entered[k] |= strike->entering[k];
-        if (!impacts->struck) memcpy(impacts->x, c->x, (size_t)m->n_x * sizeof(double));
-        impacts->struck = 1;
-        memcpy(c->x, impacts->x, (size_t)m->n_x * sizeof(double));
-        if (hold_again(c, impacts->entered) != RESULT_OK) return RESULT_ERROR;
+        for (int k = 0; k < m->n_holds; k++) strike->entering[k] = entered[k] |= strike->entering[k];
+        if (first) memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
+        c->stopped = 1;
+        memcpy(c->x, x, (size_t)m->n_x * sizeof(double));
+        if (!hold_again(c, entered)) return RESULT_ERROR;
         begin_strike(c, strike, terms);
     }
-    if (carry_out(c, strike, first) != RESULT_OK) return RESULT_ERROR;
-    for (int k = 0; k < m->n_holds; k++) impacts->entered[k] &= !strike->knocked[k];
+    if (!carry_out(c, strike, first)) return RESULT_ERROR;
+    for (int k = 0; k < m->n_holds; k++) entered[k] &= !strike->knocked[k];
     if (!any_of(strike->loose, m->n_holds)) return RESULT_OK;
     choose_again(c, strike);
-    share(c);
-    return solve_now(c, 0);
+    return share_and_solve(c);
 }

@@ -31,7 +31,7 @@ static double least_step(const State *s) { return 1e-15 * fmax(1, fabs(s->t)); }
 /* Takes one step from the present point towards `limit`, shorter where accuracy or an event asks for it. */
 static Result take_step(Instance *c, double limit) {
     State *s = &c->state;
-    double *first = c->work.first, wished = s->step > 0 ? s->step : first_step(c);
+    double *first = c->first, wished = s->step > 0 ? s->step : first_step(c);
     double least = least_step(s);
     int rejected = 0;
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
@@ -45,7 +45,7 @@ static Result take_step(Instance *c, double limit) {
         if (!rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece, &error) || !isfinite(error)) error = 1e30;
         if (cut) c->piece->end = limit;
         factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
-        if (error > 1 || solve_implicit(c, c->piece->end, last_of(c->model, c->piece), 1) != RESULT_OK ||
+        if (error > 1 || !solve_implicit(c, c->piece->end, last_of(c->model, c->piece), 1) ||
             (c->model->n_guards > 0 && !search_events(c))) {
             rejected++;
             s->n_rejected++;
@@ -81,11 +81,10 @@ Result move_to(Instance *c, double t) {
 Result take_changes(Instance *c, int *event) {
     *event = 0;
     if (!c->state.inputs_changed) return RESULT_OK;
-    if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
-    c->state.inputs_changed = 0;
+    if (!check_tables(c)) return RESULT_ERROR;
     leave_piece(c);
-    c->state.z_valid = c->variables_valid = 0;
-    if (renew(c) != RESULT_OK || settle(c) != RESULT_OK) return RESULT_ERROR;
+    c->state.inputs_changed = c->state.z_valid = c->variables_valid = 0;
+    if (!renew(c) || !settle(c)) return RESULT_ERROR;
     *event = find_wanting(c, nothing_wanting(c), 1) || pushed(c);
     return leave_instant(c, 1);
 }
@@ -95,21 +94,21 @@ static Result pass_event(Instance *c) {
     unsigned char *wanting = nothing_wanting(c);
     int located = s->event_pending, ticks = !located && (c->model->n_moments > 0 || delays_due(c));
     size_t size = (size_t)c->model->n_x * sizeof(double);
-    double *x = c->work.first, *rates = c->work.first_rates, step = s->step, events = s->n_events;
+    double *x = c->first, *rates = c->first_rates, step = s->step, events = s->n_events;
     if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
     s->step = 0;
     s->z_valid = 0;
-    if (settle(c) != RESULT_OK || reach_instant(c) != RESULT_OK) return RESULT_ERROR;
+    if (!settle(c) || !reach_instant(c)) return RESULT_ERROR;
     if (ticks) evaluate_now(c, &c->model->tapes.rates, rates);
     memcpy(x, c->x, size);
-    if (iterate_events(c, wanting, located) != RESULT_OK) return RESULT_ERROR;
+    if (!iterate_events(c, wanting, located)) return RESULT_ERROR;
     s->z_valid = 1;
-    if (leave_instant(c, s->n_events != events) != RESULT_OK) return RESULT_ERROR;
+    if (!leave_instant(c, s->n_events != events)) return RESULT_ERROR;
     if (!ticks || memcmp(x, c->x, size) != 0) return RESULT_OK;
-    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
-    if (memcmp(rates, c->work.rhs, size) == 0) s->step = step; /* a tick without effect on what moves */
+    evaluate_now(c, &c->model->tapes.rates, c->rhs);
+    if (memcmp(rates, c->rhs, size) == 0) s->step = step; /* a tick without effect on what moves */
     return RESULT_OK;
 }
 
@@ -143,7 +142,7 @@ Result check_step(Instance *c, double point, double size, double *target) {
     if (!isfinite(point) || fabs(point - s->t) > slack)
         return fail(c, "The communication point is %.12g s, but the instance is at %.12g s.", point, s->t);
     if (!(size > 0) || !isfinite(*target)) return fail(c, "The communication step size %g s is not positive.", size);
-    if (check_whole(c, size) != RESULT_OK) return RESULT_ERROR;
+    if (!check_whole(c, size)) return RESULT_ERROR;
     if (!s->stop_time_defined || *target <= s->stop_time) return RESULT_OK;
     if (*target > s->stop_time + slack)
         return fail(c, "The step to %.12g s goes beyond the stop time %.12g s.", *target, s->stop_time);
@@ -156,12 +155,12 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     State *s = &c->state;
     int held = 0;
     if (c->model->settings->fixed_step > 0) return step_fixed(c, target);
-    if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
+    if (s->at_event && !handle_event(c)) return FAILED;
     for (;;) {
         held |= s->inputs_changed;
-        if (take_changes(c, &s->at_event) != RESULT_OK) return FAILED;
+        if (!take_changes(c, &s->at_event)) return FAILED;
         if (s->at_event && stop_at_events) return AT_EVENT;
-        if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
+        if (s->at_event && !handle_event(c)) return FAILED;
         if (!(s->t < target)) return REACHED;
         if (!s->piece_valid && target - s->t < least_step(s)) {
             /* An event was located a rounding error before the target. */
@@ -172,15 +171,15 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
             double limit = s->stop_time_defined && s->stop_time >= target ? s->stop_time : INFINITY;
             limit = fmin(limit, next_moment(c));
             if (held) limit = fmin(limit, target);
-            if (take_step(c, limit) != RESULT_OK) return FAILED;
+            if (!take_step(c, limit)) return FAILED;
         }
-        if (c->piece->end > target) return move_to(c, target) == RESULT_OK ? REACHED : FAILED;
+        if (c->piece->end > target) return move_to(c, target) ? REACHED : FAILED;
         keep_piece(c, c->piece->end);
-        if (move_to(c, c->piece->end) != RESULT_OK) return FAILED;
+        if (!move_to(c, c->piece->end)) return FAILED;
         s->piece_valid = 0;
         s->at_event = s->event_pending || is_due(c);
         if (s->at_event && stop_at_events) return AT_EVENT;
-        if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
+        if (s->at_event && !handle_event(c)) return FAILED;
         if (c->step_finished != NULL) target = fmin(target, fmax(c->step_finished(c), s->t));
     }
 }

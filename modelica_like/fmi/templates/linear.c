@@ -4,56 +4,56 @@
 #define SAYS_NOTHING 1e-24 /* square of the relative size of an equation that is none */
 
 /* Left-looking Householder QR (T. Davis, Direct Methods for Sparse Linear Systems, ch. 5). Returns 0 if singular. */
-int qr_factor(const QrPattern *a, const double *values, Work *work) {
-    double *x = work->qr_work;
+int qr_factor(const QrPattern *a, const double *values, Instance *c) {
+    double *x = c->qr_work;
     memset(x, 0, (size_t)a->size * sizeof(double));
     for (int column = 0; column < a->size; column++) {
         int source = a->column_order[column], r = a->r_colind[column];
         int first = a->v_colind[column], end = a->v_colind[column + 1];
-        double *v = work->qr_v + first, tail = 0, norm;
+        double *v = c->qr_v + first, tail = 0, norm;
         for (int k = a->colind[source]; k < a->colind[source + 1]; k++) x[a->row_place[a->row[k]]] = values[k];
         for (; a->r_row[r] < column; r++) {
             int earlier = a->r_row[r];
             double dot = 0;
-            for (int k = a->v_colind[earlier]; k < a->v_colind[earlier + 1]; k++) dot += work->qr_v[k] * x[a->v_row[k]];
-            dot *= work->qr_beta[earlier];
-            for (int k = a->v_colind[earlier]; k < a->v_colind[earlier + 1]; k++) x[a->v_row[k]] -= dot * work->qr_v[k];
-            work->qr_r[r] = x[earlier];
+            for (int k = a->v_colind[earlier]; k < a->v_colind[earlier + 1]; k++) dot += c->qr_v[k] * x[a->v_row[k]];
+            dot *= c->qr_beta[earlier];
+            for (int k = a->v_colind[earlier]; k < a->v_colind[earlier + 1]; k++) x[a->v_row[k]] -= dot * c->qr_v[k];
+            c->qr_r[r] = x[earlier];
             x[earlier] = 0;
         }
         for (int k = first; k < end; k++) {
-            work->qr_v[k] = x[a->v_row[k]];
+            c->qr_v[k] = x[a->v_row[k]];
             x[a->v_row[k]] = 0;
         }
         for (int k = 1; k < end - first; k++) tail += v[k] * v[k];
         norm = sqrt(v[0] * v[0] + tail);
         if (!isfinite(norm) || norm == 0) return 0;
         if (tail == 0) {
-            work->qr_r[r] = v[0];
-            work->qr_beta[column] = 0;
+            c->qr_r[r] = v[0];
+            c->qr_beta[column] = 0;
         } else {
             double head = v[0] > 0 ? v[0] + norm : v[0] - norm;
-            work->qr_r[r] = v[0] > 0 ? -norm : norm;
-            work->qr_beta[column] = 2 / (head * head + tail);
+            c->qr_r[r] = v[0] > 0 ? -norm : norm;
+            c->qr_beta[column] = 2 / (head * head + tail);
             v[0] = head;
         }
     }
     return 1;
 }
 
-void qr_solve(const QrPattern *a, const Work *work, double *x) {
-    double *y = work->qr_work;
+void qr_solve(const QrPattern *a, const Instance *c, double *x) {
+    double *y = c->qr_work;
     for (int k = 0; k < a->size; k++) y[a->row_place[k]] = x[k];
     for (int column = 0; column < a->size; column++) {
         double dot = 0;
-        for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) dot += work->qr_v[k] * y[a->v_row[k]];
-        dot *= work->qr_beta[column];
-        for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) y[a->v_row[k]] -= dot * work->qr_v[k];
+        for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) dot += c->qr_v[k] * y[a->v_row[k]];
+        dot *= c->qr_beta[column];
+        for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) y[a->v_row[k]] -= dot * c->qr_v[k];
     }
     for (int column = a->size - 1; column >= 0; column--) {
         int last = a->r_colind[column + 1] - 1;
-        y[column] /= work->qr_r[last];
-        for (int k = a->r_colind[column]; k < last; k++) y[a->r_row[k]] -= work->qr_r[k] * y[column];
+        y[column] /= c->qr_r[last];
+        for (int k = a->r_colind[column]; k < last; k++) y[a->r_row[k]] -= c->qr_r[k] * y[column];
     }
     for (int k = 0; k < a->size; k++) x[a->column_order[k]] = y[k];
 }

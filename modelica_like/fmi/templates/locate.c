@@ -14,13 +14,13 @@ typedef struct { /* guards and their rates at a time within a step; behind them 
 } Look;
 
 static Look room_for_look(const Instance *c, int number) {
-    double *values = c->work.looks + 3 * (size_t)c->model->n_guards * (size_t)number;
+    double *values = c->looks + 3 * (size_t)c->model->n_guards * (size_t)number;
     return (Look){0, values, values + c->model->n_guards};
 }
 
 static int look_at(Instance *c, double t, double *point, Look *look) {
-    if (solve_implicit(c, t, point, 1) != RESULT_OK) return 0;
-    evaluate_special(c, SPECIAL_GUARDS, t, point, look->values);
+    if (!solve_implicit(c, t, point, 1)) return 0;
+    evaluate_special(c, &c->model->tapes.guards, t, point, look->values);
     look->t = t;
     for (int g = 0; g < c->model->n_guards; g++) {
         look->values[g] = number_or_false(look->values[g]);
@@ -31,14 +31,14 @@ static int look_at(Instance *c, double t, double *point, Look *look) {
 
 /* By the dense output of the whole step. */
 static int look_inside(Instance *c, double t, Look *look) {
-    double *point = c->work.vector + c->model->n_z;
-    piece_at(c->model, c->work.whole, t, point);
+    double *point = c->vector + c->model->n_z;
+    piece_at(c->model, c->whole, t, point);
     return look_at(c, t, point, look);
 }
 
 /* By a step again from the beginning of the whole one, which becomes the piece. */
 static int step_to(Instance *c, double t, Look *look) {
-    const Piece *whole = c->work.whole;
+    const Piece *whole = c->whole;
     double ignored;
     if (t <= whole->begin) {
         memcpy(c->piece, whole, piece_size(c->model));
@@ -88,7 +88,7 @@ static double guess(const Look *before, const Look *after, int g) {
 enum { QUIET, CROSSING, HUMP };
 
 static int find_candidates(Instance *c, const Look *before, const Look *after) {
-    unsigned char *kinds = c->work.kinds;
+    unsigned char *kinds = c->kinds;
     double h = after->t - before->t;
     for (int g = 0; g < c->model->n_guards; g++) {
         double g0 = before->values[g], g1 = after->values[g];
@@ -105,7 +105,7 @@ static int newton(const Instance *c, const Look *look, double *step) {
     int positive = 0;
     *step = INFINITY;
     for (int g = 0; g < c->model->n_guards; g++) {
-        if (c->work.kinds[g] == QUIET) continue;
+        if (c->kinds[g] == QUIET) continue;
         positive |= look->values[g] > 0;
         if (look->rates[g] > 0) *step = fmin(*step, -look->values[g] / look->rates[g]);
     }
@@ -115,15 +115,15 @@ static int newton(const Instance *c, const Look *look, double *step) {
 /* A time at which a guard that rises and falls again is positive; infinite if none is. */
 static double positive_top(Instance *c, const Look *before, const Look *after, Look *look) {
     for (int g = 0; g < c->model->n_guards; g++) {
-        double low = before->t, high = after->t, t = c->work.kinds[g] == HUMP ? guess(before, after, g) : low;
-        for (int n = 0; n < MAX_TRIALS && c->work.kinds[g] == HUMP; n++) {
+        double low = before->t, high = after->t, t = c->kinds[g] == HUMP ? guess(before, after, g) : low;
+        for (int n = 0; n < MAX_TRIALS && c->kinds[g] == HUMP; n++) {
             if (!look_inside(c, t, look)) return INFINITY;
             if (look->values[g] > 0) return t;
             *(look->rates[g] > 0 ? &low : &high) = t;
             if (look->values[g] + fabs(look->rates[g]) * (high - low) < 0 || high - low < 1e-12) break;
             t = 0.5 * (low + high);
         }
-        if (c->work.kinds[g] == HUMP) c->work.kinds[g] = QUIET;
+        if (c->kinds[g] == HUMP) c->kinds[g] = QUIET;
     }
     return INFINITY;
 }
@@ -135,7 +135,7 @@ static int locate(Instance *c, const Look *before, const Look *after, Look *look
     if (!newton(c, after, &step)) last = positive_top(c, before, after, look);
     if (!isfinite(last)) return 0;
     for (int g = 0; g < c->model->n_guards; g++)
-        if (c->work.kinds[g] != QUIET) t = fmin(t, guess(before, after, g));
+        if (c->kinds[g] != QUIET) t = fmin(t, guess(before, after, g));
     t = fmin(t, last);
     for (int rough = 1; rough >= 0; rough--) {
         double low = before->t, high = last;
@@ -159,8 +159,7 @@ static int mark_wanting(Instance *c, const Look *look, double tolerance) {
     evaluate(c, &m->tapes.guards_soon, c->piece->end, last_of(m, c->piece), soon);
     for (int g = 0; g < m->n_guards; g++) {
         int near = look->values[g] > 0 || (look->rates[g] > 0 && -look->values[g] <= 10 * tolerance * look->rates[g]);
-        if (c->work.kinds[g] != QUIET && near && number_or_false(soon[g]) > 0)
-            any = c->wanting[m->guard_transition[g]] = 1;
+        if (c->kinds[g] != QUIET && near && number_or_false(soon[g]) > 0) any = c->wanting[m->guard_transition[g]] = 1;
     }
     return any;
 }
@@ -171,7 +170,7 @@ typedef enum { NOTHING, ENDED, TOO_LONG } Found;
 static Found look_behind(Instance *c, double end, Look *look) {
     if (!step_to(c, fmin(c->piece->end + TIME_RESOLUTION * fmax(1, fabs(c->piece->end)), end), look)) return TOO_LONG;
     for (int g = 0; g < c->model->n_guards; g++)
-        if (c->work.kinds[g] == CROSSING && look->values[g] > 0)
+        if (c->kinds[g] == CROSSING && look->values[g] > 0)
             c->state.event_pending = c->wanting[c->model->guard_transition[g]] = 1;
     return ENDED;
 }
@@ -185,10 +184,9 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
         c->state.event_pending = mark_wanting(c, &found, LOCATED * fmax(1, fabs(after->t)));
         if (c->state.event_pending) return ENDED;
         /* Positive for less than the time resolution: what the last event left is on its way down. */
-        if (memchr(c->work.kinds, CROSSING, (size_t)c->model->n_guards) != NULL)
-            return look_behind(c, after->t, &found);
+        if (memchr(c->kinds, CROSSING, (size_t)c->model->n_guards) != NULL) return look_behind(c, after->t, &found);
     } else if (newton(c, after, &step)) return TOO_LONG;
-    memcpy(c->piece, c->work.whole, piece_size(c->model));
+    memcpy(c->piece, c->whole, piece_size(c->model));
     return NOTHING;
 }
 
@@ -206,11 +204,9 @@ static int behave(const Instance *c, const Look *before, const Look *middle, con
 
 static Found look_into(Instance *c, const Look *before, const Look *after, int depth) {
     Look middle = room_for_look(c, depth + 1);
-    int deeper;
-    Found found;
     if (!look_inside(c, before->t + MIDDLE * (after->t - before->t), &middle)) return TOO_LONG;
-    deeper = depth > 1 && !behave(c, before, &middle, after);
-    found = deeper ? look_into(c, before, &middle, depth - 1) : check_between(c, before, &middle);
+    int deeper = depth > 1 && !behave(c, before, &middle, after);
+    Found found = deeper ? look_into(c, before, &middle, depth - 1) : check_between(c, before, &middle);
     if (found != NOTHING) return found;
     return deeper ? look_into(c, &middle, after, depth - 1) : check_between(c, &middle, after);
 }
@@ -218,15 +214,14 @@ static Found look_into(Instance *c, const Look *before, const Look *after, int d
 /* Looks for events in an accepted step; shortens it to the first. Returns 0 if the step must be shorter. */
 int search_events(Instance *c) {
     Look before = room_for_look(c, 0), after = room_for_look(c, 1);
-    const Piece *whole = memcpy(c->work.whole, c->piece, piece_size(c->model));
-    Found found;
+    const Piece *whole = memcpy(c->whole, c->piece, piece_size(c->model));
     if (!c->look_valid && !look_inside(c, whole->begin, &before)) return 0;
     c->look_valid = 1;
     before.t = whole->begin;
     /* What the last event left positive did not want to fire: it is on its way down. */
     for (int g = 0; g < c->model->n_guards; g++) before.values[g] = fmin(before.values[g], 0);
     if (!look_inside(c, whole->end, &after)) return 0;
-    found = look_into(c, &before, &after, DEPTH);
+    Found found = look_into(c, &before, &after, DEPTH);
     if (found == NOTHING) memcpy(before.values, after.values, 2 * (size_t)c->model->n_guards * sizeof(double));
     else if (found == ENDED) c->look_valid = 0;
     return found != TOO_LONG;

@@ -3,6 +3,7 @@
 #include "model.h"
 
 #define FORMAT 5
+#define UNKNOWN (-1)
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
 
 typedef struct {
@@ -64,13 +65,10 @@ static int check_header(const unsigned char *bytes, size_t size, char *message) 
     if (size < sizeof h) return damaged(message, "it is truncated");
     memcpy(&h, bytes, sizeof h);
     if (memcmp(h.magic, "MLMODEL", 8) != 0) return damaged(message, "it is another kind of file");
-    if (h.version != FORMAT || h.n_sections != N_TABLES) {
-        snprintf(message, MESSAGE_LENGTH,
-            "The model file has format %d with %d tables, but this library reads format %d with %d. Export the model "
-            "again.",
-            h.version, h.n_sections, FORMAT, (int)N_TABLES);
-        return 0;
-    }
+    if (h.version != FORMAT || h.n_sections != N_TABLES)
+        return REFUSE("The model file has format %d with %d tables, but this library reads format %d with %d. Export "
+                      "the model again.",
+                   h.version, h.n_sections, FORMAT, (int)N_TABLES) != NULL;
     if (h.size != size || size < first) return damaged(message, "it is truncated");
     if (h.check != crc32_of(bytes + sizeof h, size - sizeof h)) return damaged(message, "its checksum is wrong");
     return (uintptr_t)bytes % sizeof(double) == 0 || damaged(message, "it is not aligned");
@@ -78,22 +76,19 @@ static int check_header(const unsigned char *bytes, size_t size, char *message) 
 
 /* Finds the tables in the file, and their sizes. */
 static int find_tables(Model *m, const unsigned char *bytes, size_t size, char *message) {
-    const int unknown = -1;
     size_t first = sizeof(FileHeader) + N_TABLES * sizeof(Section);
-    for (int k = 0; k < N_TABLES; k++) memcpy((char *)m + tables[k].count, &unknown, sizeof unknown);
+    for (int k = 0; k < N_TABLES; k++) *(int *)(void *)((char *)m + tables[k].count) = UNKNOWN;
     for (int k = 0; k < N_TABLES; k++) {
         Section s;
-        int count;
-        const void *table;
+        int *count = (int *)(void *)((char *)m + tables[k].count);
         memcpy(&s, bytes + sizeof(FileHeader) + (size_t)k * sizeof s, sizeof s);
-        memcpy(&count, (char *)m + tables[k].count, sizeof count);
         if (s.id != k || s.record != (int)tables[k].record || s.count < 0 || s.offset < 0 || s.offset % 8 != 0 ||
             (uint64_t)s.offset < first || (uint64_t)s.offset + (uint64_t)s.count * tables[k].record > size ||
-            (count >= 0 && count != s.count))
+            (*count != UNKNOWN && *count != s.count))
             return damaged(message, tables[k].name);
-        table = bytes + s.offset;
+        const void *table = bytes + s.offset;
         memcpy((char *)m + tables[k].table, &table, sizeof table);
-        memcpy((char *)m + tables[k].count, &s.count, sizeof s.count);
+        *count = s.count;
     }
     return 1;
 }
@@ -168,9 +163,8 @@ static int check_sizes(const Model *m, char *message) {
 /* Reads a model from bytes that are aligned as numbers and outlive it. Returns NULL and a message for `message`, which
  * has MESSAGE_LENGTH characters, if they are no model. */
 Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message) {
-    Model *m;
     if (!check_header(bytes, size, message)) return NULL;
-    m = allocate(1, sizeof *m);
+    Model *m = allocate(1, sizeof *m);
     if (m == NULL) return REFUSE("There is not enough memory.");
     memset(m, 0, sizeof *m);
     m->release = release;
@@ -182,7 +176,6 @@ Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Re
 }
 
 void model_free(Model *m) {
-    Release release = m->release;
-    if (m->own != NULL) release(m->own);
-    release(m);
+    if (m->own != NULL) m->release(m->own);
+    m->release(m);
 }

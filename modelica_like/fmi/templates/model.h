@@ -171,6 +171,7 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     void (*release)(void *memory);
 } Model;
 enum { N_TAPES = sizeof((Model *)0)->tapes / sizeof(Tape) };
+static inline const Tape *tapes_of(const Model *m) { return (const Tape *)(const void *)&m->tapes; }
 
 /* model.c */
 #define MESSAGE_LENGTH 512

@@ -3,8 +3,7 @@
 
 /* Tells that a file is no model; returns 0. */
 int damaged(char *message, const char *what) {
-    snprintf(message, MESSAGE_LENGTH, "The model file is damaged (%s). Export the model again.", what);
-    return 0;
+    return REFUSE("The model file is damaged (%s). Export the model again.", what) != NULL;
 }
 
 /* ---- ranges ----------------------------------------------------------------------------------------------------- */

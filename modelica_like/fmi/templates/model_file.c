@@ -83,16 +83,14 @@ static Model *read_all(FILE *file, Allocate allocate, Release release, char *mes
 
 Model *model_open(const char *location, Allocate allocate, Release release, char *message) {
     char path[LONGEST_PATH];
-    FILE *file;
-    Model *m;
     if (location == NULL || *location == 0)
         return REFUSE("The importer does not say where the FMU's resources are, so its model cannot be read. Export it "
                       "with the model compiled in (--embed).");
     if (!resource_path(location, ON_WINDOWS, path, sizeof path))
         return REFUSE("The location of the FMU's resources names no folder: '%.300s'.", location);
-    file = open_file(path);
+    FILE *file = open_file(path);
     if (file == NULL) return REFUSE("The model file cannot be opened: '%.400s'.", path);
-    m = read_all(file, allocate, release, message);
+    Model *m = read_all(file, allocate, release, message);
     fclose(file);
     return m;
 }

@@ -36,10 +36,10 @@ typedef struct {
 static void keep_message(const Instance *c, int status, const char *category, const char *message) {
     Native *n = c->environment;
     (void)category;
-    if (status != RESULT_OK) snprintf(n->message, sizeof n->message, "%s", message);
+    if (!status) snprintf(n->message, sizeof n->message, "%s", message);
 }
 
-static int code(Result result) { return result == RESULT_OK ? NATIVE_OK : NATIVE_FAILED; }
+static int code(Result result) { return result ? NATIVE_OK : NATIVE_FAILED; }
 
 /* ---- models and handles ----------------------------------------------------------------------------------------- */
 
@@ -96,8 +96,7 @@ EXPORTED int native_reset(Native *n, double start, double stop, double rtol, dou
 /* Before the begin: parameters, inputs and start values; later: inputs, and parameters that are tunable. */
 EXPORTED int native_set(Native *n, int64_t count, const uint32_t *references, const double *values) {
     for (int64_t k = 0; k < count; k++)
-        if (set_value(n->c, known_variable(n->c, references[k], ANY_TYPE), values[k]) != RESULT_OK)
-            return NATIVE_FAILED;
+        if (!set_value(n->c, known_variable(n->c, references[k], ANY_TYPE), values[k])) return NATIVE_FAILED;
     return NATIVE_OK;
 }
 
@@ -109,7 +108,7 @@ EXPORTED void native_set_all(Native *n, const double *parameters, const double *
 
 static int read_values(Instance *c, int64_t count, const uint32_t *references, double *values) {
     for (int64_t k = 0; k < count; k++)
-        if (get_value(c, known_variable(c, references[k], ANY_TYPE), &values[k]) != RESULT_OK) return NATIVE_FAILED;
+        if (!get_value(c, known_variable(c, references[k], ANY_TYPE), &values[k])) return NATIVE_FAILED;
     return NATIVE_OK;
 }
 
@@ -117,7 +116,7 @@ static int read_values(Instance *c, int64_t count, const uint32_t *references, d
 static int event_first(const Instance *c) { return c->state.at_event && !(c->model->settings->fixed_step > 0); }
 
 EXPORTED int native_get(Native *n, int64_t count, const uint32_t *references, double *values) {
-    if (event_first(n->c) && handle_event(n->c) != RESULT_OK) return NATIVE_FAILED;
+    if (event_first(n->c) && !handle_event(n->c)) return NATIVE_FAILED;
     return read_values(n->c, count, references, values);
 }
 
@@ -132,9 +131,7 @@ Result instance_begin(Instance *c) {
 }
 
 /* Finds the start from the model's start values and from those that were set. */
-EXPORTED int native_begin(Native *n) {
-    return code(start_solve(n->c) != RESULT_OK ? RESULT_ERROR : instance_begin(n->c));
-}
+EXPORTED int native_begin(Native *n) { return code(!start_solve(n->c) ? RESULT_ERROR : instance_begin(n->c)); }
 
 /* Begins at states, implicit unknowns and d that are given; events there have not happened yet. */
 EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const double *d) {
@@ -150,7 +147,7 @@ EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const 
 /* A control loop's step: sets, goes to a time through all events, gets. */
 EXPORTED int native_step(Native *n, double time, int64_t n_set, const uint32_t *set, const double *given, int64_t n_get,
     const uint32_t *get, double *values) {
-    if (native_set(n, n_set, set, given) != NATIVE_OK || check_whole(n->c, time - n->c->state.t) != RESULT_OK ||
+    if (native_set(n, n_set, set, given) != NATIVE_OK || !check_whole(n->c, time - n->c->state.t) ||
         integrate_to(n->c, time, 0) == FAILED)
         return NATIVE_FAILED;
     return native_get(n, n_get, get, values);
@@ -220,7 +217,7 @@ static int instant(Native *n, NativeRun *r, double width) {
         if (c->state.t - r->last <= NEAR_EVENT * width && r->n_points > r->first + 1) r->n_points--;
         if (write_point(n, r) != NATIVE_OK) return NATIVE_FAILED;
     }
-    if (state_copy_out(c, &n->before) != RESULT_OK || handle_event(c) != RESULT_OK) return NATIVE_FAILED;
+    if (!state_copy_out(c, &n->before) || !handle_event(c)) return NATIVE_FAILED;
     if (r->n_events > r->room_events || r->n_impacts > r->room_impacts) {
         r->n_events = events;
         r->n_impacts = impacts;
@@ -280,7 +277,7 @@ EXPORTED int native_run(Native *n, double end, int64_t results, NativeRun *run) 
         run->begin = n->c->state.t;
         run->next = 1;
     }
-    if (check_whole(n->c, (end - run->begin) / (double)results) != RESULT_OK) return NATIVE_FAILED;
+    if (!check_whole(n->c, (end - run->begin) / (double)results)) return NATIVE_FAILED;
     n->run = run;
     n->pause = run->steps > 0 ? n->c->state.n_steps + (double)run->steps : INFINITY;
     n->c->noted = note_event;

@@ -9,32 +9,32 @@ double input_at(const Instance *c, int k, double t) { return c->u[k] + c->u_rate
 
 void load(Instance *c, double t, const double *point) {
     const Model *m = c->model;
-    double *slots = c->work.slots;
+    double *slots = c->slots;
     slots[0] = t;
     memcpy(slots + m->slot_x, point, m->n_unknowns * sizeof(double));
     for (int k = 0; k < m->n_u; k++) slots[m->slot_u + k] = input_at(c, k, t);
     if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) != 0) {
         for (int k = 0; k < m->n_p; k++) {
-            if (slots[m->slot_p + k] != c->p[k] && !c->work.tuned[k]) c->work.decided_by++;
+            if (slots[m->slot_p + k] != c->p[k] && !c->tuned[k]) c->decided_by++;
             slots[m->slot_p + k] = c->p[k];
         }
     }
     if (memcmp(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double)) != 0) {
         memcpy(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double));
-        c->work.decided_by++;
+        c->decided_by++;
     }
 }
 
 void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
     load(c, t, point);
-    tape_run(tape, c->work.slots, outputs);
+    tape_run(tape, c->slots, outputs);
 }
 
 void evaluate_now(Instance *c, const Tape *tape, double *outputs) { evaluate(c, tape, c->state.t, c->x, outputs); }
 
 const double *variables_now(Instance *c) {
-    evaluate_now(c, &c->model->tapes.variables, c->work.variables);
-    return c->work.variables;
+    evaluate_now(c, &c->model->tapes.variables, c->variables);
+    return c->variables;
 }
 
 int any_of(const unsigned char *marks, int n) {
@@ -58,14 +58,14 @@ double largest_of(int n, const double *values) {
 
 Result solve_implicit(Instance *c, double t, double *point, int quiet) {
     const Model *m = c->model;
-    double *z = point + m->n_x, *step = c->work.vector, *matrix = c->work.dense_matrix, change = INFINITY, residual = 0;
-    int *order = c->work.order, rounds = !c->bounded ? MAX_NEWTON : m->settings->implicit_linear ? 1 : BOUNDED_NEWTON;
+    double *z = point + m->n_x, *step = c->vector, *matrix = c->dense_matrix, change = INFINITY, residual = 0;
+    int *order = c->order, rounds = !c->bounded ? MAX_NEWTON : m->settings->implicit_linear ? 1 : BOUNDED_NEWTON;
     if (m->n_z == 0) return RESULT_OK;
     for (int round = 0; round < rounds; round++) {
-        evaluate_special(c, SPECIAL_ALG, t, point, step);
+        evaluate_special(c, &m->tapes.alg, t, point, step);
         if (c->bounded && round > 0 && largest_of(m->n_z, step) <= SOLVED * residual) return RESULT_OK;
         residual = largest_of(m->n_z, step);
-        run_special(c, SPECIAL_ALG_JACOBIAN, matrix);
+        run_special(c, &m->tapes.alg_jacobian, matrix);
         for (int k = 0; k < m->n_z; k++)
             if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t, text_of(m, m->implicit_names[k]));
         if (!lu_factor(m->n_z, matrix, order))
@@ -91,25 +91,19 @@ Result solve_now(Instance *c, int quiet) { return solve_implicit(c, c->state.t, 
 
 Result check_singular(Instance *c) {
     const Model *m = c->model;
-    State *s = &c->state;
-    double *values = c->work.rhs;
+    double t = c->state.t, *values = c->rhs;
     evaluate_now(c, &m->tapes.determinants, values);
     for (int k = 0; k < m->n_determinants; k++)
-        if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, s->t, text_of(m, m->singular_names[k]));
+        if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, t, text_of(m, m->singular_names[k]));
     if (c->bounded) return RESULT_OK; /* the next step tells */
-    tape_run(&m->tapes.rates, c->work.slots, values);
+    tape_run(&m->tapes.rates, c->slots, values);
     for (int k = 0; k < m->n_x; k++)
         if (!isfinite(values[k]))
             return fail(c,
                 "The derivative of %s is not finite at t = %.9g s. Look for a mass, inertia or ratio of zero.",
-                text_of(m, m->state_names[k]), s->t);
+                text_of(m, m->state_names[k]), t);
     return RESULT_OK;
 }
 
 /* Bring the implicit unknowns up to date with time, states, parameters and inputs. */
-Result settle(Instance *c) {
-    if (c->state.z_valid) return RESULT_OK;
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
-    c->state.z_valid = 1;
-    return RESULT_OK;
-}
+Result settle(Instance *c) { return c->state.z_valid || (c->state.z_valid = solve_now(c, 0)); }

@@ -45,28 +45,26 @@ static const double DENSE[3][STAGES] = {
 /* The right hand side, its partial derivatives by time, with inputs on their straight lines, and its Jacobian. */
 static void linearize(Instance *c, double t, const double *y, double *slope) {
     const Model *m = c->model;
-    Work *w = &c->work;
     int moving = m->settings->rates_depend_on_time;
     for (int k = 0; k < m->n_u; k++) moving |= c->u_rate[k] != 0;
     memset(slope, 0, (size_t)m->n_unknowns * sizeof(double));
     if (moving) {
-        evaluate(c, &m->tapes.rates, t, y, w->first_rates);
-        memset(w->dots, 0, m->slot_results * sizeof(double));
-        w->dots[0] = 1;
-        for (int k = 0; k < m->n_u; k++) w->dots[m->slot_u + k] = c->u_rate[k];
-        tape_tangent(&m->tapes.rates, w->slots, w->dots, slope);
-    } else evaluate_special(c, SPECIAL_RATES, t, y, w->first_rates);
-    run_special(c, SPECIAL_JACOBIAN, w->jacobian);
+        evaluate(c, &m->tapes.rates, t, y, c->first_rates);
+        memset(c->dots, 0, m->slot_results * sizeof(double));
+        c->dots[0] = 1;
+        for (int k = 0; k < m->n_u; k++) c->dots[m->slot_u + k] = c->u_rate[k];
+        tape_tangent(&m->tapes.rates, c->slots, c->dots, slope);
+    } else evaluate_special(c, &c->model->tapes.rates, t, y, c->first_rates);
+    run_special(c, &c->model->tapes.jacobian, c->jacobian);
 }
 
 /* M * diagonal - J, factorised. */
 int factor_step(Instance *c, double diagonal) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    memset(w->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
-    for (int k = 0; k < m->n_jacobian; k++) w->matrix[m->jacobian_to_step[k]] = -w->jacobian[k];
-    for (int k = 0; k < m->n_x; k++) w->matrix[m->step_diagonal[k]] += diagonal;
-    return qr_factor(&m->step, w->matrix, w);
+    memset(c->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
+    for (int k = 0; k < m->n_jacobian; k++) c->matrix[m->jacobian_to_step[k]] = -c->jacobian[k];
+    for (int k = 0; k < m->n_x; k++) c->matrix[m->step_diagonal[k]] += diagonal;
+    return qr_factor(&m->step, c->matrix, c);
 }
 
 static double error_norm(const Instance *c, const double *first, const double *last, const double *error) {
@@ -83,10 +81,9 @@ static double error_norm(const Instance *c, const double *first, const double *l
  * Returns 0 if the equations gave values that are not finite, or a singular matrix. */
 int rosenbrock_step(
     Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error) {
-    Work *w = &c->work;
     int n = c->model->n_unknowns;
     size_t size = (size_t)n * sizeof(double);
-    double *last = last_of(c->model, piece), *slope = w->stages + (size_t)STAGES * (size_t)n, *y = w->point;
+    double *last = last_of(c->model, piece), *slope = c->stages + (size_t)STAGES * (size_t)n, *y = c->point;
     piece->begin = t;
     piece->end = t + h;
     memcpy(piece->points, first, size);
@@ -94,30 +91,30 @@ int rosenbrock_step(
     if (!factor_step(c, 1 / (h * GAMMA))) return 0;
     c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
-        double *stage = w->stages + (size_t)i * n;
+        double *stage = c->stages + (size_t)i * n;
         memcpy(y, first, size);
         for (int j = 0; j < i; j++)
-            for (int k = 0; k < n; k++) y[k] += A[i][j] * w->stages[j * n + k];
-        if (i == 0) memcpy(stage, w->first_rates, size);
-        else evaluate_special(c, SPECIAL_RATES, t + C_TIME[i] * h, y, stage);
+            for (int k = 0; k < n; k++) y[k] += A[i][j] * c->stages[j * n + k];
+        if (i == 0) memcpy(stage, c->first_rates, size);
+        else evaluate_special(c, &c->model->tapes.rates, t + C_TIME[i] * h, y, stage);
         for (int j = 0; j < i; j++)
-            for (int k = 0; k < c->model->n_x; k++) stage[k] += C[i][j] / h * w->stages[j * n + k];
+            for (int k = 0; k < c->model->n_x; k++) stage[k] += C[i][j] / h * c->stages[j * n + k];
         for (int k = 0; k < n; k++) {
             stage[k] += h * D_TIME[i] * slope[k];
             if (!isfinite(stage[k])) return 0;
         }
-        qr_solve(&c->model->step, w, stage);
+        qr_solve(&c->model->step, c, stage);
     }
     for (int k = 0; k < n; k++) {
-        last[k] = y[k] + w->stages[(STAGES - 1) * n + k];
+        last[k] = y[k] + c->stages[(STAGES - 1) * n + k];
         if (!isfinite(last[k])) return 0;
         for (int row = 0; row < 3; row++) {
             double sum = 0;
-            for (int i = 0; i < STAGES; i++) sum += DENSE[row][i] * w->stages[i * n + k];
+            for (int i = 0; i < STAGES; i++) sum += DENSE[row][i] * c->stages[i * n + k];
             last[(row + 1) * n + k] = sum;
         }
     }
-    *error = error_norm(c, first, last, w->stages + (STAGES - 1) * n);
+    *error = error_norm(c, first, last, c->stages + (STAGES - 1) * n);
     return 1;
 }
 
@@ -140,7 +137,7 @@ void piece_at(const Model *m, const Piece *piece, double t, double *point) {
 /* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4); states that are nothing but
  * rounding tell nothing about it. */
 double first_step(Instance *c) {
-    double size, speed, *rates = c->work.rhs;
+    double size, speed, *rates = c->rhs;
     evaluate_now(c, &c->model->tapes.rates, rates);
     size = error_norm(c, c->x, c->x, c->x);
     speed = error_norm(c, c->x, c->x, rates);

@@ -5,16 +5,12 @@
 
 #define WORTH_IT 6 /* runs of a tape in the same modes from which on it is worth it */
 
-const Tape *full_tape(const Model *m, SpecialTape which) {
-    const Tape *const tapes[] = {&m->tapes.rates, &m->tapes.jacobian, &m->tapes.alg, &m->tapes.alg_jacobian,
-        &m->tapes.variables, &m->tapes.guards};
-    return tapes[which];
-}
+static Special *special_of(Instance *c, const Tape *tape) { return &c->special[tape - tapes_of(c->model)]; }
 
 /* Is the output asked for? Of guards, those of the present modes. */
-static int is_wanted(const Instance *c, SpecialTape which, int output) {
-    if (which == SPECIAL_VARIABLES) return c->work.asked[output];
-    return which != SPECIAL_GUARDS || guard_active(c, output % c->model->n_guards);
+static int is_wanted(const Instance *c, const Tape *tape, int output) {
+    if (tape == &c->model->tapes.variables) return c->asked[output];
+    return tape != &c->model->tapes.guards || guard_active(c, output % c->model->n_guards);
 }
 
 /* The operand that the result of an operation is, -1 where it is known to be `*value`, or -2: it must be computed. */
@@ -37,59 +33,60 @@ static int result_of(int operation, Operands one, const double *slots, const uns
 }
 
 /* Finds for every slot which other one has its value (`same`), and whether it is known. The tape has just been run. */
-static void work_out(Instance *c, const Tape *tape, int *same, unsigned char *known) {
+static void work_out(Instance *c, const Tape *tape) {
     const Model *m = c->model;
-    double *slots = c->work.slots;
+    double *slots = c->slots;
+    unsigned char *known = c->known_slots;
     const Operands *operand = tape->operands;
     int slot = tape->first_result;
     memset(known, 0, (size_t)m->n_slots);
-    for (int k = 0; k < m->n_p; k++) known[m->slot_p + k] = !c->work.tuned[k];
+    for (int k = 0; k < m->n_p; k++) known[m->slot_p + k] = !c->tuned[k];
     memset(known + m->slot_d, 1, (size_t)m->n_d);
     memset(known + m->slot_constants, 1, (size_t)m->n_constants);
-    for (int k = 0; k < slot; k++) same[k] = k;
+    for (int k = 0; k < slot; k++) c->same[k] = k;
     for (int r = 0; r < tape->n_runs; r++)
         for (int k = 0; k < tape->runs[r].count; k++, operand++, slot++) {
-            Operands one = {same[operand->left], same[operand->right]};
+            Operands one = {c->same[operand->left], c->same[operand->right]};
             double value = slots[slot];
             int found = result_of(tape->runs[r].operation, one, slots, known, &value);
-            same[slot] = found >= 0 ? found : slot;
+            c->same[slot] = found >= 0 ? found : slot;
             known[slot] = found == -1;
             if (found == -1) slots[slot] = value;
         }
 }
 
 /* Marks what the wanted outputs need. */
-static void mark_needed(Instance *c, SpecialTape which, const Tape *tape, const int *same, unsigned char *needed) {
-    memset(needed, 0, (size_t)c->model->n_slots);
+static void mark_needed(Instance *c, const Tape *tape) {
+    const int *same = c->same;
+    unsigned char *needed = memset(c->needed_slots, 0, (size_t)c->model->n_slots);
     for (int k = 0; k < tape->n_outputs; k++)
-        if (is_wanted(c, which, k)) needed[same[tape->outputs[k]]] = 1;
+        if (is_wanted(c, tape, k)) needed[same[tape->outputs[k]]] = 1;
     for (int k = tape->n_operations - 1; k >= 0; k--) {
         int slot = tape->first_result + k;
-        if (!needed[slot] || c->work.known_slots[slot]) continue;
+        if (!needed[slot] || c->known_slots[slot]) continue;
         needed[same[tape->operands[k].left]] = 1;
         needed[same[tape->operands[k].right]] = 1;
     }
 }
 
 /* Writes the operations that are left; known results that they need get slots behind all others. */
-static void write_special(Instance *c, SpecialTape which, const Tape *tape, const unsigned char *needed) {
-    Work *w = &c->work;
-    Special *s = &w->special[which];
-    int *place = w->places_of_slots, written = 0, values = s->first_known, k = 0;
+static void write_special(Instance *c, Special *s, const Tape *tape) {
+    const unsigned char *needed = c->needed_slots;
+    int *place = c->places_of_slots, written = 0, values = s->first_known, k = 0;
     for (int slot = 0; slot < tape->first_result; slot++) place[slot] = slot;
     s->tape.n_runs = 0;
     for (int r = 0; r < tape->n_runs; r++)
         for (int end = k + tape->runs[r].count; k < end; k++) {
-            int slot = tape->first_result + k, same = w->same[slot], operation = tape->runs[r].operation;
+            int slot = tape->first_result + k, same = c->same[slot], operation = tape->runs[r].operation;
             if (same != slot) place[slot] = place[same];
             if (same != slot || !needed[slot]) continue;
-            if (w->known_slots[slot]) {
-                w->slots[values] = w->slots[slot];
+            if (c->known_slots[slot]) {
+                c->slots[values] = c->slots[slot];
                 place[slot] = values++;
                 continue;
             }
-            s->operands[written].left = place[w->same[tape->operands[k].left]];
-            s->operands[written].right = place[w->same[tape->operands[k].right]];
+            s->operands[written].left = place[c->same[tape->operands[k].left]];
+            s->operands[written].right = place[c->same[tape->operands[k].right]];
             if (s->tape.n_runs == 0 || s->runs[s->tape.n_runs - 1].operation != operation) {
                 s->runs[s->tape.n_runs].operation = operation;
                 s->runs[s->tape.n_runs++].count = 0;
@@ -99,40 +96,34 @@ static void write_special(Instance *c, SpecialTape which, const Tape *tape, cons
         }
     s->tape.n_operations = written;
     for (int n = 0; n < tape->n_outputs; n++) {
-        int slot = w->same[tape->outputs[n]];
-        s->outputs[n] = needed[slot] && is_wanted(c, which, n) ? place[slot] : c->model->slot_constants;
+        int slot = c->same[tape->outputs[n]];
+        s->outputs[n] = needed[slot] && is_wanted(c, tape, n) ? place[slot] : c->model->slot_constants;
     }
 }
 
-static void specialise(Instance *c, SpecialTape which, const Tape *tape) {
-    Work *w = &c->work;
-    work_out(c, tape, w->same, w->known_slots);
-    mark_needed(c, which, tape, w->same, w->needed_slots);
-    write_special(c, which, tape, w->needed_slots);
-}
-
 /* Runs a tape with the slots as they are loaded. Of outputs that are not wanted, any value may come. */
-void run_special(Instance *c, SpecialTape which, double *outputs) {
-    const Tape *tape = full_tape(c->model, which);
-    Special *s = &c->work.special[which];
-    int special;
-    if (s->belongs_to != c->work.decided_by) s->uses = 0;
-    s->belongs_to = c->work.decided_by;
-    special = s->uses > WORTH_IT && !c->bounded; /* where the work is bounded: working out costs more than a step */
-    tape_run(special ? &s->tape : tape, c->work.slots, outputs);
-    if (!special && !c->bounded && ++s->uses > WORTH_IT) specialise(c, which, tape);
+void run_special(Instance *c, const Tape *tape, double *outputs) {
+    Special *s = special_of(c, tape);
+    if (s->belongs_to != c->decided_by) s->uses = 0;
+    s->belongs_to = c->decided_by;
+    int special = s->uses > WORTH_IT && !c->bounded; /* where the work is bounded: working out costs more than a step */
+    tape_run(special ? &s->tape : tape, c->slots, outputs);
+    if (special || c->bounded || ++s->uses <= WORTH_IT) return;
+    work_out(c, tape);
+    mark_needed(c, tape);
+    write_special(c, s, tape);
 }
 
 /* The same at a point. */
-void evaluate_special(Instance *c, SpecialTape which, double t, const double *point, double *outputs) {
+void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
     load(c, t, point);
-    run_special(c, which, outputs);
+    run_special(c, tape, outputs);
 }
 
 /* From now on this variable is wanted. */
 void ask_for(Instance *c, int node) {
-    if (c->work.asked[node]) return;
-    c->work.asked[node] = 1;
-    c->work.special[SPECIAL_VARIABLES].uses = 0;
+    if (c->asked[node]) return;
+    c->asked[node] = 1;
+    special_of(c, &c->model->tapes.variables)->uses = 0;
     c->variables_valid = 0;
 }

@@ -6,23 +6,16 @@
 #define CONSISTENT 1e-8
 #define AT_REST (-1) /* in place of a start value: the variable is zero */
 
-void start_defaults(Instance *c) {
-    const Model *m = c->model;
-    memcpy(c->p, m->parameters, m->n_p * sizeof(double));
-    memcpy(c->u, m->inputs, m->n_u * sizeof(double));
-    memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
-}
-
 /* Start values as the model says, or as they were given. */
 void start_values(Instance *c) {
-    evaluate_now(c, &c->model->tapes.start_values, c->work.start_values);
+    evaluate_now(c, &c->model->tapes.start_values, c->start_values);
     for (int k = 0; k < c->model->n_starts; k++)
-        if (c->start_given[k]) c->work.start_values[k] = c->start_value[k];
+        if (c->start_given[k]) c->start_values[k] = c->start_value[k];
 }
 
 static Result apply_direct(Instance *c, const double *values) {
     const Model *m = c->model;
-    unsigned char *known = memset(c->work.known, 0, (size_t)m->n_x);
+    unsigned char *known = memset(c->known, 0, (size_t)m->n_x);
     double *x = c->x;
     for (int k = 0; k < m->n_start_direct; k++) {
         const StartOf *one = &m->start_direct[k];
@@ -38,19 +31,20 @@ static Result apply_direct(Instance *c, const double *values) {
 
 /* Guesses, or defaults: they contradict nothing. */
 static void apply(Instance *c, const StartOf *starts, int count) {
-    for (int k = 0; k < count; k++) c->x[starts[k].position] = c->work.start_values[starts[k].start] / starts[k].factor;
+    for (int k = 0; k < count; k++) c->x[starts[k].position] = c->start_values[starts[k].start] / starts[k].factor;
 }
 
 /* Newton's method on the equations between free states, the variables that follow from them, and start values. */
 static Result solve_start_system(Instance *c, const double *values) {
     const Model *m = c->model;
-    double *residual = c->work.start_residual, *step = c->work.start_unknowns, error = 0;
-    memset(c->work.slots + m->slot_y, 0, m->n_y * sizeof(double));
+    double *residual = c->start_residual, *step = c->start_unknowns, error = 0;
+    if (m->n_start_unknowns == 0) return RESULT_OK;
+    memset(c->slots + m->slot_y, 0, m->n_y * sizeof(double));
     for (int k = 0; k < m->n_start_zero; k++) c->x[m->start_zero[k]] = 0;
     for (int round = 0; round < MAX_NEWTON; round++) {
         double change = 0;
         evaluate_now(c, &m->tapes.start_system, residual);
-        tape_run(&m->tapes.start_jacobian, c->work.slots, c->work.jacobian);
+        tape_run(&m->tapes.start_jacobian, c->slots, c->jacobian);
         error = 0;
         for (int k = 0; k < m->n_start_unknowns; k++) {
             int given = m->start_rows[k].start;
@@ -58,16 +52,16 @@ static Result solve_start_system(Instance *c, const double *values) {
             step[k] = residual[m->start_rows[k].row] - target;
             error = fmax(error, isfinite(step[k]) ? fabs(step[k]) / (1 + fabs(target)) : INFINITY);
         }
-        if (!isfinite(error) || !qr_factor(&m->start, c->work.jacobian, &c->work)) {
+        if (!isfinite(error) || !qr_factor(&m->start, c->jacobian, c)) {
             error = INFINITY;
             break;
         }
-        qr_solve(&m->start, &c->work, step);
+        qr_solve(&m->start, c, step);
         for (int k = 0; k < m->n_start_unknowns; k++) {
             int column = m->start_columns[k]; /* among states, variables, implicit unknowns */
-            double *y = &c->work.slots[m->slot_y], *unknown = column < m->n_x            ? &c->x[column]
-                                                              : column < m->n_x + m->n_y ? &y[column - m->n_x]
-                                                                                         : &c->x[column - m->n_y];
+            double *y = &c->slots[m->slot_y], *unknown = column < m->n_x            ? &c->x[column]
+                                                         : column < m->n_x + m->n_y ? &y[column - m->n_x]
+                                                                                    : &c->x[column - m->n_y];
             *unknown -= step[k];
             change = fmax(change, fabs(step[k]) / (1 + fabs(*unknown)));
         }
@@ -82,7 +76,7 @@ static Result check_dependent(Instance *c, const double *values) {
     if (m->n_start_dependent == 0) return RESULT_OK;
     variables_now(c);
     for (int k = 0; k < m->n_start_dependent; k++) {
-        double value = values[m->start_dependent[k].start], actual = c->work.variables[m->start_dependent[k].node];
+        double value = values[m->start_dependent[k].start], actual = c->variables[m->start_dependent[k].node];
         if (!(fabs(actual - value) <= CONSISTENT * (1 + fabs(value))))
             return fail(c, "A start value of %.9g cannot be met: the variable would be %.9g.", value, actual);
     }
@@ -90,36 +84,33 @@ static Result check_dependent(Instance *c, const double *values) {
 }
 
 static Result solve_states(Instance *c) {
-    const double *values = c->work.start_values;
-    if (apply_direct(c, values) != RESULT_OK) return RESULT_ERROR;
-    if (c->model->n_start_unknowns > 0 && solve_start_system(c, values) != RESULT_OK) return RESULT_ERROR;
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
-    return check_dependent(c, values);
+    const double *values = c->start_values;
+    return apply_direct(c, values) && solve_start_system(c, values) && solve_now(c, 0) && check_dependent(c, values);
 }
 
 /* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. */
 static Result solve_steady(Instance *c) {
     const Model *m = c->model;
     int n = m->n_steady;
-    double *rates = c->work.rhs, *a = c->work.square, *step = c->work.point, residual = INFINITY;
+    double *rates = c->rhs, *a = c->square, *step = c->point, residual = INFINITY;
     for (int round = 0; round < MAX_NEWTON && n > 0; round++) {
         double change = 0;
         evaluate_now(c, &m->tapes.rates, rates);
-        tape_run(&m->tapes.jacobian, c->work.slots, c->work.jacobian);
-        memset(c->work.matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
-        for (int k = 0; k < m->n_jacobian; k++) c->work.matrix[m->jacobian_to_step[k]] = c->work.jacobian[k];
+        tape_run(&m->tapes.jacobian, c->slots, c->jacobian);
+        memset(c->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
+        for (int k = 0; k < m->n_jacobian; k++) c->matrix[m->jacobian_to_step[k]] = c->jacobian[k];
         memset(a, 0, (size_t)n * (size_t)n * sizeof(double));
         for (int j = 0; j < n; j++)
             for (int k = m->step.colind[m->steady[j]]; k < m->step.colind[m->steady[j] + 1]; k++)
                 for (int i = 0; i < n; i++)
-                    if (m->steady[i] == m->step.row[k]) a[i * n + j] = c->work.matrix[k];
+                    if (m->steady[i] == m->step.row[k]) a[i * n + j] = c->matrix[k];
         residual = 0;
         for (int i = 0; i < n; i++) {
-            c->work.vector[i] = rates[m->steady[i]];
-            residual = fmax(residual, isfinite(c->work.vector[i]) ? fabs(c->work.vector[i]) : INFINITY);
+            c->vector[i] = rates[m->steady[i]];
+            residual = fmax(residual, isfinite(c->vector[i]) ? fabs(c->vector[i]) : INFINITY);
         }
         if (!isfinite(residual)) break;
-        keeping_least_squares(n, n - m->n_z, a, a + (size_t)n * (size_t)n, c->work.vector, step);
+        keeping_least_squares(n, n - m->n_z, a, a + (size_t)n * (size_t)n, c->vector, step);
         for (int j = 0; j < n; j++) {
             c->x[m->steady[j]] -= step[j];
             change = fmax(change, fabs(step[j]) / (1 + fabs(step[j])));
@@ -133,7 +124,7 @@ static Result solve_steady(Instance *c) {
 /* Equations of discrete variables, whose values before the start are their start values. */
 static void start_equations(Instance *c) {
     const Model *m = c->model;
-    double *values = c->work.reset_values, *starts = c->work.guards;
+    double *values = c->reset_values, *starts = c->guards;
     if (m->n_updates == 0) return;
     evaluate_now(c, &m->tapes.discrete_starts, starts);
     for (int k = 0; k < m->n_updates; k++)
@@ -145,7 +136,7 @@ static void start_equations(Instance *c) {
 
 /* Choose modes that are not decided by their start conditions: the first that holds wins. */
 void choose_modes(Instance *c, unsigned char *decided) {
-    double *holds = c->work.guards;
+    double *holds = c->guards;
     evaluate_now(c, &c->model->tapes.start_conditions, holds);
     for (int k = 0; k < c->model->n_start_modes; k++) {
         const StartMode *one = &c->model->start_modes[k];
@@ -159,49 +150,40 @@ void choose_modes(Instance *c, unsigned char *decided) {
  * lies in between, where it stands still. Tells whether a mode changed. */
 static int choose_start_modes(Instance *c, const double *begun) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    memcpy(w->decided, c->mode_given, (size_t)m->n_d);
-    memcpy(w->d_before, c->d, (size_t)m->n_d * sizeof(double));
-    choose_modes(c, w->decided);
+    memcpy(c->decided, c->mode_given, (size_t)m->n_d);
+    memcpy(c->d_before, c->d, (size_t)m->n_d * sizeof(double));
+    choose_modes(c, c->decided);
     if (begun) variables_now(c);
     for (int k = 0; k < m->n_holds && begun; k++) {
         const Held *one = &m->holds[k];
-        if (begun[k] * w->variables[one->motion] < 0 && c->d[one->mode] != w->d_before[one->mode])
+        if (begun[k] * c->variables[one->motion] < 0 && c->d[one->mode] != c->d_before[one->mode])
             c->d[one->mode] = one->number;
     }
     start_equations(c);
-    return memcmp(w->d_before, c->d, (size_t)m->n_d * sizeof(double)) != 0;
-}
-
-static void start_discretes(Instance *c) {
-    double *values = c->work.guards;
-    evaluate_now(c, &c->model->tapes.discrete_starts, values);
-    for (int k = 0; k < c->model->n_d; k++)
-        if (!c->mode_given[k]) c->d[k] = values[k];
+    return memcmp(c->d_before, c->d, (size_t)m->n_d * sizeof(double)) != 0;
 }
 
 /* The steady state of the present modes, in which what they hold stands still; held motions become what they were. */
 static Result find_steady(Instance *c, double *begun) {
     const Model *m = c->model;
-    Work *w = &c->work;
     int count = 0;
     apply(c, m->start_default, m->n_start_default);
-    if (apply_direct(c, w->start_values) != RESULT_OK) return RESULT_ERROR;
-    if (m->n_holds > 0) find_held(c, w->terms, w->held);
+    if (!apply_direct(c, c->start_values)) return RESULT_ERROR;
+    if (m->n_holds > 0) find_held(c, c->terms, c->held);
     variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
-        begun[k] = w->variables[m->holds[k].motion];
-        if (w->held[k]) w->standing[count++] = m->holds[k].motion;
+        begun[k] = c->variables[m->holds[k].motion];
+        if (c->held[k]) c->standing[count++] = m->holds[k].motion;
     }
-    if (count > 0) move_states(c, w->standing, NULL, count);
+    if (count > 0) move_states(c, c->standing, NULL, count);
     return solve_steady(c);
 }
 
 /* Surfaces that stick against too large a torque are not in equilibrium. */
 static Result check_modes_hold(Instance *c) {
     const Model *m = c->model;
-    double *guards = c->work.guards;
-    if (m->n_guards == 0) return RESULT_OK;
+    double *guards = c->guards_before;
+    if (m->n_guards == 0 || !m->settings->steady) return RESULT_OK;
     evaluate_now(c, &m->tapes.guards, guards);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
@@ -214,35 +196,35 @@ static Result check_modes_hold(Instance *c) {
 
 static Result pass_start(Instance *c) {
     const Model *m = c->model;
-    double *begun = c->work.begun;
+    double *begun = m->settings->steady ? c->begun : NULL;
     int round;
-    if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
+    if (!check_tables(c)) return RESULT_ERROR;
     memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
-    start_discretes(c);
+    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
+    for (int k = 0; k < m->n_d; k++)
+        if (!c->mode_given[k]) c->d[k] = c->guards[k];
     share(c);
     start_values(c);
     apply(c, m->start_guess, m->n_start_guess);
-    if (m->settings->steady) {
+    if (begun) {
         apply(c, m->start_default, m->n_start_default);
-        if (apply_direct(c, c->work.start_values) != RESULT_OK) return RESULT_ERROR;
+        if (!apply_direct(c, c->start_values)) return RESULT_ERROR;
         choose_start_modes(c, NULL);
         share(c);
     }
     for (round = 0; round < MODE_ROUNDS; round++) {
-        if ((m->settings->steady ? find_steady(c, begun) : solve_states(c)) != RESULT_OK) return RESULT_ERROR;
-        if (!choose_start_modes(c, m->settings->steady ? begun : NULL)) break;
+        if (!(begun ? find_steady(c, begun) : solve_states(c))) return RESULT_ERROR;
+        if (!choose_start_modes(c, begun)) break;
         share(c);
     }
     if (round == MODE_ROUNDS)
         return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
     rest(c);
     replace_dependent(c);
-    if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
-    if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
+    if (!solve_now(c, 0) || !check_singular(c) || !check_modes_hold(c)) return RESULT_ERROR;
     c->state.z_valid = c->state.solved = 1;
-    c->state.piece_valid = c->state.event_pending = 0;
-    c->variables_valid = 0;
+    c->state.piece_valid = c->state.event_pending = c->variables_valid = 0;
     return RESULT_OK;
 }
 

@@ -127,7 +127,7 @@ static void extend(int operation, const Series a, const Series b, Series f) {
 /* Evaluates a tape, then its coefficients behind the first: coefficient n of slot k is terms[(n - 1) * n_slots + k]. */
 static void run_series(Instance *c, const Tape *tape, int order, double *outputs) {
     const Model *m = c->model;
-    double *slots = c->work.slots, *terms = c->work.dots;
+    double *slots = c->slots, *terms = c->dots;
     int k = 0;
     evaluate_now(c, tape, outputs);
     for (int r = 0; r < tape->n_runs; r++)
@@ -149,28 +149,27 @@ static void run_series(Instance *c, const Tape *tape, int order, double *outputs
 Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
     const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
-    Work *w = &c->work;
-    double *terms = w->dots, factorial = 1;
+    double *terms = c->dots, factorial = 1;
     if (v == NULL) return RESULT_ERROR;
     if (order < 1 || order >= ORDERS) return fail(c, "Outputs have derivatives of order 1 to %d only.", ORDERS - 1);
     if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE)
         return fail(c, "%s has no time derivative: it is not a variable.", text_of(m, v->name));
-    if (factor_implicit(c, w->order) != RESULT_OK) return RESULT_ERROR;
+    if (!factor_implicit(c)) return RESULT_ERROR;
     for (int n = 1; n < ORDERS; n++) memset(terms + (n - 1) * m->n_slots, 0, m->slot_results * sizeof(double));
     terms[0] = 1;
     memcpy(terms + m->slot_u, c->u_rate, m->n_u * sizeof(double));
     for (int n = 1; n <= order; n++) {
-        run_series(c, &m->tapes.rates, n - 1, w->rhs);
-        for (int k = 0; k < m->n_x; k++) terms[(n - 1) * m->n_slots + m->slot_x + k] = w->rhs[k] / n;
+        run_series(c, &m->tapes.rates, n - 1, c->rhs);
+        for (int k = 0; k < m->n_x; k++) terms[(n - 1) * m->n_slots + m->slot_x + k] = c->rhs[k] / n;
         factorial *= n;
         if (m->n_z == 0) continue;
-        run_series(c, &m->tapes.alg, n, w->vector); /* without the unknowns' own terms, in which it is linear */
-        lu_solve(m->n_z, w->dense_matrix, w->order, w->vector);
-        for (int k = 0; k < m->n_z; k++) terms[(n - 1) * m->n_slots + m->slot_z + k] = -w->vector[k];
+        run_series(c, &m->tapes.alg, n, c->vector); /* without the unknowns' own terms, in which it is linear */
+        lu_solve(m->n_z, c->dense_matrix, c->order, c->vector);
+        for (int k = 0; k < m->n_z; k++) terms[(n - 1) * m->n_slots + m->slot_z + k] = -c->vector[k];
     }
     c->variables_valid = 0;
-    if (v->kind == KIND_VARIABLE) run_series(c, &m->tapes.variables, order, w->variables);
+    if (v->kind == KIND_VARIABLE) run_series(c, &m->tapes.variables, order, c->variables);
     *value = factorial *
-             (v->kind == KIND_STATE ? terms[(order - 1) * m->n_slots + m->slot_x + v->index] : w->variables[v->index]);
+             (v->kind == KIND_STATE ? terms[(order - 1) * m->n_slots + m->slot_x + v->index] : c->variables[v->index]);
     return RESULT_OK;
 }

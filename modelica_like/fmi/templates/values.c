@@ -27,36 +27,33 @@ const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) 
 
 /* Values that a tape gives, each computed once per point; NULL if there are none. */
 static const double *seen(Instance *c, const Variable *v) {
-    Work *w = &c->work;
-    const double *values = v->kind == KIND_DERIVED      ? w->seen_derived
-                           : v->kind == KIND_DERIVATIVE ? w->seen_rates
-                           : v->kind == KIND_GUARD      ? w->seen_indicators
-                                                        : w->variables;
+    const double *values = v->kind == KIND_DERIVED      ? c->seen_derived
+                           : v->kind == KIND_DERIVATIVE ? c->seen_rates
+                           : v->kind == KIND_GUARD      ? c->seen_indicators
+                                                        : c->variables;
     if (v->kind == KIND_VARIABLE) ask_for(c, v->index);
     if (c->variables_valid & 1 << v->kind) return values;
-    if (v->kind != KIND_DERIVED && settle(c) != RESULT_OK) return NULL;
+    if (v->kind != KIND_DERIVED && !settle(c)) return NULL;
     switch (v->kind) {
-        case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, w->seen_derived); break;
-        case KIND_DERIVATIVE: evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, w->seen_rates); break;
-        case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
-        default: evaluate_special(c, SPECIAL_VARIABLES, c->state.t, c->x, w->variables);
+        case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, c->seen_derived); break;
+        case KIND_DERIVATIVE: evaluate_special(c, &c->model->tapes.rates, c->state.t, c->x, c->seen_rates); break;
+        case KIND_GUARD: get_indicators(c, c->seen_indicators); break;
+        default: evaluate_special(c, &c->model->tapes.variables, c->state.t, c->x, c->variables);
     }
     c->variables_valid |= 1 << v->kind;
     return values;
 }
 
 /* In initialization mode, whatever was set since the last time must have its effect before anything is read. */
-static Result make_ready(Instance *c, const Variable *v) {
-    if (c->state.phase != PHASE_INITIALIZATION || c->state.solved || v->kind == KIND_PARAMETER ||
-        v->kind == KIND_INPUT || v->kind == KIND_TIME || v->kind == KIND_DERIVED)
-        return RESULT_OK;
-    return start_solve(c);
+static Result make_ready(Instance *c) {
+    return c->state.phase != PHASE_INITIALIZATION || c->state.solved || start_solve(c);
 }
 
 /* Of a variable that is known, or NULL: then its reference was wrong. */
 Result get_value(Instance *c, const Variable *v, double *value) {
-    const double *values;
-    if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
+    const int known = 1 << KIND_PARAMETER | 1 << KIND_INPUT | 1 << KIND_TIME | 1 << KIND_DERIVED;
+    const double *values = NULL;
+    if (v == NULL || (!(known & 1 << v->kind) && !make_ready(c))) return RESULT_ERROR;
     switch (v->kind) {
         case KIND_TIME: *value = c->state.t; return RESULT_OK;
         case KIND_STATE: *value = c->x[v->index]; return RESULT_OK;
@@ -66,18 +63,15 @@ Result get_value(Instance *c, const Variable *v, double *value) {
         default: values = seen(c, v);
     }
     if (values != NULL) *value = values[v->index];
-    return values != NULL ? RESULT_OK : RESULT_ERROR;
+    return values != NULL;
 }
 
 /* Solves what getting a value from the present point needs. */
-Result make_consistent(Instance *c) {
-    if (c->state.phase == PHASE_INITIALIZATION && !c->state.solved && start_solve(c) != RESULT_OK) return RESULT_ERROR;
-    return settle(c);
-}
+Result make_consistent(Instance *c) { return make_ready(c) && settle(c); }
 
 void get_derivatives(Instance *c, double *derivatives) {
-    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
-    memcpy(derivatives, c->work.rhs, c->model->n_x * sizeof(double));
+    evaluate_now(c, &c->model->tapes.rates, c->rhs);
+    memcpy(derivatives, c->rhs, c->model->n_x * sizeof(double));
     rest_rates(c, derivatives);
 }
 
@@ -87,7 +81,7 @@ void get_derivatives(Instance *c, double *derivatives) {
  * an offset. It shifts no event, as it is gone above zero; its size is that of rounding, and products of it do not
  * underflow, by whose sign root finders judge. */
 void get_indicators(Instance *c, double *indicators) {
-    double *values = c->work.guards;
+    double *values = c->guards;
     evaluate_now(c, &c->model->tapes.guards_soon, values);
     drop_balanced(c, values);
     for (int k = 0; k < c->model->n_guards; k++) {
@@ -120,22 +114,21 @@ static int before_start(const State *s) {
 
 /* From now on tapes are not specialised for the value of a parameter. */
 void mark_tuned(Instance *c, int parameter) {
-    c->work.decided_by += !c->work.tuned[parameter];
-    c->work.tuned[parameter] = 1;
+    c->decided_by += !c->tuned[parameter];
+    c->tuned[parameter] = 1;
 }
 
 static Result set_parameter(Instance *c, const Variable *v, double value) {
-    State *s = &c->state;
     double low = c->model->parameter_min[v->index], high = c->model->parameter_max[v->index];
-    if (!v->tunable && !before_start(s))
+    if (!v->tunable && !before_start(&c->state))
         return refuse_value(c, v, "it is a fixed parameter. Set it before the end of the initialization.");
-    if (v->tunable && s->phase == PHASE_CONTINUOUS)
+    if (v->tunable && c->state.phase == PHASE_CONTINUOUS)
         return refuse_value(c, v, "tunable parameters change in event mode only.");
     if (value < low || value > high)
         return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(c->model, v->name), value,
             value < low ? "least" : "most", value < low ? low : high);
     if (c->p[v->index] == value) return RESULT_OK;
-    if (!before_start(s)) mark_tuned(c, v->index);
+    if (!before_start(&c->state)) mark_tuned(c, v->index);
     keep_before_change(c);
     c->p[v->index] = value;
     touch(c);
@@ -145,12 +138,10 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
 /* Columns of tables must rise; they are set number by number, so this is asked where they are needed. */
 Result check_tables(Instance *c) {
     const Model *m = c->model;
-    for (int k = 0; k < m->n_rising; k++) {
-        const Rising *one = &m->rising[k];
+    for (const Rising *one = m->rising; one < m->rising + m->n_rising; one++)
         if (!(c->p[one->below] < c->p[one->above]))
             return fail(c, "%s = %g is not above %s = %g: this column of the table must rise.",
                 text_of(m, one->above_name), c->p[one->above], text_of(m, one->below_name), c->p[one->below]);
-    }
     return RESULT_OK;
 }
 
