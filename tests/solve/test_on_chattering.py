@@ -395,6 +395,7 @@ class Ball(Component):
     e: Parameter = param("1", "restitution", default=0.7)
     lift: Parameter = param("N", "lift", default=30.0)
     T: Parameter = param("s", "time of lifting", default=5.0)
+    end: Parameter = param("s", "when it is let go again", default=1e9)
     floor = Mode("air", "contact", holds={"contact": Hold("v", reaction="against", capacity="limits", restitution="e")})
 
     def limits(self) -> tuple[float, None]:
@@ -403,7 +404,8 @@ class Ball(Component):
     def equations(self) -> Equations:
         yield der(self.h) == self.v
         yield self.against == -self.N
-        yield self.m * der(self.v) == self.N - self.m * self.g + if_(self.time > self.T, self.lift, 0)
+        lifted = all_of(self.time > self.T, self.time < self.end)
+        yield self.m * der(self.v) == self.N - self.m * self.g + if_(lifted, self.lift, 0)
         yield self.floor.choose(air=self.N, contact=der(self.v)) == 0
 
     def events(self) -> Events:
@@ -426,6 +428,23 @@ def test_a_ball_lies_still_and_rises_again(solver, e):
     # With 0.5, impacts become rounding before there are too many.
     told = "rests in contact: impacts followed each other ever faster."
     assert [notice.partition("model ")[2] for notice in run.notices] == ([told] if e == 0.7 else [])
+
+
+@SOLVERS
+@pytest.mark.parametrize("unit", [1.0, 1e-4])
+def test_a_ball_that_has_been_lifted_bounces_again(solver, unit):
+    """In any unit of time: it falls from 1 m, lies still, is lifted for 0.5 units, and comes down."""
+    lifted, g = 4.0, 9.81 / unit**2
+    ball = Ball(h=1.0, v=0.0, g=g, lift=30.0 / unit**2, T=lifted * unit, end=(lifted + 0.5) * unit)
+    run = simulate(ball, 8 * unit, on_chattering="rest", solver=solver)
+    speed, height = (30 / 2 - 9.81) * 0.5, 0.5 * (30 / 2 - 9.81) * 0.25
+    comes = lifted + 0.5 + (speed + math.sqrt(speed**2 + 2 * 9.81 * height)) / 9.81
+    hits = [time / unit for time, _, after in changes(run) if after == "contact"]
+    second = [time for time in hits if time > lifted]
+    assert second[0] == pytest.approx(comes, rel=1e-8)
+    assert second[1] - second[0] == pytest.approx(2 * 0.7 * math.sqrt(speed**2 + 2 * 9.81 * height) / 9.81, rel=1e-6)
+    assert len(second) > 20
+    assert run.final["h"] == 0.0
 
 
 @SOLVERS

@@ -1,0 +1,28 @@
+"""Whether the equations of a start are far from singular, by condition or, where there are many, by factors."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from modelica_like.initialize.plan import _DENSE, _regular
+
+
+def regular(matrix: np.ndarray) -> bool:
+    sparse = ca.sparsify(ca.DM(matrix))
+    return _regular(sparse, np.array(sparse.nonzeros()))
+
+
+@pytest.mark.parametrize("size", [4, _DENSE + 20])
+def test_what_is_far_from_singular(size: int) -> None:
+    chain = 2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1)
+    last = np.eye(size)[-1]
+    assert regular(np.eye(size))
+    assert regular(chain)
+    assert regular(10.0 ** np.linspace(-9, 9, size)[:, None] * chain)  # rows have units of their own
+    loop = chain.copy()
+    loop[0, 0] = loop[-1, -1] = 1.0  # what all unknowns have in common is open
+    assert not regular(loop)
+    assert not regular(loop + 1e-13 * np.outer(last, last))
+    assert regular(loop + 1e-2 * np.outer(last, last))
+    assert not regular(chain * (1 - np.outer(last, np.ones(size))))  # an equation without unknowns
+    assert not regular(np.where(np.eye(size) > 0, np.inf, chain))
