@@ -166,6 +166,7 @@ typedef struct Instance {
     int co_simulation, event_mode_used, early_return_allowed, inputs_move;
     Allocate allocate;
     Release release;
+    int passing;         /* a gradient passes an instant again, of which nobody is told */
     int bounded;         /* the work of a step is bounded: iterations end early */
     int budget;          /* rounds of events and further pieces that are left of a bounded step */
     int variables_valid; /* which values belong to the present point, see values.c */
@@ -227,7 +228,6 @@ int pushed(Instance *c);
 #define GIVEN_BACK 1e-3 /* of the largest current: none where modes return, as it ends within the time resolution */
 Result meet(Instance *c, double keep, int *any);
 Result renew(Instance *c);
-int same_modes(const Instance *c, const double *before);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before);
 /* events.c */

@@ -92,7 +92,7 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
     const int *names = m->mode_names + one->first_name;
     double before = c->d[mode];
     c->state.n_events++;
-    if (c->noted != NULL) c->noted(c, transition, mode, target);
+    if (c->noted != NULL && !c->passing) c->noted(c, transition, mode, target);
     if (before >= 0 && before < one->n_names && target >= 0 && target < one->n_names)
         report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, text_of(m, name),
             text_of(m, names[(int)before]), text_of(m, names[target]));
@@ -233,8 +233,9 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         c->variables_valid = 0;
         if (any && (!solve_now(c, 0) || !stop_motions(c, before) || !check_singular(c))) return RESULT_ERROR;
         if (any && m->n_ideals > 0) {
-            double keep = round > 0 && same_modes(c, c->d_earlier) ? GIVEN_BACK : 0;
-            if (!meet(c, keep, &met)) return RESULT_ERROR;
+            int same = round > 0; /* modes return */
+            for (int k = 0; k < m->n_ideals; k++) same &= c->d[m->ideals[k].mode] == c->d_earlier[m->ideals[k].mode];
+            if (!meet(c, same ? GIVEN_BACK : 0, &met)) return RESULT_ERROR;
         }
         if (!update_once(c, &changes)) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);

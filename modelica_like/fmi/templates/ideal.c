@@ -170,13 +170,3 @@ Result renew(Instance *c) {
     replace_dependent(c);
     return meet(c, GIVEN_BACK, &any);
 }
-
-/* Whether ideal elements have the modes that they had before. */
-int same_modes(const Instance *c, const double *before) {
-    int same = c->model->n_ideals > 0;
-    for (int k = 0; k < c->model->n_ideals; k++) {
-        int mode = c->model->ideals[k].mode;
-        same &= c->d[mode] == before[mode];
-    }
-    return same;
-}

@@ -129,7 +129,7 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
             c->x[one->state] = -terms[k].restitution * strike->before[k] / one->factor;
     }
     if (!solve_now(c, 0)) return RESULT_ERROR;
-    if (strike->hard && c->struck != NULL) book(c, strike, first);
+    if (strike->hard && c->struck != NULL && !c->passing) book(c, strike, first);
     if (strike->hard) mark_moved(c, strike, terms);
     return RESULT_OK;
 }
@@ -156,17 +156,6 @@ static void choose_again(Instance *c, const Strike *strike) {
         note_change(c, m->holds[k].name, -1, mode, chosen);
         c->d[mode] = d[mode] = chosen;
     }
-}
-
-/* Hold again what finite forces have released since the first impact at this instant: they act after it. */
-static Result hold_again(Instance *c, const unsigned char *entered) {
-    for (int k = 0; k < c->model->n_holds; k++) {
-        const Held *one = &c->model->holds[k];
-        if (!entered[k] || c->d[one->mode] == one->number) continue;
-        note_change(c, one->name, -1, one->mode, one->number);
-        c->d[one->mode] = one->number;
-    }
-    return share_and_solve(c);
 }
 
 /* Speeds before an impact, and whether it is one. Friction stops nothing at once; where an importer lets it overrun
@@ -200,11 +189,18 @@ Result stop_motions(Instance *c, const double *before) {
     if (!any_of(strike->entering, m->n_holds)) return RESULT_OK;
     begin_strike(c, strike, terms);
     if (strike->hard) {
-        for (int k = 0; k < m->n_holds; k++) strike->entering[k] = entered[k] |= strike->entering[k];
+        for (int k = 0; k < m->n_holds; k++) {
+            const Held *one = &m->holds[k];
+            strike->entering[k] = entered[k] |= strike->entering[k];
+            if (!entered[k] || c->d[one->mode] == one->number) continue;
+            /* Finite forces have released it since the first impact at this instant: they act after it. */
+            note_change(c, one->name, -1, one->mode, one->number);
+            c->d[one->mode] = one->number;
+        }
         if (first) memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
         c->stopped = 1;
         memcpy(c->x, x, (size_t)m->n_x * sizeof(double));
-        if (!hold_again(c, entered)) return RESULT_ERROR;
+        if (!share_and_solve(c)) return RESULT_ERROR;
         begin_strike(c, strike, terms);
     }
     if (!carry_out(c, strike, first)) return RESULT_ERROR;

@@ -13,7 +13,7 @@ Result report(Instance *c, LogCategory category, Result result, const char *form
     char message[MESSAGE_LENGTH];
     const char *name = "";
     va_list arguments;
-    if (c->log == NULL || (category != LOG_ERROR && !(c->log_enabled & category))) return result;
+    if (c->log == NULL || c->passing || (category != LOG_ERROR && !(c->log_enabled & category))) return result;
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
@@ -66,7 +66,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
              left = 0;
     uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), larger(m->n_updates, holds + m->n_ideals));
     uint64_t small = larger(larger(guards, m->n_moments), larger(larger(m->n_start_modes, n_d), m->n_derived));
-    uint64_t outputs = larger(larger(n, m->n_nodes), larger(m->n_derived, 2 * guards));
+    uint64_t outputs = larger(larger(n, m->n_nodes), larger(larger(m->n_derived, m->n_moments), 2 * guards));
     uint64_t square = larger(larger(2 * steady * steady, resets * n_x), members * (n_x + 3 * members));
     square = larger(square, ideal * (ideal + 2));
 #define OF_INSTANCE(name, size) TAKE(c->name, size)

@@ -146,14 +146,10 @@ static int check_pattern(const QrPattern *a) {
     return 1;
 }
 
-static int check_tapes(const Model *m, char *message) {
-    for (int k = 0; k < N_TAPES; k++)
-        if (!check_tape((const Tape *)(const void *)&m->tapes + k)) return damaged(message, "tapes");
-    if (!check_pattern(&m->step)) return damaged(message, "step");
-    return check_pattern(&m->start) || damaged(message, "start");
-}
-
 int check_model(const Model *m, char *message) {
+    for (int k = 0; k < N_TAPES; k++)
+        if (!check_tape(tapes_of(m) + k)) return damaged(message, "tapes");
     return check_indices(m, message) && check_variables(m, message) && check_events(m, message) &&
-           check_tapes(m, message);
+           (check_pattern(&m->step) || damaged(message, "step")) &&
+           (check_pattern(&m->start) || damaged(message, "start"));
 }
