@@ -112,7 +112,7 @@ typedef struct {
         A(begun, holds), A(d_before, n_d), A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets),                \
         A(target_values, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), \
         A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), \
-        A(sizes, members), A(zeros, members)
+        A(sizes, members)
 /* order: pivots of the implicit equations */
 #define WORK_INDICES(A)                                                                                          \
     A(order, n_z), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), A(member, members), \

@@ -36,8 +36,6 @@ static inline Status status(Result result) {
     return result == RESULT_OK ? FMI(OK) : result == RESULT_DISCARD ? FMI(Discard) : FMI(Error);
 }
 
-static inline Status refuse(Instance *c, const char *why) { return status(fail(c, "%s", why)); }
-
 /* `names`: (a, b, c). */
 static inline int all_given(Instance *c, const void *const *given, const char *names) {
     for (; *names != ')'; given++) {
@@ -75,12 +73,12 @@ static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what
         return status(call);           \
     }
 /* A function that changes nothing but the phase. */
-#define CHANGE_PHASE(name, from, to, forbidden, why)          \
-    Status FMI(name)(void *instance) {                        \
-        ENTER(name, from);                                    \
-        if (forbidden) return refuse(c, TEXT(FMI(name)) why); \
-        c->state.phase = to;                                  \
-        return FMI(OK);                                       \
+#define CHANGE_PHASE(name, from, to, forbidden, why)                \
+    Status FMI(name)(void *instance) {                              \
+        ENTER(name, from);                                          \
+        if (forbidden) return status(fail(c, TEXT(FMI(name)) why)); \
+        c->state.phase = to;                                        \
+        return FMI(OK);                                             \
     }
 
 static inline Status failed(Instance *c) {

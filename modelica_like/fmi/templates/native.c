@@ -58,12 +58,11 @@ EXPORTED void native_close(Model *m) { model_free(m); }
 /* A handle of a model, which must outlive it; NULL if there is no memory. */
 EXPORTED Native *native_new(const Model *m) {
     Native *n = calloc(1, sizeof *n);
-    if (n == NULL) return NULL;
-    n->c = instance_for(m, n);
-    if (n->c != NULL) n->c->log = keep_message;
-    if (n->c != NULL) return n;
-    free(n);
-    return NULL;
+    Instance *c = n == NULL ? NULL : instance_for(m, n);
+    if (c == NULL) return free(n), NULL;
+    c->log = keep_message;
+    n->c = c;
+    return n;
 }
 
 EXPORTED void native_free(Native *n) {
@@ -79,9 +78,8 @@ EXPORTED const char *native_message(const Native *n) { return n->message; }
 
 /* Back to the model's values; start and end (infinite: unknown) in s, relative tolerance, absolute one in nominals. */
 Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol) {
-    Result result;
     instance_reset(c);
-    result = set_experiment(c, 1, rtol, start, isfinite(stop), stop);
+    Result result = set_experiment(c, 1, rtol, start, isfinite(stop), stop);
     c->state.absolute = atol;
     c->state.phase = PHASE_INITIALIZATION;
     return result;
@@ -185,15 +183,11 @@ static void note_impact(Instance *c, int held, double energy, int first) {
     NativeRun *r = n->run;
     if (r == NULL || r->impacts == NULL) return;
     if (first) n->strikes = r->n_impacts;
-    if (held < 0) {
-        r->n_impacts = n->strikes;
-        return;
-    }
-    if (r->n_impacts < r->room_impacts) {
+    if (held >= 0 && r->n_impacts < r->room_impacts) {
         double row[] = {c->state.t, held, energy};
         memcpy(r->impacts + 3 * r->n_impacts, row, sizeof row);
     }
-    r->n_impacts++;
+    r->n_impacts = held < 0 ? n->strikes : r->n_impacts + 1;
 }
 
 static int write_point(Native *n, NativeRun *r) {
@@ -250,7 +244,6 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
     double width = (end - r->begin) / (double)results;
     while (s->t < end || event_first(n->c) || r->n_segments == 0) {
         double t = r->begin + (end - r->begin) * ((double)r->next / (double)results);
-        Arrival arrival;
         if (event_first(n->c) || r->n_segments == 0) {
             int result = instant(n, r, width);
             if (result != NATIVE_OK) return result;
@@ -260,7 +253,7 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
         if (r->n_points == r->room_points) return NATIVE_MORE;
         if (r->next++ < results && t <= s->t + fmin(0.5 * NEAR_EVENT * width, SAME * fmax(1, fabs(s->t)))) continue;
         t = r->next <= results ? t : end;
-        arrival = integrate_to(n->c, t, 1);
+        Arrival arrival = integrate_to(n->c, t, 1);
         if (arrival == FAILED) return NATIVE_FAILED;
         if (arrival == AT_EVENT || s->t < t) r->next--;
         if (arrival == AT_EVENT) continue;
@@ -272,7 +265,6 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
 
 /* Runs to `end`, with results at `results` equal distances. All counts of `run` are zero at first. */
 EXPORTED int native_run(Native *n, double end, int64_t results, NativeRun *run) {
-    int result;
     if (run->n_segments == 0) {
         run->begin = n->c->state.t;
         run->next = 1;
@@ -283,7 +275,7 @@ EXPORTED int native_run(Native *n, double end, int64_t results, NativeRun *run) 
     n->c->noted = note_event;
     n->c->struck = note_impact;
     n->c->step_finished = run->steps > 0 ? pause_after : NULL;
-    result = run_on(n, end, results, run);
+    int result = run_on(n, end, results, run);
     n->run = NULL;
     n->c->step_finished = NULL;
     return result;
