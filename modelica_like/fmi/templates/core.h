@@ -34,8 +34,6 @@ OLD(fmod);
 /* Zero is failure: results are asked for and joined like conditions. */
 typedef enum { RESULT_ERROR, RESULT_OK, RESULT_DISCARD } Result;
 
-/* ---- state and instance ----------------------------------------------------------------------------------------- */
-
 typedef enum {
     PHASE_INSTANTIATED = 1,
     PHASE_INITIALIZATION = 2,

@@ -120,7 +120,6 @@ static const Tape *tape_of(const Model *m, int kind) {
 
 static int is_idle(const Instance *c, const Variable *v) { return v->kind == KIND_GUARD && !guard_active(c, v->index); }
 
-/* Reads derivatives off the tangents of all arguments. */
 void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride) {
     const Model *m = c->model;
     double *dots = c->dots, *values = c->outputs;

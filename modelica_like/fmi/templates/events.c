@@ -85,7 +85,6 @@ void move_states(Instance *c, const int *nodes, const double *values, int count)
     for (int k = 0; k < c->model->n_x; k++) c->x[k] += step[k];
 }
 
-/* Tells that a mode changes. */
 void note_change(Instance *c, int name, int transition, int mode, int target) {
     const Model *m = c->model;
     const Mode *one = &m->modes[mode];

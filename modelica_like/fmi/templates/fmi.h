@@ -93,8 +93,6 @@ static inline Result get_mode(Instance *c, uint32_t reference, INTEGER *value) {
     return result;
 }
 
-/* ---- life of an instance ---------------------------------------------------------------------------------------- */
-
 void FMI(FreeInstance)(void *instance) {
     if (instance != NULL) instance_free(instance);
 }
@@ -123,8 +121,6 @@ CHANGE_PHASE(Terminate, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_FAIL
 
 DO(Reset, ANY_PHASE, (instance_reset(c), RESULT_OK))
 
-/* ---- Model Exchange --------------------------------------------------------------------------------------------- */
-
 CHANGE_PHASE(EnterContinuousTimeMode, PHASE_EVENT, PHASE_CONTINUOUS, c->co_simulation, " belongs to Model Exchange.")
 
 Status FMI(CompletedIntegratorStep)(void *instance, FMI(Boolean) noSetFMUStatePriorToCurrentPoint,
@@ -150,8 +146,6 @@ GET_STATES(GetDerivatives, derivatives, READABLE, get_derivatives(c, derivatives
 GET_STATES(GetContinuousStates, x, READABLE, memcpy(x, c->x, n * sizeof(double)))
 GET_STATES(GetNominals, x_nominal, ANY_PHASE, memcpy(x_nominal, c->model->nominals, n * sizeof(double)))
 GET_ALL(GetEventIndicators, indicators, READABLE, c->model->n_guards, "event indicators", get_indicators(c, indicators))
-
-/* ---- copies of the state ---------------------------------------------------------------------------------------- */
 
 CALL(JOIN(Get, FMUState), ANY_PHASE, GIVEN(1, FMUState), state_copy_out(c, FMUState), void **FMUState)
 CALL(JOIN(Set, FMUState), ANY_PHASE, GIVEN(1, FMUState), state_copy_in(c, FMUState), void *FMUState)

@@ -44,8 +44,6 @@ CALL(SetupExperiment, PHASE_INSTANTIATED, 1,
 CHANGE_PHASE(EnterInitializationMode, PHASE_INSTANTIATED, PHASE_INITIALIZATION, 0, "")
 CHANGE_PHASE(EnterEventMode, PHASE_CONTINUOUS | PHASE_EVENT, PHASE_EVENT, 0, "")
 
-/* ---- values ----------------------------------------------------------------------------------------------------- */
-
 #define REFERENCES const fmi2ValueReference vr[], size_t nvr
 #define VALUES(name, phases, type, call) EACH(name, phases, nvr, GIVEN(nvr, vr, value), call, REFERENCES, type value[])
 #define NO_VALUES(name, phases, type, kind)                                                                            \
@@ -66,8 +64,6 @@ CALL(GetDirectionalDerivative, READABLE, GIVEN(nUnknown, vUnknown_ref, dvUnknown
     const fmi2ValueReference vUnknown_ref[], size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown,
     const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 
-/* ---- Model Exchange --------------------------------------------------------------------------------------------- */
-
 fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInfo) {
     double next;
     int restart;
@@ -82,8 +78,6 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInf
     eventInfo->nextEventTime = isfinite(next) ? next : 0;
     return fmi2OK;
 }
-
-/* ---- Co-Simulation ---------------------------------------------------------------------------------------------- */
 
 EACH(SetRealInputDerivatives, PHASE_INITIALIZATION | PHASE_STEP, nvr, GIVEN(nvr, vr, order, value),
     set_input_rate(c, vr[k], order[k], value[k]), REFERENCES, const fmi2Integer order[], const fmi2Real value[])

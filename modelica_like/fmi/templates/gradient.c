@@ -60,8 +60,6 @@ static const double *copied(const Instance *c, const void *copy, const double *v
     return (const double *)(const void *)((const char *)copy + sizeof(State)) + (values - c->numbers);
 }
 
-/* ---- steps ------------------------------------------------------------------------------------------------------ */
-
 /* Parameters, inputs and discrete values move along a tangent; if `moving` (at the present point, where factor_implicit
  * has been called) also states, with the implicit unknowns. */
 static void load_tangent(Instance *c, const Tangent *one, int moving) {
@@ -91,7 +89,6 @@ static void take_stage(Instance *c, Tangent *one, int i, double h) {
     if (i == N_STAGES - 1) memcpy(x, solved, n_x * sizeof(double));
 }
 
-/* Goes to a time in the present piece, from the present point. */
 void gradient_move(Instance *c, double end) {
     Gradient *g = c->gradient;
     const Model *m = c->model;
@@ -116,8 +113,6 @@ void gradient_move(Instance *c, double end) {
         }
     }
 }
-
-/* ---- instants --------------------------------------------------------------------------------------------------- */
 
 /* By how much the instant comes later, per tangent: a guard, or moment, tells when it is, or its time is given. */
 static void find_shifts(Instance *c, Gradient *g) {
@@ -207,7 +202,6 @@ static void move_on(const Instance *c, const Gradient *g, const double *rates, d
             part_of(c, &g->tangents[j], c->x)[k] += part * g->tangents[j].shift * rates[k];
 }
 
-/* The tangents pass the instant that the run has passed. */
 static void pass_tangents(Instance *c, Gradient *g, Result (*pass)(Instance *c)) {
     const Variable *other = NULL;
     move_on(c, g, g->rates, 1);
@@ -223,7 +217,6 @@ static void pass_tangents(Instance *c, Gradient *g, Result (*pass)(Instance *c))
     move_on(c, g, c->rhs, -1);
 }
 
-/* Passes the start, or an event, with the tangents. */
 Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
     Gradient *g = c->gradient;
     if (g == NULL || c->passing) return pass(c);
@@ -243,8 +236,6 @@ Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
     if (g->why == NULL) pass_tangents(c, g, pass);
     return RESULT_OK;
 }
-
-/* ---- for importers ---------------------------------------------------------------------------------------------- */
 
 void gradient_end(Instance *c) {
     Gradient *g = c->gradient;

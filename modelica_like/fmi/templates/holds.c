@@ -21,7 +21,6 @@ void find_held(Instance *c, Terms *terms, unsigned char *held) {
     mark_held(c, terms, held);
 }
 
-/* The largest variable with the unit of a node. */
 double largest_like(const Model *m, const double *values, int node) {
     double largest = 0;
     for (int n = 0; n < m->n_nodes; n++)
@@ -54,8 +53,6 @@ void rest_rates(Instance *c, double *rates) {
         if (c->held[k] && state >= 0 && fabs(rates[state]) <= CANCELLED * largest) rates[state] = 0;
     }
 }
-
-/* ---- sharing ---------------------------------------------------------------------------------------------------- */
 
 /* Bring dependences to the form of an identity in one column each, the largest one left; write their shares. */
 static void eliminate(Instance *c, const Circuit *one, int rows, int n, double *silent, double *weighted) {

@@ -92,7 +92,6 @@ static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
     }
 }
 
-/* Tells what the impact has cost. */
 static void book(Instance *c, const Strike *strike, int first) {
     const double *after = variables_now(c);
     int any = 0;

@@ -6,8 +6,6 @@ static const char *const categories[] = {
     "logStatusError", "logStatusWarning", "logEvents", "logIntegrator"}; /* by the bits of LogCategory */
 enum { N_CATEGORIES = sizeof categories / sizeof categories[0] };
 
-/* ---- logging ---------------------------------------------------------------------------------------------------- */
-
 /* Errors are always told, the rest if its category is on. Returns `result`. */
 Result report(Instance *c, LogCategory category, Result result, const char *format, ...) {
     char message[MESSAGE_LENGTH];
@@ -42,8 +40,6 @@ Result allowed(Instance *c, const char *function, int phases) {
     while (!(c->state.phase >> phase & 1)) phase++;
     return fail(c, "%s is not allowed now: %s.", function, names[phase]);
 }
-
-/* ---- memory ----------------------------------------------------------------------------------------------------- */
 
 static uint64_t larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
 
@@ -191,14 +187,11 @@ Result set_experiment(
     return RESULT_OK;
 }
 
-/* ---- copies of the state ---------------------------------------------------------------------------------------- */
-
 typedef struct {
     char magic[8];
     uint64_t size, model, check;
 } Header;
 
-/* A copy is the state, and then its numbers. */
 static size_t copy_size(const Instance *c) { return sizeof(State) + c->n_numbers * sizeof(double); }
 
 static Header header_of(const Instance *c, const void *copy) {

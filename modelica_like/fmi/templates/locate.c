@@ -78,13 +78,11 @@ double cubic_guess(double g0, double r0, double g1, double r1) {
     return high;
 }
 
-/* Where the cubic through two looks says that a guard has a zero, or its top. */
 static double guess(const Look *before, const Look *after, int g) {
     double h = after->t - before->t;
     return before->t + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g], after->rates[g] * h);
 }
 
-/* Kinds of candidates per guard. */
 enum { QUIET, CROSSING, HUMP };
 
 static int find_candidates(Instance *c, const Look *before, const Look *after) {
@@ -151,7 +149,6 @@ static int locate(Instance *c, const Look *before, const Look *after, Look *look
     return step_to(c, last, look);
 }
 
-/* Which of the located guards want to fire. */
 static int mark_wanting(Instance *c, const Look *look, double tolerance) {
     const Model *m = c->model;
     double *soon = look->rates + m->n_guards;

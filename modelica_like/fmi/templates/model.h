@@ -177,10 +177,6 @@ void model_free(Model *m);
 uint32_t crc32_of(const unsigned char *bytes, size_t size);
 static inline const char *text_of(const Model *m, int place) { return m->text + place; }
 
-/* model_check.c */
-int damaged(char *message, const char *what);
-int check_model(const Model *m, char *message);
-
 /* model_file.c */
 Model *model_open(const char *location, Allocate allocate, Release release, char *message);
 

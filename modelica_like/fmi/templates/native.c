@@ -41,8 +41,6 @@ static void keep_message(const Instance *c, int status, const char *category, co
 
 static int code(Result result) { return result ? NATIVE_OK : NATIVE_FAILED; }
 
-/* ---- models and handles ----------------------------------------------------------------------------------------- */
-
 /* Returns NULL, and why in `message` (of 512 characters), if the bytes are no model. They are copied. */
 EXPORTED Model *native_open(const unsigned char *bytes, size_t size, char *message) {
     unsigned char *own = calloc(size + 1, 1);
@@ -89,8 +87,6 @@ EXPORTED int native_reset(Native *n, double start, double stop, double rtol, dou
     return code(instance_prepare(n->c, start, stop, rtol, atol));
 }
 
-/* ---- values ----------------------------------------------------------------------------------------------------- */
-
 /* Before the begin: parameters, inputs and start values; later: inputs, and parameters that are tunable. */
 EXPORTED int native_set(Native *n, int64_t count, const uint32_t *references, const double *values) {
     for (int64_t k = 0; k < count; k++)
@@ -117,8 +113,6 @@ EXPORTED int native_get(Native *n, int64_t count, const uint32_t *references, do
     if (event_first(n->c) && !handle_event(n->c)) return NATIVE_FAILED;
     return read_values(n->c, count, references, values);
 }
-
-/* ---- start, steps, copies --------------------------------------------------------------------------------------- */
 
 /* Events at the start come first, whatever is asked for next. */
 Result instance_begin(Instance *c) {
@@ -164,8 +158,6 @@ EXPORTED void native_counts(const Native *n, double *counts) {
     const double found[] = {s->n_steps, s->n_rejected, s->n_evaluations, s->n_events};
     memcpy(counts, found, sizeof found);
 }
-
-/* ---- runs ------------------------------------------------------------------------------------------------------- */
 
 static void note_event(Instance *c, int transition, int mode, int target) {
     NativeRun *r = ((Native *)c->environment)->run;
