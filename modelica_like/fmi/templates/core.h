@@ -290,6 +290,7 @@ void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *resu
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c);
 /* native.c */
+Instance *instance_for(const Model *m, void *environment);
 Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol);
 Result instance_begin(Instance *c);
 /* gradient.c */
@@ -302,7 +303,6 @@ void gradient_end(Instance *c);
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 /* instance.c */
 Instance *instance_new(Instance bare, const char *token);
-Instance *instance_for(const Model *m, void *environment);
 Instance *instance_open(Instance bare, const char *token, const char *location);
 void instance_free(Instance *c);
 void instance_reset(Instance *c);

@@ -92,18 +92,14 @@ static uint64_t lay_out(Instance *c, double *memory) {
     return used;
 }
 
-static void set_tolerance(State *s, const Model *m, double relative) {
-    s->tolerance = relative;
-    s->absolute = relative * m->settings->absolute_to_relative;
-}
-
 void instance_reset(Instance *c) {
     const Model *m = c->model;
     State *s = &c->state;
     memset(s, 0, sizeof *s);
     memset(c->numbers, 0, c->n_numbers * sizeof(double));
     s->phase = PHASE_INSTANTIATED;
-    set_tolerance(s, m, m->settings->default_tolerance);
+    s->tolerance = m->settings->default_tolerance;
+    s->absolute = s->tolerance * m->settings->absolute_to_relative;
     c->variables_valid = c->look_valid = 0;
     gradient_end(c);
     memcpy(c->p, m->parameters, m->n_p * sizeof(double));
@@ -142,13 +138,6 @@ Instance *instance_new(Instance bare, const char *token) {
     return c;
 }
 
-/* The same for a program that has loaded this library. */
-Instance *instance_for(const Model *m, void *environment) {
-    Instance bare = {.model = m, .name = "native", .environment = environment, .allocate = calloc, .release = free};
-    bare.co_simulation = 1;
-    return instance_new(bare, m->token);
-}
-
 /* The same with a model of its own: the one that is compiled in, or else the one in the folder of resources. */
 Instance *instance_open(Instance bare, const char *token, const char *location) {
     char message[MESSAGE_LENGTH];
@@ -180,7 +169,8 @@ Result set_experiment(
         return fail(c, "The start time %g s must be finite and not after the stop time %g s.", start, stop);
     if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
         return fail(c, "The tolerance must be between 0 and 1, not %g.", tolerance);
-    if (tolerance_defined) set_tolerance(s, c->model, tolerance);
+    if (tolerance_defined) s->tolerance = tolerance;
+    if (tolerance_defined) s->absolute = tolerance * c->model->settings->absolute_to_relative;
     s->t = s->start_time = s->u_time = start;
     s->stop_time_defined = stop_defined && isfinite(stop);
     s->stop_time = s->stop_time_defined ? stop : 0;

@@ -167,36 +167,35 @@ typedef struct { /* integers of records, not below `low` and below `end` */
     size_t stride;
     int count, low, end;
 } Range;
-#define COLUMN(table, field, n, low, end) {#table "." #field, &m->table[0].field, sizeof m->table[0], n, low, end}
-#define INDEX(table, field, end) COLUMN(table, field, m->n_##table, 0, end)
-#define ARRAY(table, n, end) {#table, m->table, sizeof(int), n, 0, end}
+#define COLUMN(table, field, n, low, end) {#table "." #field, &m->table[0].field, sizeof m->table[0], m->n, low, end}
+#define INDEX(table, field, end) COLUMN(table, field, n_##table, 0, m->end)
+#define TEXT(table, field) INDEX(table, field, n_text)
+#define ARRAY(table, n, end) {#table, m->table, sizeof(int), m->n, 0, m->end}
 
 /* Every index is one of the table that it points into. */
 static int check_indices(const Model *m, char *message) {
-    const Range ranges[] = {ARRAY(state_names, m->n_x, m->n_text), ARRAY(implicit_names, m->n_z, m->n_text),
-        ARRAY(singular_names, m->n_determinants, m->n_text), INDEX(variables, kind, N_KINDS),
-        INDEX(variables, type, N_TYPES), INDEX(variables, name, m->n_text),
-        COLUMN(variables, count, m->n_variables, 1, m->n_p + 2), INDEX(rising, below, m->n_p),
-        INDEX(rising, above, m->n_p), INDEX(rising, below_name, m->n_text), INDEX(rising, above_name, m->n_text),
-        ARRAY(mode_names, m->n_mode_names, m->n_text), INDEX(modes, first_name, m->n_mode_names + 1),
-        INDEX(modes, n_names, m->n_mode_names + 1), INDEX(transitions, mode, m->n_modes),
-        INDEX(transitions, name, m->n_text), INDEX(transitions, notice, m->n_text),
-        ARRAY(guard_transition, m->n_guards, m->n_transitions), ARRAY(reset_nodes, m->n_reset_nodes, m->n_nodes),
-        INDEX(resets, kind, N_RESET_KINDS), INDEX(updates, kind, N_RESET_KINDS),
-        INDEX(resets, value, m->n_reset_values), INDEX(holds, mode, m->n_modes), INDEX(holds, motion, m->n_nodes),
-        COLUMN(holds, state, m->n_holds, -1, m->n_x), COLUMN(holds, reaction, m->n_holds, -1, m->n_nodes),
-        INDEX(holds, approach, m->n_d), INDEX(holds, name, m->n_text), ARRAY(members, m->n_members, m->n_holds),
-        INDEX(ideals, row, m->n_z), INDEX(ideals, mode, m->n_modes), INDEX(ideals, zero, m->n_nodes),
-        INDEX(ideals, other, m->n_nodes), INDEX(ideals, name, m->n_text),
-        INDEX(circuits, first_member, m->n_members + 1), INDEX(circuits, n_members, m->n_members + 1),
-        INDEX(circuits, first, m->n_d + 1), INDEX(start_modes, mode, m->n_modes), INDEX(start_direct, position, m->n_x),
-        INDEX(start_direct, start, m->n_starts), INDEX(start_default, position, m->n_x),
-        INDEX(start_default, start, m->n_starts), INDEX(start_guess, position, m->n_unknowns),
-        INDEX(start_guess, start, m->n_starts), COLUMN(start_rows, start, m->n_start_unknowns, -1, m->n_starts),
-        COLUMN(start_rows, row, m->n_start_unknowns, 0, m->n_start_values), INDEX(start_dependent, start, m->n_starts),
-        INDEX(start_dependent, node, m->n_nodes), ARRAY(start_zero, m->n_start_zero, m->n_x),
-        ARRAY(start_columns, m->n_start_unknowns, m->n_unknowns + m->n_y), ARRAY(steady, m->n_steady, m->n_unknowns),
-        ARRAY(jacobian_to_step, m->n_jacobian, m->step.n_nonzeros), ARRAY(step_diagonal, m->n_x, m->step.n_nonzeros)};
+    const Range ranges[] = {ARRAY(state_names, n_x, n_text), ARRAY(implicit_names, n_z, n_text),
+        ARRAY(singular_names, n_determinants, n_text), COLUMN(variables, kind, n_variables, 0, N_KINDS),
+        COLUMN(variables, type, n_variables, 0, N_TYPES), TEXT(variables, name),
+        COLUMN(variables, count, n_variables, 1, m->n_p + 2), INDEX(rising, below, n_p), INDEX(rising, above, n_p),
+        TEXT(rising, below_name), TEXT(rising, above_name), ARRAY(mode_names, n_mode_names, n_text),
+        INDEX(modes, first_name, n_mode_names + 1), INDEX(modes, n_names, n_mode_names + 1),
+        INDEX(transitions, mode, n_modes), TEXT(transitions, name), TEXT(transitions, notice),
+        ARRAY(guard_transition, n_guards, n_transitions), ARRAY(reset_nodes, n_reset_nodes, n_nodes),
+        COLUMN(resets, kind, n_resets, 0, N_RESET_KINDS), COLUMN(updates, kind, n_updates, 0, N_RESET_KINDS),
+        INDEX(resets, value, n_reset_values), INDEX(holds, mode, n_modes), INDEX(holds, motion, n_nodes),
+        COLUMN(holds, state, n_holds, -1, m->n_x), COLUMN(holds, reaction, n_holds, -1, m->n_nodes),
+        INDEX(holds, approach, n_d), TEXT(holds, name), ARRAY(members, n_members, n_holds), INDEX(ideals, row, n_z),
+        INDEX(ideals, mode, n_modes), INDEX(ideals, zero, n_nodes), INDEX(ideals, other, n_nodes), TEXT(ideals, name),
+        INDEX(circuits, first_member, n_members + 1), INDEX(circuits, n_members, n_members + 1),
+        INDEX(circuits, first, n_d + 1), INDEX(start_modes, mode, n_modes), INDEX(start_direct, position, n_x),
+        INDEX(start_direct, start, n_starts), INDEX(start_default, position, n_x),
+        INDEX(start_default, start, n_starts), INDEX(start_guess, position, n_unknowns),
+        INDEX(start_guess, start, n_starts), COLUMN(start_rows, start, n_start_unknowns, -1, m->n_starts),
+        COLUMN(start_rows, row, n_start_unknowns, 0, m->n_start_values), INDEX(start_dependent, start, n_starts),
+        INDEX(start_dependent, node, n_nodes), ARRAY(start_zero, n_start_zero, n_x),
+        ARRAY(start_columns, n_start_unknowns, n_unknowns + m->n_y), ARRAY(steady, n_steady, n_unknowns),
+        ARRAY(jacobian_to_step, n_jacobian, step.n_nonzeros), ARRAY(step_diagonal, n_x, step.n_nonzeros)};
     for (size_t k = 0; k < sizeof ranges / sizeof ranges[0]; k++)
         for (int i = 0; i < ranges[k].count; i++) {
             int value;

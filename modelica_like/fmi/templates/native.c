@@ -9,8 +9,7 @@ enum { NATIVE_OK, NATIVE_FAILED, NATIVE_MORE, NATIVE_PAUSED };
 #define SAME 1e-12
 
 /* What a run writes, by rows; NULL: it is not wanted. Where room ends it returns NATIVE_MORE, where `steps` are done
- * (0: any number) NATIVE_PAUSED; called again, it goes on from there. Points are results and both sides of every event.
- */
+ * (0: any number) NATIVE_PAUSED; called again, it goes on from there. Points are results and both sides of events. */
 typedef struct {
     double *times, *states, *outputs; /* by point: time; states and implicit unknowns; outputs */
     double *modes, *firsts;           /* by segment: d (modes, discrete values, what holds need); its first point */
@@ -52,6 +51,13 @@ EXPORTED Model *native_open(const unsigned char *bytes, size_t size, char *messa
 }
 
 EXPORTED void native_close(Model *m) { model_free(m); }
+
+/* An instance for a program that has loaded this library. */
+Instance *instance_for(const Model *m, void *environment) {
+    Instance bare = {.model = m, .name = "native", .environment = environment, .allocate = calloc, .release = free};
+    bare.co_simulation = 1;
+    return instance_new(bare, m->token);
+}
 
 /* A handle of a model, which must outlive it; NULL if there is no memory. */
 EXPORTED Native *native_new(const Model *m) {
