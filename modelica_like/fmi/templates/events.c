@@ -55,10 +55,7 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
         for (int k = 0; k < m->n_guards; k++)
             if (number_or_false(values[k]) > 0) wanting[m->guard_transition[k]] = 1;
     }
-    for (int k = 0; k < m->n_transitions; k++) {
-        wanting[k] = wanting[k] && is_source(c, &m->transitions[k]);
-        any |= wanting[k];
-    }
+    for (int k = 0; k < m->n_transitions; k++) any |= wanting[k] = wanting[k] && is_source(c, &m->transitions[k]);
     return any;
 }
 
@@ -214,10 +211,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             if (!meet(c, -1, &met)) return RESULT_ERROR;
             if (met) find_wanting(c, wanting, 1);
         }
-        for (int k = 0; k < m->n_transitions; k++) {
-            if (any && round >= TOGETHER) wanting[k] = 0;
-            any |= wanting[k];
-        }
+        for (int k = 0; k < m->n_transitions; k++) any |= wanting[k] = wanting[k] && (!any || round < TOGETHER);
         if (!gradient_round(c, round, wanting, any | changes)) return RESULT_OK;
         any = any_of(wanting, m->n_transitions); /* it may have told others to fire */
         if (c->bounded && --c->budget < 1) {

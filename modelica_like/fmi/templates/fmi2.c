@@ -28,13 +28,16 @@ const char *fmi2GetVersion(void) { return fmi2Version; }
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
     fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions, fmi2Boolean visible,
     fmi2Boolean loggingOn) {
-    Instance bare = {.name = instanceName, .log_enabled = loggingOn, .co_simulation = fmuType == fmi2CoSimulation};
     if (functions == NULL || (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation)) return NULL;
-    bare.environment = functions->componentEnvironment;
-    bare.logger = (AnyFunction)functions->logger;
-    bare.log = functions->logger ? log_fmi2 : NULL;
-    bare.allocate = functions->allocateMemory && functions->freeMemory ? functions->allocateMemory : calloc;
-    bare.release = functions->allocateMemory && functions->freeMemory ? functions->freeMemory : free;
+    int own = functions->allocateMemory == NULL || functions->freeMemory == NULL;
+    Instance bare = {.name = instanceName,
+        .log_enabled = loggingOn,
+        .co_simulation = fmuType == fmi2CoSimulation,
+        .environment = functions->componentEnvironment,
+        .logger = (AnyFunction)functions->logger,
+        .log = functions->logger ? log_fmi2 : NULL,
+        .allocate = own ? calloc : functions->allocateMemory,
+        .release = own ? free : functions->freeMemory};
     return instance_open(bare, fmuGUID, fmuResourceLocation);
 }
 

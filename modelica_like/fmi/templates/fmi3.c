@@ -17,10 +17,13 @@ const char *fmi3GetVersion(void) { return fmi3Version; }
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
     fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage) {
-    Instance bare = {.name = instanceName, .log_enabled = loggingOn, .allocate = calloc, .release = free};
-    bare.environment = instanceEnvironment;
-    bare.logger = (AnyFunction)logMessage;
-    bare.log = logMessage ? log_fmi3 : NULL;
+    Instance bare = {.name = instanceName,
+        .log_enabled = loggingOn,
+        .allocate = calloc,
+        .release = free,
+        .environment = instanceEnvironment,
+        .logger = (AnyFunction)logMessage,
+        .log = logMessage ? log_fmi3 : NULL};
     return instance_open(bare, instantiationToken, resourcePath);
 }
 
@@ -62,14 +65,10 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     return NULL;
 }
 
-fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
-    fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-    ENTER(EnterInitializationMode, PHASE_INSTANTIATED);
-    if (!set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime)) return fmi3Error;
-    c->state.phase = PHASE_INITIALIZATION;
-    return fmi3OK;
-}
-
+CALL(EnterInitializationMode, PHASE_INSTANTIATED,
+    set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime),
+    (c->state.phase = PHASE_INITIALIZATION, RESULT_OK), fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
+    fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 CHANGE_PHASE(EnterConfigurationMode, PHASE_INSTANTIATED, PHASE_CONFIGURATION, 0, "")
 CHANGE_PHASE(ExitConfigurationMode, PHASE_CONFIGURATION, PHASE_INSTANTIATED, 0, "")
 CHANGE_PHASE(EnterEventMode, PHASE_CONTINUOUS | PHASE_STEP, PHASE_EVENT, c->co_simulation && !c->event_mode_used,
