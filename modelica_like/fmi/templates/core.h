@@ -85,9 +85,8 @@ enum { N_SPECIALS = 6 }; /* of the first tapes of a model */
 /* Arrays with their sizes, for which lay_out has short names. */
 #define FIELD(name, size) *name
 
-/* An impact: of all motions that modes hold, and its jump of the states. */
+/* An impact: of all motions that modes hold, and its jump of the states; `knocked` is let go in the impact itself. */
 #define STRIKE_NUMBERS(A) A(before, holds), A(approach, holds), A(impulse, holds), A(reaction, holds), A(jump, n)
-/* knocked: let go in the impact itself */
 #define STRIKE_MARKS(A) A(entering, holds), A(loose, holds), A(held, holds), A(knocked, holds)
 typedef struct {
     double STRIKE_NUMBERS(FIELD);
@@ -111,12 +110,11 @@ typedef struct {
         A(target_values, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), \
         A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), \
         A(sizes, members)
-/* order: pivots of the implicit equations */
+/* open_rows: implicit equations that depend on others (`order`: their pivots); asked: variables that somebody reads;
+ * tuned: parameters that have changed in a run; entered: what has begun to hold at an instant */
 #define WORK_INDICES(A)                                                                                          \
     A(order, n_z), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), A(member, members), \
         A(pivots, members), A(same, slots), A(places_of_slots, slots)
-/* open_rows: implicit equations that depend on others; asked: variables that somebody reads; tuned: parameters that
- * have changed in a run; entered: what has begun to hold at an instant */
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
@@ -124,9 +122,9 @@ typedef struct {
 
 typedef struct Gradient Gradient; /* see gradient.c */
 
-/* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns. */
+/* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns; `wanting` transitions fire at the
+ * end of the piece. */
 #define SMOOTH_NUMBERS(A) A(x, n), A(p, m->n_p), A(u, m->n_u), A(u_rate, m->n_u), A(d, n_d), A(start_value, starts)
-/* wanting: transitions that fire at the end of the piece */
 #define STATE_MARKS(A) A(mode_given, n_d), A(start_given, starts), A(wanting, m->n_transitions)
 
 typedef struct Instance {

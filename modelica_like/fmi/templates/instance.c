@@ -107,34 +107,28 @@ void instance_reset(Instance *c) {
     memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
 }
 
-static Instance *instance_make(const Instance *bare) {
-    const Model *m = bare->model;
-    Instance measured = *bare, *c;
-    size_t length = strlen(bare->name) + 1, head = (sizeof *c + length) / sizeof(double) + 1;
+/* An instance of a model, which must outlive it; NULL, with a message in the log, if there is none. `bare` has the
+ * model, a name, and what belongs to the caller; log_enabled tells whether there is to be logged more than errors. */
+Instance *instance_new(Instance bare, const char *token) {
+    const Model *m = bare.model;
+    const char *name = bare.name;
+    if (name == NULL || *name == 0) bare.name = "?";
+    bare.log_enabled = bare.log_enabled ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
+    if (name != bare.name) return fail(&bare, "The instance needs a name."), NULL;
+    if (token == NULL || strcmp(token, m->token) != 0)
+        return fail(&bare, "The instantiation token is that of another export of the model."), NULL;
+    Instance measured = bare;
+    size_t length = strlen(name) + 1, head = (sizeof bare + length) / sizeof(double) + 1;
     uint64_t size = head + lay_out(&measured, NULL);
-    c = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
-    if (c == NULL) return NULL;
-    *c = *bare;
-    c->name = memcpy(c + 1, bare->name, length);
+    Instance *c = size > SIZE_MAX / sizeof(double) ? NULL : bare.allocate((size_t)size, sizeof(double));
+    if (c == NULL) return fail(&bare, "There is not enough memory."), NULL;
+    *c = bare;
+    c->name = memcpy(c + 1, name, length);
     c->numbers = (double *)(void *)c + head;
     lay_out(c, c->numbers);
     c->z = c->x + m->n_x;
     memcpy(c->slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
-    return c;
-}
-
-/* An instance of a model, which must outlive it; NULL, with a message in the log, if there is none. `bare` has the
- * model, a name, and what belongs to the caller; log_enabled tells whether there is to be logged more than errors. */
-Instance *instance_new(Instance bare, const char *token) {
-    Instance *c = NULL;
-    const char *name = bare.name;
-    if (name == NULL || *name == 0) bare.name = "?";
-    bare.log_enabled = bare.log_enabled ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
-    if (name != bare.name) fail(&bare, "The instance needs a name.");
-    else if (token == NULL || strcmp(token, bare.model->token) != 0)
-        fail(&bare, "The instantiation token is that of another export of the model.");
-    else if ((c = instance_make(&bare)) == NULL) fail(&bare, "There is not enough memory.");
     return c;
 }
 
@@ -144,11 +138,8 @@ Instance *instance_open(Instance bare, const char *token, const char *location) 
     Model *own = model_data_size > 0 ? model_read((const unsigned char *)model_data, model_data_size, bare.allocate,
                                            bare.release, message)
                                      : model_open(location, bare.allocate, bare.release, message);
-    if (own == NULL) {
-        if (bare.name == NULL) bare.name = "?";
-        fail(&bare, "%s", message);
-        return NULL;
-    }
+    if (own == NULL && bare.name == NULL) bare.name = "?";
+    if (own == NULL) return fail(&bare, "%s", message), NULL;
     bare.model = own;
     Instance *c = instance_new(bare, token);
     if (c == NULL) model_free(own);

@@ -69,10 +69,9 @@ int lu_factor(int n, double *m, int *order) {
     double largest = 0, smallest = DBL_MAX;
     for (int j = 0; j < n; j++) {
         int pivot = j;
-        double size;
         for (int i = j + 1; i < n; i++)
             if (fabs(m[i + n * j]) > fabs(m[pivot + n * j])) pivot = i;
-        size = fabs(m[pivot + n * j]);
+        double size = fabs(m[pivot + n * j]);
         if (!isfinite(size) || size == 0) return 0;
         if (size > largest) largest = size;
         if (size < smallest) smallest = size;
