@@ -100,7 +100,6 @@ static double after_step(Instance *c) {
 
 static void count_change(Instance *c, int transition, int mode, int target) {
     Batch *b = c->environment;
-    (void)transition;
     b->events++;
     for (int64_t k = 0; k < b->asked->n_readings; k++) {
         const Reading *one = &b->asked->readings[k];
@@ -154,14 +153,12 @@ static int run_to_end(Batch *b) {
     Instance *c = b->c;
     State *s = &c->state;
     while ((s->t < b->asked->end || s->at_event) && !b->failed && !*b->asked->stop) {
-        if (s->at_event) {
-            if (!handle_event(c) || b->events > b->asked->most_events) return 0;
-        } else switch (integrate_to(c, b->asked->end, 1)) {
-                case FAILED: return 0;
-                case AT_EVENT: read_piece(b); break;
-                case REACHED:
-                    if (s->t < b->asked->end) continue;
-            }
+        int passed = s->at_event;
+        if (passed && (!handle_event(c) || b->events > b->asked->most_events)) return 0;
+        Arrival arrival = passed ? AT_EVENT : integrate_to(c, b->asked->end, 1);
+        if (arrival == FAILED) return 0;
+        if (arrival == AT_EVENT && !passed) read_piece(b);
+        if (arrival == REACHED && s->t < b->asked->end) continue;
         if (b->sampled) take_result(b, s->t, variables_at(b, b->c->state.t, 1));
     }
     return !b->failed;

@@ -11,6 +11,9 @@
 #include "model.h"
 #include "modelica_like.h" /* EXPORTED: what programs see that load this library */
 
+/* Much of the standard is for what no model here has. */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+
 /* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
    Versions can only be told to a linker that is given libm. */
 #if defined(OLD_GLIBC) && defined(__GLIBC__) && defined(__x86_64__)
@@ -206,7 +209,7 @@ double input_at(const Instance *c, int k, double t);
 /* start.c */
 void start_values(Instance *c);
 Result start_solve(Instance *c);
-void choose_modes(Instance *c, unsigned char *decided);
+void choose_modes(Instance *c);
 /* holds.c */
 #define UNLIMITED 1e30
 #define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */

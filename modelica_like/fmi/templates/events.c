@@ -186,11 +186,10 @@ static void keep_wanting(Instance *c, const double *soon, unsigned char *wanting
 
 /* Before one of several that hold a motion gives way, let the others take more. */
 static Result share_anew(Instance *c, unsigned char *wanting) {
-    double *soon = c->guards;
     if (!anything_shared(c)) return RESULT_OK;
     if (!share_and_solve(c)) return RESULT_ERROR;
-    evaluate_now(c, &c->model->tapes.guards_soon, soon);
-    keep_wanting(c, soon, wanting);
+    evaluate_now(c, &c->model->tapes.guards_soon, c->guards);
+    keep_wanting(c, c->guards, wanting);
     return RESULT_OK;
 }
 

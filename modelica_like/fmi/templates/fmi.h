@@ -5,9 +5,6 @@
 
 #include "core.h"
 
-/* Much of the standard is for what no model here has. */
-#pragma GCC diagnostic ignored "-Wunused-parameter"
-
 #define JOIN_(a, b) a##b
 #define JOIN(a, b) JOIN_(a, b)
 #define TEXT_(name) #name

@@ -58,10 +58,9 @@ static int let_go_unbearable(const Instance *c, Strike *strike, const Terms *ter
 /* Puts back what was let go and would now move on against what nothing limits; tells whether anything would. */
 static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
-    double *x = c->x_kept;
     int any = 0;
     if (!any_of(strike->loose, m->n_holds)) return 0;
-    memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
+    memcpy(c->x_kept, c->x, (size_t)m->n_x * sizeof(double));
     for (int k = 0; k < m->n_x; k++) c->x[k] += strike->jump[k];
     const double *after = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
@@ -72,21 +71,20 @@ static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms)
         strike->loose[k] = 0;
         any = 1;
     }
-    memcpy(c->x, x, (size_t)m->n_x * sizeof(double));
+    memcpy(c->x, c->x_kept, (size_t)m->n_x * sizeof(double));
     return any;
 }
 
 /* Marks as loose also what bounces, or was moved in passing. */
 static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
-    unsigned char *held = c->held;
     const double *after = variables_now(c);
     double largest = 0;
-    mark_held(c, terms, held);
+    mark_held(c, terms, c->held);
     for (int k = 0; k < m->n_holds; k++) largest = fmax(largest, fabs(after[m->holds[k].motion] - strike->before[k]));
     for (int k = 0; k < m->n_holds; k++) {
         double now = after[m->holds[k].motion];
-        if (held[k] && !strike->loose[k] && now == 0) continue; /* it stays */
+        if (c->held[k] && !strike->loose[k] && now == 0) continue; /* it stays */
         if (fabs(now - strike->before[k]) > FELT * largest || (strike->approach[k] != 0 && now != 0))
             strike->loose[k] = 1;
     }
@@ -137,17 +135,16 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
 static void choose_again(Instance *c, const Strike *strike) {
     const Model *m = c->model;
     double *d = c->respond_d;
-    unsigned char *decided = c->decided;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
-    memset(decided, 1, (size_t)m->n_d);
+    memset(c->decided, 1, (size_t)m->n_d);
     evaluate_now(c, &m->tapes.discrete_starts, c->guards);
     for (int k = 0; k < m->n_holds; k++) {
         int mode = m->holds[k].mode;
         if (!strike->loose[k]) continue;
         c->d[mode] = c->guards[mode];
-        decided[mode] = 0;
+        c->decided[mode] = 0;
     }
-    choose_modes(c, decided);
+    choose_modes(c);
     for (int k = 0; k < m->n_holds; k++) {
         int mode = m->holds[k].mode, chosen = (int)c->d[mode];
         if (chosen == (int)d[mode]) continue;
@@ -179,7 +176,6 @@ Result stop_motions(Instance *c, const double *before) {
     Strike *strike = &c->strike;
     Terms *terms = c->strike_terms;
     unsigned char *entered = c->entered;
-    double *x = c->impact_x;
     int first = !c->stopped;
     if (m->n_holds == 0) return RESULT_OK;
     memset(strike->loose, 0, (size_t)m->n_holds);
@@ -196,9 +192,9 @@ Result stop_motions(Instance *c, const double *before) {
             note_change(c, one->name, -1, one->mode, one->number);
             c->d[one->mode] = one->number;
         }
-        if (first) memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
+        if (first) memcpy(c->impact_x, c->x, (size_t)m->n_x * sizeof(double));
         c->stopped = 1;
-        memcpy(c->x, x, (size_t)m->n_x * sizeof(double));
+        memcpy(c->x, c->impact_x, (size_t)m->n_x * sizeof(double));
         if (!share_and_solve(c)) return RESULT_ERROR;
         begin_strike(c, strike, terms);
     }

@@ -86,16 +86,15 @@ static double guess(const Look *before, const Look *after, int g) {
 enum { QUIET, CROSSING, HUMP };
 
 static int find_candidates(Instance *c, const Look *before, const Look *after) {
-    unsigned char *kinds = c->kinds;
     double h = after->t - before->t;
     for (int g = 0; g < c->model->n_guards; g++) {
         double g0 = before->values[g], g1 = after->values[g];
-        kinds[g] = QUIET;
+        c->kinds[g] = QUIET;
         if (!guard_active(c, g) || g0 > 0) continue;
-        if (g1 > 0) kinds[g] = CROSSING;
-        else if (is_hump(g0, before->rates[g] * h, g1, after->rates[g] * h)) kinds[g] = HUMP;
+        if (g1 > 0) c->kinds[g] = CROSSING;
+        else if (is_hump(g0, before->rates[g] * h, g1, after->rates[g] * h)) c->kinds[g] = HUMP;
     }
-    return any_of(kinds, c->model->n_guards);
+    return any_of(c->kinds, c->model->n_guards);
 }
 
 /* Newton's step to the earliest zero of a candidate; tells whether one is positive already. */

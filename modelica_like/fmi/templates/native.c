@@ -34,7 +34,6 @@ typedef struct {
 
 static void keep_message(const Instance *c, int status, const char *category, const char *message) {
     Native *n = c->environment;
-    (void)category;
     if (!status) snprintf(n->message, sizeof n->message, "%s", message);
 }
 

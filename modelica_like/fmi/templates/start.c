@@ -130,13 +130,12 @@ static void start_equations(Instance *c) {
 }
 
 /* Choose modes that are not decided by their start conditions: the first that holds wins. */
-void choose_modes(Instance *c, unsigned char *decided) {
-    double *holds = c->guards;
-    evaluate_now(c, &c->model->tapes.start_conditions, holds);
+void choose_modes(Instance *c) {
+    evaluate_now(c, &c->model->tapes.start_conditions, c->guards);
     for (int k = 0; k < c->model->n_start_modes; k++) {
         const StartMode *one = &c->model->start_modes[k];
-        if (holds[k] == 0 || decided[one->mode]) continue;
-        decided[one->mode] = 1;
+        if (c->guards[k] == 0 || c->decided[one->mode]) continue;
+        c->decided[one->mode] = 1;
         c->d[one->mode] = one->target;
     }
 }
@@ -147,7 +146,7 @@ static int choose_start_modes(Instance *c, const double *begun) {
     const Model *m = c->model;
     memcpy(c->decided, c->mode_given, (size_t)m->n_d);
     memcpy(c->d_before, c->d, (size_t)m->n_d * sizeof(double));
-    choose_modes(c, c->decided);
+    choose_modes(c);
     if (begun) variables_now(c);
     for (int k = 0; k < m->n_holds && begun; k++) {
         const Held *one = &m->holds[k];
@@ -177,12 +176,11 @@ static Result find_steady(Instance *c, double *begun) {
 /* Surfaces that stick against too large a torque are not in equilibrium. */
 static Result check_modes_hold(Instance *c) {
     const Model *m = c->model;
-    double *guards = c->guards_before;
     if (m->n_guards == 0 || !m->settings->steady) return RESULT_OK;
-    evaluate_now(c, &m->tapes.guards, guards);
+    evaluate_now(c, &m->tapes.guards, c->guards_before);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
-        if (guard_active(c, k) && guards[k] > 0 && one->target != (int)c->d[one->mode])
+        if (guard_active(c, k) && c->guards_before[k] > 0 && one->target != (int)c->d[one->mode])
             return fail(c, "No steady state was found at t = %.9g s: %s does not stay in its mode.", c->state.t,
                 text_of(m, one->name));
     }
@@ -192,7 +190,6 @@ static Result check_modes_hold(Instance *c) {
 static Result pass_start(Instance *c) {
     const Model *m = c->model;
     double *begun = m->settings->steady ? c->begun : NULL;
-    int round;
     if (!check_tables(c)) return RESULT_ERROR;
     memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
@@ -208,15 +205,15 @@ static Result pass_start(Instance *c) {
         choose_start_modes(c, NULL);
         share(c);
     }
-    for (round = 0; round < MODE_ROUNDS; round++) {
+    for (int round = 0;; round++) {
+        if (round == MODE_ROUNDS)
+            return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
         if (!(begun ? find_steady(c, begun)
                     : apply_direct(c) && solve_start_system(c) && solve_now(c, 0) && check_dependent(c)))
             return RESULT_ERROR;
         if (!choose_start_modes(c, begun)) break;
         share(c);
     }
-    if (round == MODE_ROUNDS)
-        return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
     rest(c);
     replace_dependent(c);
     if (!solve_now(c, 0) || !check_singular(c) || !check_modes_hold(c)) return RESULT_ERROR;
