@@ -83,7 +83,7 @@ typedef struct { /* a tape for the present modes, see special.c */
     int first_known, uses;
     uint64_t belongs_to;
 } Special;
-enum { N_SPECIALS = 6 }; /* of the first tapes of a model */
+enum { N_SPECIALS = 6 }; /* of the first tapes of a model, from its rates to its guards */
 
 /* Arrays with their sizes, for which lay_out has short names. */
 #define FIELD(name, size) *name
@@ -113,8 +113,8 @@ typedef struct {
         A(target_values, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), \
         A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), \
         A(sizes, members)
-/* open_rows: implicit equations that depend on others (`order`: their pivots); asked: variables that somebody reads;
- * tuned: parameters that have changed in a run; entered: what has begun to hold at an instant */
+/* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
+ * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant */
 #define WORK_INDICES(A)                                                                                          \
     A(order, n_z), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), A(member, members), \
         A(pivots, members), A(same, slots), A(places_of_slots, slots)
