@@ -4,13 +4,14 @@
 #define OFFSET 1e-12
 
 const Variable *find_variable(const Model *m, uint32_t reference) {
-    int low = 0, high = m->n_variables;
-    while (low < high) {
+    int low = 0, high = m->n_variables - 1;
+    while (low <= high) {
         int middle = low + (high - low) / 2;
+        if (m->variables[middle].reference == reference) return &m->variables[middle];
         if (m->variables[middle].reference < reference) low = middle + 1;
-        else high = middle;
+        else high = middle - 1;
     }
-    return low < m->n_variables && m->variables[low].reference == reference ? &m->variables[low] : NULL;
+    return NULL;
 }
 
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) {
