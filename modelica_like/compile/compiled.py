@@ -249,7 +249,7 @@ class CompiledDae:
             owner = self.flat_discretes[self.delay_parts[0][0]].path.rpartition(".")[0] or "it"
             raise error(
                 f"{what}: {owner} has a delay(…), which needs the past of a run.",
-                advice="Simulate it with IDAS, or approximate the delay there, by a lag or a Padé approximation.",
+                advice="Approximate the delay there, by a lag or a Padé approximation.",
             )
 
     @cached_property

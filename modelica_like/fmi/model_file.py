@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import TERMINAL, CompiledDae
+from modelica_like.errors import ExportError
 from modelica_like.fmi.interface import FmuVariable, Interface
 from modelica_like.fmi.sources import Version, runtime_sources
 from modelica_like.fmi.start_tables import StartTables
@@ -29,7 +30,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
 """Path of the file in an FMU."""
-FORMAT = 4
+FORMAT = 5
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
 _ENTRY = struct.Struct("<4i")
@@ -49,7 +50,7 @@ _QR = ("colind", "row", "v_colind", "v_row", "r_colind", "r_row", "row_place", "
 _TAPES = (
     "rates", "jacobian", "alg", "alg_jacobian", "variables", "guards", "guards_soon", "moments", "resets",
     "updates", "start_conditions", "start_values", "discrete_starts", "hold_terms", "determinants", "start_system",
-    "start_jacobian", "derived",
+    "start_jacobian", "derived", "delays",
 )  # fmt: skip
 SECTIONS: dict[str, Any] = {
     "settings": _record(
@@ -78,6 +79,7 @@ SECTIONS: dict[str, Any] = {
     "members": _INTEGER,
     "ideals": _record("row mode zero other name unused", "nominal"),
     "units": _INTEGER,
+    "delays": _record("name first"),
     "start_modes": _record("mode target"),
     **dict.fromkeys(("start_direct", "start_default", "start_guess"), _START_OF),
     **dict.fromkeys(("start_rows", "start_dependent"), _START_ROW),
@@ -111,8 +113,13 @@ def model_file(
         token: GUID (2.0) or instantiation token (3.0) of the description.
         tolerance: relative tolerance of Co-Simulation if the importer gives none.
         fixed_step: step size of Co-Simulation in s, 0 for adaptive steps.
+
+    Raises:
+        ExportError: a value is delayed, and steps are fixed.
     """
     text = _Text()
+    if fixed_step:
+        tables.model.refuse_delays(ExportError, f"{tables.model.name} cannot take fixed steps")
     contents = _contents(tables, variables, tolerance, fixed_step, text)
     contents |= {"token": np.frombuffer(token.encode() + b"\0", _TEXT), "text": np.frombuffer(text.joined(), _TEXT)}
     entries, body = b"", bytearray()
@@ -202,6 +209,9 @@ def _contents(
         "singular_names": [text(", ".join(names[:6])) for names, _ in model.singular],
         "variables": [_variable(one, text) for one in sorted(variables, key=lambda one: one.reference)],
         "rising": [(*pair, *(text(model.flat_parameters[k].path) for k in pair)) for pair in model.rising],
+        "delays": [
+            (text(model.flat_discretes[first].path.removesuffix("[0]")), first) for first, *_ in model.delay_parts
+        ],
         "jacobian_to_step": tables.to_step,
         "step_diagonal": tables.diagonal,
     }

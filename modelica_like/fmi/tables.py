@@ -8,7 +8,6 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import ExportError
 from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.fmi.tape import ARGUMENTS, Slots, Tape, write_tapes
 
@@ -60,9 +59,7 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.
         LanguageError: a function has no counterpart in C.
-        ExportError: a value is delayed.
     """
-    model.refuse_delays(ExportError, f"The compiled run-time cannot have {model.name}")
     start = start or start_tables(model)
     functions, jacobian, start_pattern = _functions(model, start)
     states = len(model.states)
@@ -108,7 +105,7 @@ def _functions(model: CompiledDae, start: StartTables) -> tuple[dict[str, Any], 
     }
     plain = (
         "alg", "variables", "guards_soon", "moments", "resets", "updates", "start_conditions", "start_values",
-        "discrete_starts", "determinants", "hold_terms", "derived",
+        "discrete_starts", "determinants", "hold_terms", "derived", "delays",
     )  # fmt: skip
     functions |= {name: getattr(model, name) for name in plain}
     y = ca.SX.sym("y", start.system.size1_out(0))

@@ -42,7 +42,7 @@ def delay(value: Expr, time: Scalar) -> Expr:
 
     A run takes it from its own past, as a polynomial for a piece of at most `time`. Jumps and kinks of the value come
     again exactly `time` later. The value now does not depend on it, so it breaks algebraic loops. It has no
-    derivatives by parameters, and is not in FMUs.
+    derivatives by parameters.
 
     Args:
         value: any expression.

@@ -261,6 +261,22 @@ def machine_loads(run: Solution) -> None:
 
 
 @numbers
+def drill_string(run: Solution) -> None:
+    M, Z, T, tau = 5e3, 300.0, 0.94, 60 / 300
+    moves, arrives, echo = 0.5, 0.5 + T, 0.5 + 2 * T
+    # The matched bit sends nothing back, and brakes with all the power of the top.
+    assert run.at(moves + 0.1)["string.w_a"] == close(M / Z)
+    assert [run.at(arrives + sign * 1e-3)["string.w_b"] for sign in (-1, 1)] == close([0, M / Z])
+    assert run.energy()["bit"].lost == close(M**2 / Z * (3.2 - arrives))
+    # The collar begins as a wall, which sends the torque back, and ends as a free end.
+    after = np.array([0.1, 0.5, 1.5])
+    collar = [run.at(arrives + t)["collar.w"] for t in after]
+    assert collar == close(2 * M / Z * (1 - np.exp(-after / tau)))
+    top = [run.at(echo + t)["free_string.w_a"] for t in (1e-6, 0.5)]
+    assert top == pytest.approx(M / Z * (3 - 4 * np.exp(-np.array([1e-6, 0.5]) / tau)), rel=1e-6)
+
+
+@numbers
 def full_turns(run: Solution) -> None:
     L, v, g = 1.5, 9.5, 9.81
     top = run.at(2 * ellipk(4 * g * L / v**2) * L / v)

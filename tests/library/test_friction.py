@@ -181,6 +181,12 @@ def test_normal_force_that_jumps_to_zero_and_back() -> None:
     )
 
 
+def test_a_brake_that_is_pressed_at_rest_sticks_at_once() -> None:
+    press = Pulse(period="0.4 s", start_time="0.1 s")
+    run = simulate(shaft(press, "brake.f_normalized", mass=still(), brake=Brake(capacity=3.0)), "0.2 s")
+    assert changes(run, "brake.mode") == ["stuck"]
+
+
 def test_free_surfaces_carry_no_torque() -> None:
     run = simulate(shaft(mass=still(5.0), clutch=Clutch(capacity=3.0, f_normalized=0.0), other=still()), "1 s")
     assert np.all(run["clutch.tau"] == 0.0)

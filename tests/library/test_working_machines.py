@@ -1,6 +1,7 @@
 """Linkages, drives with a variable ratio and working machines beyond what their netlist shows."""
 
 from math import pi, sin, sqrt
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,6 +89,24 @@ def test_chain_pulls_in_both_directions_and_is_as_fast_as_its_teeth() -> None:
         assert abs(turned - speed * 2 / 3) < 1.2 * stretch / 0.0908 + 1e-3
         assert np.min(run["chain.loss_power"]) > -1e-9
         assert run.energy().closure < 1e-9
+
+
+def test_a_chain_on_a_frame_that_turns_does_not_notice() -> None:
+    """Speeds, and the teeth that are in the chain, are those against the frame."""
+    forces: list[Any] = []
+    for speed in (0.0, 3.0):
+        parts = {
+            "motor": ConstantSpeed(w_fixed=20.0 + speed, phi=0.0), "frame": ConstantSpeed(w_fixed=speed, phi=0.0),
+            "chain": ChainDrive(z_a=15, z_b=45, pitch=0.0127, c=2e5, d=500.0),
+            "wheel": Inertia(J=0.05, phi=0.0, w=20 / 3 + speed),
+        }  # fmt: skip
+        drive = Assembly(
+            "drive", parts=parts, series={"s": ["motor", "chain", "wheel"]},
+            connect={"f": ["frame.flange", "chain.support"]},
+        )  # fmt: skip
+        forces.append(simulate(drive, 0.5, **TIGHT)["chain.f"])
+    assert np.ptp(forces[0]) > 10
+    assert forces[1] == pytest.approx(forces[0], abs=1e-4 * np.ptp(forces[0]))
 
 
 def test_centrifugal_pump_below_its_static_head_moves_nothing() -> None:

@@ -19,7 +19,7 @@ from modelica_like.errors import (
     UnitMismatch,
     ValueOutOfRange,
 )
-from modelica_like.language import Component, Equations, Expr, Parameter, Variable, delay, der, param, tanh, var
+from modelica_like.language import Component, Equations, Expr, Parameter, Variable, delay, der, param, sin, tanh, var
 
 
 class Lagging(Component):
@@ -59,6 +59,11 @@ class Length(Lagging):
 class Unit(Lagging):
     def late(self) -> Expr:
         return delay(self.T, self.T)
+
+
+class Swinging(Lagging):
+    def late(self) -> Expr:
+        return delay(sin(1e6 * self.x), 10 * self.T)
 
 
 class Own(Lagging):
@@ -116,35 +121,44 @@ REFUSED: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = 
         lambda: simulate(Lagging(T=-0.1), 1.0),
         "The time of delay[1] is -0.1 s: it must be positive.",
     ),
-    "fmu": (
-        ExportError,
-        lambda: export_fmu(Lagging(), "lagging.fmu"),
-        "The compiled run-time cannot have Lagging: it has a delay(…), which needs the past of a run.\n"
-        "Simulate it with IDAS, or approximate the delay there, by a lag or a Padé approximation.",
+    "negative natively": (
+        ValueOutOfRange,
+        lambda: simulate(Lagging(T=-0.1), 1.0, solver="native"),
+        "The time of delay[1] is -0.1 s: it must be positive.",
     ),
-    "native": (
+    "long": (
+        ValueOutOfRange,
+        lambda: simulate(Swinging(), 3.0, solver="native"),
+        "Delays reach back over more than 8192 points of the past.\nShorten them, or simulate with IDAS.",
+    ),
+    "fixed steps": (
         ExportError,
-        lambda: simulate(Lagging(), 1.0, solver="native"),
-        "The compiled run-time cannot have Lagging: it has a delay(…), which needs the past of a run.\n"
-        "Simulate it with IDAS, or approximate the delay there, by a lag or a Padé approximation.",
+        lambda: export_fmu(Lagging(), "lagging.fmu", fixed_step="1 ms"),
+        "Lagging cannot take fixed steps: it has a delay(…), which needs the past of a run.\n"
+        "Approximate the delay there, by a lag or a Padé approximation.",
+    ),
+    "native gradient": (
+        NoGradient,
+        lambda: build(Lagging()).native(outputs=["y"], by=["T"]).gradient(),
+        "There are no derivatives with respect to anything after t = 0 s: a value is delayed.",
     ),
     "gradient": (
         NoGradient,
         lambda: sensitivities(Lagging(), ["y"], ["T"], until=1.0),
         "No gradient of Lagging: it has a delay(…), which needs the past of a run.\n"
-        "Simulate it with IDAS, or approximate the delay there, by a lag or a Padé approximation.",
+        "Approximate the delay there, by a lag or a Padé approximation.",
     ),
     "linear": (
         LanguageError,
         lambda: linearize(Lagging()),
         "Lagging cannot be linearized: it has a delay(…), which needs the past of a run.\n"
-        "Simulate it with IDAS, or approximate the delay there, by a lag or a Padé approximation.",
+        "Approximate the delay there, by a lag or a Padé approximation.",
     ),
     "steady": (
         InitializationError,
         lambda: simulate(Lagging(), 1.0, start="steady"),
         "Lagging cannot start in the steady state: it has a delay(…), which needs the past of a run.\n"
-        "Simulate it with IDAS, or approximate the delay there, by a lag or a Padé approximation.",
+        "Approximate the delay there, by a lag or a Padé approximation.",
     ),
 }
 

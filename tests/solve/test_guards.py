@@ -6,7 +6,7 @@ import pytest
 from modelica_like import simulate
 from modelica_like.initialize import Point
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var
-from modelica_like.solve.guards import Candidate, _cubic, _nearly, _newton, candidates, locate
+from modelica_like.solve.guards import Candidate, _cubic, _hermite, _nearly, _newton, candidates, locate
 
 
 class Steps(Component):
@@ -107,6 +107,12 @@ def test_the_first_guess_of_a_hump_is_the_top_of_the_cubic(top: float, bottom: f
     assert _cubic(*ends(value), inside=True) == pytest.approx(top, abs=1e-9)
     assert not _nearly(*ends(value))
     assert _nearly(*ends(value - value(top)))
+
+
+def test_a_cubic_is_known_by_its_ends() -> None:
+    cubic, inside = np.poly1d([3.0, -2.0, 0.7, -0.1]), np.linspace(0.0, 1.0, 7)
+    slope = cubic.deriv()
+    assert _hermite(inside) @ [cubic(0), slope(0), cubic(1), slope(1)] == pytest.approx(cubic(inside), abs=1e-14)
 
 
 class Ahead:

@@ -125,7 +125,8 @@ def test_two_start_values_of_one_motion_that_contradict(start):
 
 
 @pytest.mark.parametrize(
-    ("one", "other"), [(1e6, 1e6 * (1 + 3e-8)), (1e6, 1e6 * (1 - 3e-8)), (0.0, 3e-8), (-1e-3, -1e-3 + 3e-8)]
+    ("one", "other"),
+    [(1e6, 1e6 * (1 + 3e-8)), (1e6, 1e6 * (1 - 3e-8)), (0.0, 3e-8), (0.0, 1.5e-8), (-1e-3, -1e-3 + 3e-8)],
 )
 def test_start_values_agree_to_eight_digits_or_to_1e_8(start, one, other):
     """Compared as states (one shaft) and behind a gear; a tenth of the difference is rounding."""

@@ -57,10 +57,11 @@ typedef struct { /* what changes; arrays of the model's sizes stand behind it, s
     int phase, solved, z_valid, inputs_changed, piece_valid, event_pending, at_event;
     int looked;                                        /* the guards are known from the end of the last fixed step */
     double tolerance, absolute, start_time, stop_time; /* absolute: in nominal values */
-    int stop_time_defined;
-    double step;             /* next step size, 0: choose one */
-    double instants[CROWD];  /* of the last events, in a circle */
-    int n_instants, resting; /* resting: impacts end in contact */
+    double delayed_until;                              /* when series of delayed values end */
+    int stop_time_defined, n_past, past_lost;          /* rows of the past; there were too many */
+    double step;                                       /* next step size, 0: choose one */
+    double instants[CROWD];                            /* of the last events, in a circle */
+    int n_instants, resting;                           /* resting: impacts end in contact */
     double n_steps, n_rejected, n_evaluations, n_events;
 } State;
 
@@ -101,18 +102,18 @@ typedef struct {
  * `slots` (values) and `dots` (derivatives in either direction, or three Taylor coefficients), the integrator 8 stages
  * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
  * steady state began; `impact_x` are states before the first impact at an instant. */
-#define WORK_NUMBERS(A)                                                                                                \
-    A(slots, slots + left), A(dots, 3 * slots), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),                  \
-        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),    \
-        A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),           \
-        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),           \
-        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS),   \
-        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),              \
-        A(start_unknowns, system), A(start_values, starts), A(start_residual, larger(m->n_start_values, resets)),      \
-        A(begun, holds), A(d_before, n_d), A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets),                \
-        A(target_values, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), \
-        A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), \
-        A(sizes, members)
+#define WORK_NUMBERS(A)                                                                                              \
+    A(slots, slots + left), A(dots, 3 * slots), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),                \
+        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),  \
+        A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),         \
+        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),         \
+        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS), \
+        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),            \
+        A(start_unknowns, system), A(start_values, starts), A(start_residual, larger(m->n_start_values, resets)),    \
+        A(delayed, 2 * delays), A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(d_before, n_d),              \
+        A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets), A(respond_d, n_d),    \
+        A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(weights, holds), A(base_weights, holds), \
+        A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), A(sizes, members)
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant */
 #define WORK_INDICES(A)                                                                                          \
@@ -139,8 +140,9 @@ typedef struct Instance {
     double SMOOTH_NUMBERS(FIELD);
     unsigned char STATE_MARKS(FIELD);
     Piece *piece;
-    double *end_look; /* guards and their rates at the end of the last fixed step */
-    double *z;        /* in x: together they are a point */
+    double *past, *past_sizes; /* what delayed values were, see delay.c; their sizes */
+    double *end_look;          /* guards and their rates at the end of the last fixed step */
+    double *z;                 /* in x: together they are a point */
 
     double WORK_NUMBERS(FIELD);
     int WORK_INDICES(FIELD);
@@ -229,7 +231,16 @@ Result meet(Instance *c, double keep, int *any);
 Result renew(Instance *c);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before);
+/* delay.c */
+#define MOST_PAST 8192 /* rows */
+void keep_past(Instance *c, double t, const double *point, double order);
+void keep_piece(Instance *c, double end);
+void keep_before_change(Instance *c);
+int delays_due(const Instance *c);
+Result reach_instant(Instance *c);
+Result leave_instant(Instance *c, int happened);
 /* events.c */
+double just_after(const State *s);
 int guard_active(const Instance *c, int guard);
 double next_moment(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);

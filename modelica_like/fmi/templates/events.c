@@ -26,10 +26,10 @@ int guard_active(const Instance *c, int guard) {
 /* Room for a mark per transition; none wants to fire yet. */
 unsigned char *nothing_wanting(Instance *c) { return memset(c->wishes, 0, (size_t)c->model->n_transitions); }
 
-static double just_after(const State *s) { return s->t + SAME_TIME * fmax(1, fabs(s->t)); }
+double just_after(const State *s) { return s->t + SAME_TIME * fmax(1, fabs(s->t)); }
 
 double next_moment(Instance *c) {
-    double *moments = c->guards, next = INFINITY;
+    double *moments = c->guards, next = c->model->n_delays > 0 ? c->state.delayed_until : INFINITY;
     if (c->model->n_moments == 0) return next;
     evaluate_now(c, &c->model->tapes.moments, moments);
     for (int k = 0; k < c->model->n_transitions; k++) {
@@ -246,10 +246,11 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
    no state jumped: rates do, and importers restart only when told that states have changed. */
 Result update_discrete(Instance *c, int *restart, double *next) {
     double before = c->state.n_events;
-    *restart = c->state.inputs_changed;
-    if (*restart && (!check_tables(c) || !renew(c))) return RESULT_ERROR;
+    int changed = c->state.inputs_changed;
+    *restart = changed | delays_due(c);
+    if (changed && (!check_tables(c) || !renew(c))) return RESULT_ERROR;
     c->state.inputs_changed = 0;
-    if (!handle_event(c)) return RESULT_ERROR;
+    if (!handle_event(c) || (changed && !leave_instant(c, 1))) return RESULT_ERROR;
     *restart |= c->state.n_events != before;
     *next = next_moment(c);
     return RESULT_OK;

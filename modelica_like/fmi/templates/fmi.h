@@ -125,6 +125,7 @@ Status FMI(CompletedIntegratorStep)(void *instance, FMI(Boolean) noSetFMUStatePr
     ENTER(CompletedIntegratorStep, PHASE_CONTINUOUS);
     NEED(1, enterEventMode, terminateSimulation);
     if (!settle(c)) return FMI(Error);
+    keep_past(c, c->state.t, c->x, -1);
     *enterEventMode = find_wanting(c, nothing_wanting(c), 1) != 0;
     *terminateSimulation = 0;
     return FMI(OK);

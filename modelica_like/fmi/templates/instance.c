@@ -56,9 +56,10 @@ static uint64_t lay_out(Instance *c, double *memory) {
     const Model *m = c->model;
     Strike *strike = &c->strike;
     uint64_t n = m->n_unknowns, n_x = m->n_x, n_z = m->n_z, n_d = m->n_d, holds = m->n_holds, guards = m->n_guards;
-    uint64_t starts = m->n_starts, slots = m->n_slots, steady = m->settings->steady ? m->n_steady : 0, used = 0;
-    uint64_t members = m->most_members + 1, ideal = m->n_ideals > 0 ? n_z : 0, dense = n_z * n_z, left = 0;
+    uint64_t starts = m->n_starts, slots = m->n_slots, delays = m->n_delays, used = 0, left = 0;
+    uint64_t members = m->most_members + 1, ideal = m->n_ideals > 0 ? n_z : 0, dense = n_z * n_z;
     uint64_t jacobian = larger(m->n_jacobian, m->n_start_jacobian), system = larger(n, m->start.size);
+    uint64_t steady = m->settings->steady ? m->n_steady : 0;
     uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), larger(m->n_updates, holds + m->n_ideals));
     uint64_t small = larger(larger(guards, m->n_moments), larger(larger(m->n_start_modes, n_d), m->n_derived));
     uint64_t outputs = larger(larger(n, m->n_nodes), larger(larger(m->n_derived, m->n_moments), 2 * guards));
@@ -69,6 +70,8 @@ static uint64_t lay_out(Instance *c, double *memory) {
     SMOOTH_NUMBERS(OF_INSTANCE);
     c->n_smooth = (size_t)used;
     TAKE(c->end_look, m->settings->fixed_step > 0 ? 2 * guards : 0);
+    TAKE(c->past, delays > 0 ? MOST_PAST * (2 + delays) : 0);
+    TAKE(c->past_sizes, delays);
     STATE_MARKS(OF_INSTANCE);
     c->piece = take(memory, &used, piece_size(m), 1);
     c->n_numbers = (size_t)used;

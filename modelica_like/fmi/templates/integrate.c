@@ -85,25 +85,26 @@ Result take_changes(Instance *c, int *event) {
     c->state.inputs_changed = c->state.z_valid = c->variables_valid = 0;
     if (!renew(c) || !settle(c)) return RESULT_ERROR;
     *event = find_wanting(c, nothing_wanting(c), 1) || pushed(c);
-    return RESULT_OK;
+    return leave_instant(c, 1);
 }
 
 static Result pass_event(Instance *c) {
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
-    int located = s->event_pending, ticks = c->model->n_moments > 0 && !located;
+    int located = s->event_pending, ticks = !located && (c->model->n_moments > 0 || delays_due(c));
     size_t size = (size_t)c->model->n_x * sizeof(double);
-    double *x = c->first, *rates = c->first_rates, step = s->step;
+    double *x = c->first, *rates = c->first_rates, step = s->step, events = s->n_events;
     if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
     s->step = 0;
     s->z_valid = 0;
-    if (!settle(c)) return RESULT_ERROR;
+    if (!settle(c) || !reach_instant(c)) return RESULT_ERROR;
     if (ticks) evaluate_now(c, &c->model->tapes.rates, rates);
     memcpy(x, c->x, size);
     if (!iterate_events(c, wanting, located)) return RESULT_ERROR;
     s->z_valid = 1;
+    if (!leave_instant(c, s->n_events != events)) return RESULT_ERROR;
     if (!ticks || memcmp(x, c->x, size) != 0) return RESULT_OK;
     evaluate_now(c, &c->model->tapes.rates, c->rhs);
     if (memcmp(rates, c->rhs, size) == 0) s->step = step; /* a tick without effect on what moves */
@@ -121,7 +122,7 @@ Result finish(Instance *c) {
     return handle_event(c);
 }
 
-int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
+int is_due(Instance *c) { return delays_due(c) || (c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0)); }
 
 /* Fixed steps go to whole numbers of them only. */
 Result check_whole(Instance *c, double size) {
@@ -172,6 +173,7 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
             if (!take_step(c, limit)) return FAILED;
         }
         if (c->piece->end > target) return move_to(c, target) ? REACHED : FAILED;
+        keep_piece(c, c->piece->end);
         if (!move_to(c, c->piece->end)) return FAILED;
         s->piece_valid = 0;
         s->at_event = s->event_pending || is_due(c);

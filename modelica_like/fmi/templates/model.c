@@ -2,7 +2,7 @@
  * stands in a file, nothing is read or written outside of the tables. */
 #include "model.h"
 
-#define FORMAT 4
+#define FORMAT 5
 #define UNKNOWN (-1)
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
 
@@ -35,14 +35,14 @@ static const struct {
     TABLE(transitions, n_transitions), TABLE(guard_transition, n_guards), TABLE(resets, n_resets),
     TABLE(reset_nodes, n_reset_nodes), TABLE(updates, n_updates), TABLE(modes, n_modes),
     TABLE(mode_names, n_mode_names), TABLE(holds, n_holds), TABLE(circuits, n_circuits), TABLE(members, n_members),
-    TABLE(ideals, n_ideals), TABLE(units, n_units), TABLE(start_modes, n_start_modes),
+    TABLE(ideals, n_ideals), TABLE(units, n_units), TABLE(delays, n_delays), TABLE(start_modes, n_start_modes),
     TABLE(start_direct, n_start_direct), TABLE(start_default, n_start_default), TABLE(start_guess, n_start_guess),
     TABLE(start_rows, n_start_unknowns), TABLE(start_dependent, n_start_dependent), TABLE(start_zero, n_start_zero),
     TABLE(start_columns, n_start_unknowns), TABLE(steady, n_steady), TABLE(jacobian_to_step, n_jacobian),
     TABLE(step_diagonal, n_x), QR(step), QR(start), TAPE(rates), TAPE(jacobian), TAPE(alg), TAPE(alg_jacobian),
     TAPE(variables), TAPE(guards), TAPE(guards_soon), TAPE(moments), TAPE(resets), TAPE(updates),
     TAPE(start_conditions), TAPE(start_values), TAPE(discrete_starts), TAPE(hold_terms), TAPE(determinants),
-    TAPE(start_system), TAPE(start_jacobian), TAPE(derived)};
+    TAPE(start_system), TAPE(start_jacobian), TAPE(derived), TAPE(delays)};
 enum { N_TABLES = sizeof tables / sizeof tables[0] };
 
 /* Tells that a file is no model; returns 0. */
@@ -152,9 +152,9 @@ static int check_sizes(const Model *m, char *message) {
         RESULTS(alg_jacobian, n_z * n_z), RESULTS(guards, 2 * (int64_t)m->n_guards), RESULTS(guards_soon, m->n_guards),
         RESULTS(updates, m->n_updates), RESULTS(start_conditions, m->n_start_modes), RESULTS(discrete_starts, m->n_d),
         RESULTS(hold_terms, 4 * (int64_t)m->n_holds), RESULTS(determinants, m->n_determinants),
-        RESULTS(start_jacobian, m->start.n_nonzeros), {"step", m->step.size, m->n_unknowns},
-        {"start", m->start.size, m->n_start_unknowns}, {"guesses", m->n_guesses, m->n_unknowns},
-        {"units", m->n_units, m->n_holds + m->n_ideals > 0 ? m->n_nodes : 0}};
+        RESULTS(delays, 2 * (int64_t)m->n_delays), RESULTS(start_jacobian, m->start.n_nonzeros),
+        {"step", m->step.size, m->n_unknowns}, {"start", m->start.size, m->n_start_unknowns},
+        {"guesses", m->n_guesses, m->n_unknowns}, {"units", m->n_units, m->n_holds + m->n_ideals > 0 ? m->n_nodes : 0}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++)
         if (sizes[k].found != sizes[k].wanted) return damaged(message, sizes[k].name);
     if (m->n_steady > m->n_unknowns) return damaged(message, "steady");
@@ -187,9 +187,9 @@ static int check_indices(const Model *m, char *message) {
         COLUMN(holds, state, n_holds, -1, m->n_x), COLUMN(holds, reaction, n_holds, -1, m->n_nodes),
         INDEX(holds, approach, n_d), TEXT(holds, name), ARRAY(members, n_members, n_holds), INDEX(ideals, row, n_z),
         INDEX(ideals, mode, n_modes), INDEX(ideals, zero, n_nodes), INDEX(ideals, other, n_nodes), TEXT(ideals, name),
-        INDEX(circuits, first_member, n_members + 1), INDEX(circuits, n_members, n_members + 1),
-        INDEX(circuits, first, n_d + 1), INDEX(start_modes, mode, n_modes), INDEX(start_direct, position, n_x),
-        INDEX(start_direct, start, n_starts), INDEX(start_default, position, n_x),
+        TEXT(delays, name), INDEX(delays, first, n_d - DELAY_TERMS - 1), INDEX(circuits, first_member, n_members + 1),
+        INDEX(circuits, n_members, n_members + 1), INDEX(circuits, first, n_d + 1), INDEX(start_modes, mode, n_modes),
+        INDEX(start_direct, position, n_x), INDEX(start_direct, start, n_starts), INDEX(start_default, position, n_x),
         INDEX(start_default, start, n_starts), INDEX(start_guess, position, n_unknowns),
         INDEX(start_guess, start, n_starts), COLUMN(start_rows, start, n_start_unknowns, -1, m->n_starts),
         COLUMN(start_rows, row, n_start_unknowns, 0, m->n_start_values), INDEX(start_dependent, start, n_starts),

@@ -97,6 +97,10 @@ typedef struct {
     double nominal;
 } Ideal;
 typedef struct {
+    int name, first; /* entry of d where its numbers begin: terms of a series, its begin, 2 over its length */
+} Delay;
+#define DELAY_TERMS 16 /* as in delay.py */
+typedef struct {
     int position, start;
     double factor;
 } StartOf;
@@ -117,7 +121,7 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables, n_rising, n_transitions, n_guards;
     int n_resets, n_reset_nodes, n_updates, n_modes, n_mode_names, n_holds, n_circuits, n_members, n_ideals, n_units;
     int n_start_modes, n_start_direct, n_start_default, n_start_guess, n_start_dependent, n_guesses, n_start_zero;
-    int n_start_unknowns, n_steady, n_jacobian;
+    int n_start_unknowns, n_steady, n_jacobian, n_delays;
     const Settings *settings;
     const char *text, *token;
     const double *constants, *parameters, *parameter_min, *parameter_max, *inputs, *guesses, *nominals;
@@ -130,6 +134,7 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     const Held *holds;
     const Circuit *circuits; /* those that depend on each other; in d from `first`: switches, then shares */
     const Ideal *ideals;
+    const Delay *delays; /* in the order of the tape's results, each with value and time */
     const StartMode *start_modes;
     const StartOf *start_direct, *start_default, *start_guess;
     const StartRow *start_rows, *start_dependent;
@@ -143,7 +148,7 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     struct {
         Tape rates, jacobian, alg, alg_jacobian, variables, guards, guards_soon, moments, resets, updates,
             start_conditions, start_values, discrete_starts, hold_terms, determinants, start_system, start_jacobian,
-            derived;
+            derived, delays;
     } tapes;
 
     /* What follows from the sizes of the tables. */

@@ -101,6 +101,7 @@ static void touch(Instance *c) {
 
 /* Their lines begin anew at the present time. */
 static void touch_inputs(Instance *c) {
+    keep_before_change(c);
     for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, c->state.t);
     c->state.u_time = c->state.t;
     touch(c);
@@ -127,6 +128,7 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
             value < low ? "least" : "most", value < low ? low : high);
     if (c->p[v->index] == value) return RESULT_OK;
     if (!before_start(&c->state)) mark_tuned(c, v->index);
+    keep_before_change(c);
     c->p[v->index] = value;
     touch(c);
     return RESULT_OK;
