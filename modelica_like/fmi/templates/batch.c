@@ -53,13 +53,11 @@ static const double *variables_at(Batch *b, double t, int now) {
     return c->variables;
 }
 
-/* Takes a result. */
 static void take_result(Batch *b, double t, const double *variables) {
     for (int64_t k = 0; k < b->asked->n_readings; k++) {
         const Reading *one = &b->asked->readings[k];
-        double value, *found = &b->values[k];
         if (one->kind != READ_MAX && one->kind != READ_MIN && one->kind != READ_AREA) continue;
-        value = variables[one->place];
+        double value = variables[one->place], *found = &b->values[k];
         if (one->kind == READ_AREA) *found += 0.5 * (t - b->last) * (value + b->kept[k]);
         else if (isnan(*found) || (one->kind == READ_MAX ? value > *found : value < *found)) *found = value;
         b->kept[k] = value;
@@ -78,7 +76,6 @@ static void add_work(Batch *b, double begin, double end) {
     }
 }
 
-/* Reads the step that has just been taken. */
 static void read_piece(Batch *b) {
     const NativeBatch *a = b->asked;
     double begin = b->c->piece->begin, end = b->c->piece->end;
@@ -103,7 +100,6 @@ static double after_step(Instance *c) {
 
 static void count_change(Instance *c, int transition, int mode, int target) {
     Batch *b = c->environment;
-    (void)transition;
     b->events++;
     for (int64_t k = 0; k < b->asked->n_readings; k++) {
         const Reading *one = &b->asked->readings[k];
@@ -125,7 +121,6 @@ static void add_impact(Instance *c, int held, double energy, int first) {
     }
 }
 
-/* Prepares the readings of a run. */
 static void begin_readings(Batch *b, int64_t run) {
     const NativeBatch *a = b->asked;
     b->values = a->values + run * a->n_readings;
@@ -140,21 +135,17 @@ static void begin_readings(Batch *b, int64_t run) {
 }
 
 /* What a parameter that differs from run to run decides is not worked out: tapes then stay as they are. */
-static void set_numbers(Batch *b, int64_t run) {
+static int start_run(Batch *b, int64_t run) {
+    const NativeBatch *a = b->asked;
     Instance *c = b->c;
     size_t n_p = (size_t)c->model->n_p, n_u = (size_t)c->model->n_u;
-    const double *p = b->asked->parameters + (size_t)run * n_p;
+    const double *p = a->parameters + (size_t)run * n_p;
+    if (!instance_prepare(c, a->start, a->end, a->rtol, a->atol)) return 0;
     for (size_t k = 0; k < n_p && run > 0; k++)
         if (p[k] != p[k - n_p]) mark_tuned(c, (int)k);
     memcpy(c->p, p, n_p * sizeof(double));
-    memcpy(c->u, b->asked->inputs + (size_t)run * n_u, n_u * sizeof(double));
-}
-
-static int start_run(Batch *b, int64_t run) {
-    const NativeBatch *a = b->asked;
-    if (!instance_prepare(b->c, a->start, a->end, a->rtol, a->atol)) return 0;
-    set_numbers(b, run);
-    return start_solve(b->c) && instance_begin(b->c);
+    memcpy(c->u, a->inputs + (size_t)run * n_u, n_u * sizeof(double));
+    return start_solve(c) && instance_begin(c);
 }
 
 /* Returns 0 if the run cannot go on. */
@@ -162,14 +153,12 @@ static int run_to_end(Batch *b) {
     Instance *c = b->c;
     State *s = &c->state;
     while ((s->t < b->asked->end || s->at_event) && !b->failed && !*b->asked->stop) {
-        if (s->at_event) {
-            if (!handle_event(c) || b->events > b->asked->most_events) return 0;
-        } else switch (integrate_to(c, b->asked->end, 1)) {
-                case FAILED: return 0;
-                case AT_EVENT: read_piece(b); break;
-                case REACHED:
-                    if (s->t < b->asked->end) continue;
-            }
+        int passed = s->at_event;
+        if (passed && (!handle_event(c) || b->events > b->asked->most_events)) return 0;
+        Arrival arrival = passed ? AT_EVENT : integrate_to(c, b->asked->end, 1);
+        if (arrival == FAILED) return 0;
+        if (arrival == AT_EVENT && !passed) read_piece(b);
+        if (arrival == REACHED && s->t < b->asked->end) continue;
         if (b->sampled) take_result(b, s->t, variables_at(b, b->c->state.t, 1));
     }
     return !b->failed;
@@ -204,15 +193,14 @@ static int begin_batch(Batch *b, const Model *m) {
 /* Does the runs one after the other; returns how many are done, fewer than asked for if it was stopped, or -1 without
  * memory. */
 EXPORTED int64_t native_batch(const Model *m, const NativeBatch *asked) {
-    Batch b = {NULL, asked, NULL, NULL, 0, 0, 0, 0, 0, 0};
-    int64_t run = -1;
-    if (begin_batch(&b, m))
-        for (run = 0; run < asked->n_runs && !*asked->stop; run++) {
-            begin_readings(&b, run);
-            asked->failed[run] = !start_run(&b, run) || !run_to_end(&b) || !finish(b.c);
-            if (!asked->failed[run] && !*asked->stop) read_end(&b);
-            if (*asked->stop) break;
-        }
+    Batch b = {.asked = asked};
+    int64_t run = begin_batch(&b, m) ? 0 : -1;
+    for (; run >= 0 && run < asked->n_runs && !*asked->stop; run++) {
+        begin_readings(&b, run);
+        asked->failed[run] = !start_run(&b, run) || !run_to_end(&b) || !finish(b.c);
+        if (*asked->stop) break;
+        if (!asked->failed[run]) read_end(&b);
+    }
     if (b.c != NULL) instance_free(b.c);
     free(b.kept);
     return run;

@@ -11,6 +11,9 @@
 #include "model.h"
 #include "modelica_like.h" /* EXPORTED: what programs see that load this library */
 
+/* Much of the standard is for what no model here has. */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+
 /* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
    Versions can only be told to a linker that is given libm. */
 #if defined(OLD_GLIBC) && defined(__GLIBC__) && defined(__x86_64__)
@@ -33,8 +36,6 @@ OLD(fmod);
 
 /* Zero is failure: results are asked for and joined like conditions. */
 typedef enum { RESULT_ERROR, RESULT_OK, RESULT_DISCARD } Result;
-
-/* ---- state and instance ----------------------------------------------------------------------------------------- */
 
 typedef enum {
     PHASE_INSTANTIATED = 1,
@@ -83,14 +84,13 @@ typedef struct { /* a tape for the present modes, see special.c */
     int first_known, uses;
     uint64_t belongs_to;
 } Special;
-enum { N_SPECIALS = 6 }; /* of the first tapes of a model */
+enum { N_SPECIALS = 6 }; /* of the first tapes of a model, from its rates to its guards */
 
 /* Arrays with their sizes, for which lay_out has short names. */
 #define FIELD(name, size) *name
 
-/* An impact: of all motions that modes hold, and its jump of the states. */
+/* An impact: of all motions that modes hold, and its jump of the states; `knocked` is let go in the impact itself. */
 #define STRIKE_NUMBERS(A) A(before, holds), A(approach, holds), A(impulse, holds), A(reaction, holds), A(jump, n)
-/* knocked: let go in the impact itself */
 #define STRIKE_MARKS(A) A(entering, holds), A(loose, holds), A(held, holds), A(knocked, holds)
 typedef struct {
     double STRIKE_NUMBERS(FIELD);
@@ -113,13 +113,12 @@ typedef struct {
         A(delayed, 2 * delays), A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(d_before, n_d),              \
         A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets), A(respond_d, n_d),    \
         A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(weights, holds), A(base_weights, holds), \
-        A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), A(sizes, members), A(zeros, members)
-/* order: pivots of the implicit equations */
+        A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), A(sizes, members)
+/* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
+ * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant */
 #define WORK_INDICES(A)                                                                                          \
     A(order, n_z), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), A(member, members), \
         A(pivots, members), A(same, slots), A(places_of_slots, slots)
-/* open_rows: implicit equations that depend on others; asked: variables that somebody reads; tuned: parameters that
- * have changed in a run; entered: what has begun to hold at an instant */
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
@@ -127,9 +126,9 @@ typedef struct {
 
 typedef struct Gradient Gradient; /* see gradient.c */
 
-/* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns. */
+/* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns; `wanting` transitions fire at the
+ * end of the piece. */
 #define SMOOTH_NUMBERS(A) A(x, n), A(p, m->n_p), A(u, m->n_u), A(u_rate, m->n_u), A(d, n_d), A(start_value, starts)
-/* wanting: transitions that fire at the end of the piece */
 #define STATE_MARKS(A) A(mode_given, n_d), A(start_given, starts), A(wanting, m->n_transitions)
 
 typedef struct Instance {
@@ -168,6 +167,7 @@ typedef struct Instance {
     int co_simulation, event_mode_used, early_return_allowed, inputs_move;
     Allocate allocate;
     Release release;
+    int passing;         /* a gradient passes an instant again, of which nobody is told */
     int bounded;         /* the work of a step is bounded: iterations end early */
     int budget;          /* rounds of events and further pieces that are left of a bounded step */
     int variables_valid; /* which values belong to the present point, see values.c */
@@ -211,7 +211,7 @@ double input_at(const Instance *c, int k, double t);
 /* start.c */
 void start_values(Instance *c);
 Result start_solve(Instance *c);
-void choose_modes(Instance *c, unsigned char *decided);
+void choose_modes(Instance *c);
 /* holds.c */
 #define UNLIMITED 1e30
 #define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */
@@ -229,7 +229,6 @@ int pushed(Instance *c);
 #define GIVEN_BACK 1e-3 /* of the largest current: none where modes return, as it ends within the time resolution */
 Result meet(Instance *c, double keep, int *any);
 Result renew(Instance *c);
-int same_modes(const Instance *c, const double *before);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before);
 /* delay.c */
@@ -303,6 +302,7 @@ void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *resu
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c);
 /* native.c */
+Instance *instance_for(const Model *m, void *environment);
 Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol);
 Result instance_begin(Instance *c);
 /* gradient.c */
@@ -315,7 +315,6 @@ void gradient_end(Instance *c);
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 /* instance.c */
 Instance *instance_new(Instance bare, const char *token);
-Instance *instance_for(const Model *m, void *environment);
 Instance *instance_open(Instance bare, const char *token, const char *location);
 void instance_free(Instance *c);
 void instance_reset(Instance *c);

@@ -71,7 +71,6 @@ static void seed_knowns(Instance *c, const uint32_t *knowns, size_t n, const dou
 /* Newton's last step once more, with what the start equations change by instead of what they lack. */
 static Result start_system_tangent(Instance *c, const double *start_dots) {
     const Model *m = c->model;
-    double *step = c->start_unknowns;
     evaluate_now(c, &m->tapes.start_system, c->start_residual);
     tape_run(&m->tapes.start_jacobian, c->slots, c->jacobian);
     if (!qr_factor(&m->start, c->jacobian, c))
@@ -79,11 +78,11 @@ static Result start_system_tangent(Instance *c, const double *start_dots) {
     tangent_now(c, &m->tapes.start_system, c->start_residual);
     for (int k = 0; k < m->n_start_unknowns; k++) {
         int start = m->start_rows[k].start;
-        step[k] = (start < 0 ? 0 : start_dots[start]) - c->start_residual[m->start_rows[k].row];
+        c->start_unknowns[k] = (start < 0 ? 0 : start_dots[start]) - c->start_residual[m->start_rows[k].row];
     }
-    qr_solve(&m->start, c, step);
+    qr_solve(&m->start, c, c->start_unknowns);
     for (int k = 0; k < m->n_start_unknowns; k++)
-        if (m->start_columns[k] < m->n_x) c->dots[m->slot_x + m->start_columns[k]] = step[k];
+        if (m->start_columns[k] < m->n_x) c->dots[m->slot_x + m->start_columns[k]] = c->start_unknowns[k];
     return RESULT_OK;
 }
 
@@ -120,7 +119,6 @@ static const Tape *tape_of(const Model *m, int kind) {
 
 static int is_idle(const Instance *c, const Variable *v) { return v->kind == KIND_GUARD && !guard_active(c, v->index); }
 
-/* Reads derivatives off the tangents of all arguments. */
 void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride) {
     const Model *m = c->model;
     double *dots = c->dots, *values = c->outputs;
@@ -151,17 +149,16 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
 /* From bars of z to bars of the arguments, through the implicit equations. */
 static void adjoint_of_implicit(Instance *c, int regular) {
     const Model *m = c->model;
-    double *residual = c->residual;
     if (m->n_z == 0) return;
     for (int k = 0; k < m->n_z; k++) c->vector[k] = -c->dots[m->slot_z + k];
     if (regular) lu_solve_transposed(m->n_z, c->dense_matrix, c->order, c->vector);
     else {
-        memcpy(residual, c->vector, m->n_z * sizeof(double));
+        memcpy(c->residual, c->vector, m->n_z * sizeof(double));
         evaluate_now(c, &m->tapes.alg_jacobian, c->dense_matrix);
-        least_squares(m->n_z, m->n_z, c->dense_matrix, residual, c->vector);
+        least_squares(m->n_z, m->n_z, c->dense_matrix, c->residual, c->vector);
     }
     memset(c->dots + m->slot_z, 0, m->n_z * sizeof(double));
-    evaluate_now(c, &m->tapes.alg, residual);
+    evaluate_now(c, &m->tapes.alg, c->residual);
     tape_adjoint(&m->tapes.alg, c->slots, c->dots, c->vector);
 }
 

@@ -55,10 +55,7 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
         for (int k = 0; k < m->n_guards; k++)
             if (number_or_false(values[k]) > 0) wanting[m->guard_transition[k]] = 1;
     }
-    for (int k = 0; k < m->n_transitions; k++) {
-        wanting[k] = wanting[k] && is_source(c, &m->transitions[k]);
-        any |= wanting[k];
-    }
+    for (int k = 0; k < m->n_transitions; k++) any |= wanting[k] = wanting[k] && is_source(c, &m->transitions[k]);
     return any;
 }
 
@@ -85,14 +82,13 @@ void move_states(Instance *c, const int *nodes, const double *values, int count)
     for (int k = 0; k < c->model->n_x; k++) c->x[k] += step[k];
 }
 
-/* Tells that a mode changes. */
 void note_change(Instance *c, int name, int transition, int mode, int target) {
     const Model *m = c->model;
     const Mode *one = &m->modes[mode];
     const int *names = m->mode_names + one->first_name;
     double before = c->d[mode];
     c->state.n_events++;
-    if (c->noted != NULL) c->noted(c, transition, mode, target);
+    if (c->noted != NULL && !c->passing) c->noted(c, transition, mode, target);
     if (before >= 0 && before < one->n_names && target >= 0 && target < one->n_names)
         report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, text_of(m, name),
             text_of(m, names[(int)before]), text_of(m, names[target]));
@@ -190,11 +186,10 @@ static void keep_wanting(Instance *c, const double *soon, unsigned char *wanting
 
 /* Before one of several that hold a motion gives way, let the others take more. */
 static Result share_anew(Instance *c, unsigned char *wanting) {
-    double *soon = c->guards;
     if (!anything_shared(c)) return RESULT_OK;
     if (!share_and_solve(c)) return RESULT_ERROR;
-    evaluate_now(c, &c->model->tapes.guards_soon, soon);
-    keep_wanting(c, soon, wanting);
+    evaluate_now(c, &c->model->tapes.guards_soon, c->guards);
+    keep_wanting(c, c->guards, wanting);
     return RESULT_OK;
 }
 
@@ -215,10 +210,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             if (!meet(c, -1, &met)) return RESULT_ERROR;
             if (met) find_wanting(c, wanting, 1);
         }
-        for (int k = 0; k < m->n_transitions; k++) {
-            if (any && round >= TOGETHER) wanting[k] = 0;
-            any |= wanting[k];
-        }
+        for (int k = 0; k < m->n_transitions; k++) any |= wanting[k] = wanting[k] && (!any || round < TOGETHER);
         if (!gradient_round(c, round, wanting, any | changes)) return RESULT_OK;
         any = any_of(wanting, m->n_transitions); /* it may have told others to fire */
         if (c->bounded && --c->budget < 1) {
@@ -233,8 +225,9 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         c->variables_valid = 0;
         if (any && (!solve_now(c, 0) || !stop_motions(c, before) || !check_singular(c))) return RESULT_ERROR;
         if (any && m->n_ideals > 0) {
-            double keep = round > 0 && same_modes(c, c->d_earlier) ? GIVEN_BACK : 0;
-            if (!meet(c, keep, &met)) return RESULT_ERROR;
+            int same = round > 0; /* modes return */
+            for (int k = 0; k < m->n_ideals; k++) same &= c->d[m->ideals[k].mode] == c->d_earlier[m->ideals[k].mode];
+            if (!meet(c, same ? GIVEN_BACK : 0, &met)) return RESULT_ERROR;
         }
         if (!update_once(c, &changes)) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);

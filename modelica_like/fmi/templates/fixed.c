@@ -68,9 +68,7 @@ static Result fire_here(Instance *c, int *fired) {
     unsigned char *wanting = nothing_wanting(c);
     c->state.at_event = c->state.looked = 0;
     *fired = find_wanting(c, wanting, 1);
-    if (!*fired) return RESULT_OK;
-    c->variables_valid = 0;
-    return iterate_events(c, wanting, 1);
+    return !*fired || iterate_events(c, wanting, 1);
 }
 
 /* Goes from the present point to `limit`, or to an event before it while the budget allows for one. */

@@ -5,9 +5,6 @@
 
 #include "core.h"
 
-/* Much of the standard is for what no model here has. */
-#pragma GCC diagnostic ignored "-Wunused-parameter"
-
 #define JOIN_(a, b) a##b
 #define JOIN(a, b) JOIN_(a, b)
 #define TEXT_(name) #name
@@ -35,8 +32,6 @@ typedef FMI(Status) Status;
 static inline Status status(Result result) {
     return result == RESULT_OK ? FMI(OK) : result == RESULT_DISCARD ? FMI(Discard) : FMI(Error);
 }
-
-static inline Status refuse(Instance *c, const char *why) { return status(fail(c, "%s", why)); }
 
 /* `names`: (a, b, c). */
 static inline int all_given(Instance *c, const void *const *given, const char *names) {
@@ -75,12 +70,12 @@ static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what
         return status(call);           \
     }
 /* A function that changes nothing but the phase. */
-#define CHANGE_PHASE(name, from, to, forbidden, why)          \
-    Status FMI(name)(void *instance) {                        \
-        ENTER(name, from);                                    \
-        if (forbidden) return refuse(c, TEXT(FMI(name)) why); \
-        c->state.phase = to;                                  \
-        return FMI(OK);                                       \
+#define CHANGE_PHASE(name, from, to, forbidden, why)                \
+    Status FMI(name)(void *instance) {                              \
+        ENTER(name, from);                                          \
+        if (forbidden) return status(fail(c, TEXT(FMI(name)) why)); \
+        c->state.phase = to;                                        \
+        return FMI(OK);                                             \
     }
 
 static inline Status failed(Instance *c) {
@@ -94,8 +89,6 @@ static inline Result get_mode(Instance *c, uint32_t reference, INTEGER *value) {
     if (result) *value = (INTEGER)number;
     return result;
 }
-
-/* ---- life of an instance ---------------------------------------------------------------------------------------- */
 
 void FMI(FreeInstance)(void *instance) {
     if (instance != NULL) instance_free(instance);
@@ -125,8 +118,6 @@ CHANGE_PHASE(Terminate, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_FAIL
 
 DO(Reset, ANY_PHASE, (instance_reset(c), RESULT_OK))
 
-/* ---- Model Exchange --------------------------------------------------------------------------------------------- */
-
 CHANGE_PHASE(EnterContinuousTimeMode, PHASE_EVENT, PHASE_CONTINUOUS, c->co_simulation, " belongs to Model Exchange.")
 
 Status FMI(CompletedIntegratorStep)(void *instance, FMI(Boolean) noSetFMUStatePriorToCurrentPoint,
@@ -153,8 +144,6 @@ GET_STATES(GetDerivatives, derivatives, READABLE, get_derivatives(c, derivatives
 GET_STATES(GetContinuousStates, x, READABLE, memcpy(x, c->x, n * sizeof(double)))
 GET_STATES(GetNominals, x_nominal, ANY_PHASE, memcpy(x_nominal, c->model->nominals, n * sizeof(double)))
 GET_ALL(GetEventIndicators, indicators, READABLE, c->model->n_guards, "event indicators", get_indicators(c, indicators))
-
-/* ---- copies of the state ---------------------------------------------------------------------------------------- */
 
 CALL(JOIN(Get, FMUState), ANY_PHASE, GIVEN(1, FMUState), state_copy_out(c, FMUState), void **FMUState)
 CALL(JOIN(Set, FMUState), ANY_PHASE, GIVEN(1, FMUState), state_copy_in(c, FMUState), void *FMUState)

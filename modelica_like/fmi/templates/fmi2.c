@@ -28,13 +28,16 @@ const char *fmi2GetVersion(void) { return fmi2Version; }
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
     fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions, fmi2Boolean visible,
     fmi2Boolean loggingOn) {
-    Instance bare = {.name = instanceName, .log_enabled = loggingOn, .co_simulation = fmuType == fmi2CoSimulation};
     if (functions == NULL || (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation)) return NULL;
-    bare.environment = functions->componentEnvironment;
-    bare.logger = (AnyFunction)functions->logger;
-    bare.log = functions->logger ? log_fmi2 : NULL;
-    bare.allocate = functions->allocateMemory && functions->freeMemory ? functions->allocateMemory : calloc;
-    bare.release = functions->allocateMemory && functions->freeMemory ? functions->freeMemory : free;
+    int own = functions->allocateMemory == NULL || functions->freeMemory == NULL;
+    Instance bare = {.name = instanceName,
+        .log_enabled = loggingOn,
+        .co_simulation = fmuType == fmi2CoSimulation,
+        .environment = functions->componentEnvironment,
+        .logger = (AnyFunction)functions->logger,
+        .log = functions->logger ? log_fmi2 : NULL,
+        .allocate = own ? calloc : functions->allocateMemory,
+        .release = own ? free : functions->freeMemory};
     return instance_open(bare, fmuGUID, fmuResourceLocation);
 }
 
@@ -43,8 +46,6 @@ CALL(SetupExperiment, PHASE_INSTANTIATED, 1,
     fmi2Real tolerance, fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 CHANGE_PHASE(EnterInitializationMode, PHASE_INSTANTIATED, PHASE_INITIALIZATION, 0, "")
 CHANGE_PHASE(EnterEventMode, PHASE_CONTINUOUS | PHASE_EVENT, PHASE_EVENT, 0, "")
-
-/* ---- values ----------------------------------------------------------------------------------------------------- */
 
 #define REFERENCES const fmi2ValueReference vr[], size_t nvr
 #define VALUES(name, phases, type, call) EACH(name, phases, nvr, GIVEN(nvr, vr, value), call, REFERENCES, type value[])
@@ -66,8 +67,6 @@ CALL(GetDirectionalDerivative, READABLE, GIVEN(nUnknown, vUnknown_ref, dvUnknown
     const fmi2ValueReference vUnknown_ref[], size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown,
     const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 
-/* ---- Model Exchange --------------------------------------------------------------------------------------------- */
-
 fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInfo) {
     double next;
     int restart;
@@ -82,8 +81,6 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInf
     eventInfo->nextEventTime = isfinite(next) ? next : 0;
     return fmi2OK;
 }
-
-/* ---- Co-Simulation ---------------------------------------------------------------------------------------------- */
 
 EACH(SetRealInputDerivatives, PHASE_INITIALIZATION | PHASE_STEP, nvr, GIVEN(nvr, vr, order, value),
     set_input_rate(c, vr[k], order[k], value[k]), REFERENCES, const fmi2Integer order[], const fmi2Real value[])

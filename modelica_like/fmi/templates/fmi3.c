@@ -12,17 +12,18 @@ static void log_fmi3(const Instance *c, int result, const char *category, const 
     ((fmi3LogMessageCallback)c->logger)(c->environment, status((Result)result), category, message);
 }
 
-/* ---- life of an instance ---------------------------------------------------------------------------------------- */
-
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
     fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage) {
-    Instance bare = {.name = instanceName, .log_enabled = loggingOn, .allocate = calloc, .release = free};
-    bare.environment = instanceEnvironment;
-    bare.logger = (AnyFunction)logMessage;
-    bare.log = logMessage ? log_fmi3 : NULL;
+    Instance bare = {.name = instanceName,
+        .log_enabled = loggingOn,
+        .allocate = calloc,
+        .release = free,
+        .environment = instanceEnvironment,
+        .logger = (AnyFunction)logMessage,
+        .log = logMessage ? log_fmi3 : NULL};
     return instance_open(bare, instantiationToken, resourcePath);
 }
 
@@ -64,21 +65,15 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     return NULL;
 }
 
-fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
-    fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-    ENTER(EnterInitializationMode, PHASE_INSTANTIATED);
-    if (!set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime)) return fmi3Error;
-    c->state.phase = PHASE_INITIALIZATION;
-    return fmi3OK;
-}
-
+CALL(EnterInitializationMode, PHASE_INSTANTIATED,
+    set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime),
+    (c->state.phase = PHASE_INITIALIZATION, RESULT_OK), fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
+    fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 CHANGE_PHASE(EnterConfigurationMode, PHASE_INSTANTIATED, PHASE_CONFIGURATION, 0, "")
 CHANGE_PHASE(ExitConfigurationMode, PHASE_CONFIGURATION, PHASE_INSTANTIATED, 0, "")
 CHANGE_PHASE(EnterEventMode, PHASE_CONTINUOUS | PHASE_STEP, PHASE_EVENT, c->co_simulation && !c->event_mode_used,
     ": this instance was made with eventModeUsed = false.")
 CHANGE_PHASE(EnterStepMode, PHASE_EVENT, PHASE_STEP, !c->co_simulation, " belongs to Co-Simulation.")
-
-/* ---- values ----------------------------------------------------------------------------------------------------- */
 
 /* Values of arrays lie one behind the other. */
 static size_t elements(const Instance *c, fmi3ValueReference reference, fmi3ValueReference *first) {
@@ -149,8 +144,6 @@ REFUSED(GetNumberOfVariableDependencies, SEE_DESCRIPTION, fmi3ValueReference v, 
 REFUSED(GetVariableDependencies, SEE_DESCRIPTION, fmi3ValueReference v, size_t a[], fmi3ValueReference r[], size_t b[],
     fmi3DependencyKind k[], size_t n)
 
-/* ---- derivatives ------------------------------------------------------------------------------------------------ */
-
 #define DERIVATIVES                                                                                           \
     const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns, \
         const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity
@@ -162,8 +155,6 @@ CALL(GetAdjointDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_T
     SIZED(nSeed, nUnknowns, "seeds, one per unknown") && GIVEN(nUnknowns, unknowns, seed) &&
         SIZED(nSensitivity, nKnowns, "sensitivities, one per known") && GIVEN(nKnowns, knowns, sensitivity),
     adjoint(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity), DERIVATIVES)
-
-/* ---- events ----------------------------------------------------------------------------------------------------- */
 
 DO(EvaluateDiscreteStates, PHASE_INITIALIZATION | PHASE_EVENT, make_consistent(c))
 
@@ -183,13 +174,9 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     return fmi3OK;
 }
 
-/* ---- Model Exchange --------------------------------------------------------------------------------------------- */
-
 #define COUNT(name, count) CALL(name, ANY_PHASE, GIVEN(1, n), (*n = (size_t)(count), RESULT_OK), size_t *n)
 COUNT(GetNumberOfEventIndicators, c->model->n_guards)
 COUNT(GetNumberOfContinuousStates, c->model->n_x)
-
-/* ---- Co-Simulation ---------------------------------------------------------------------------------------------- */
 
 EACH(GetOutputDerivatives, PHASE_STEP | PHASE_TERMINATED, n, SIZED(n, nVr, "values") && GIVEN(n, vr, orders, values),
     output_rate(c, vr[k], orders[k], &values[k]), const fmi3ValueReference vr[], size_t nVr, const fmi3Int32 orders[],

@@ -33,7 +33,7 @@ typedef struct { /* derivatives of a run by one of its values */
 } Tangent;
 
 struct Gradient {
-    int n, passing, n_rounds;
+    int n, n_rounds;
     Tangent *tangents;
     void *before, *behind; /* copies of the state at an instant */
     double *rates;         /* before it */
@@ -44,7 +44,7 @@ struct Gradient {
 
 void gradient_lose(Instance *c, const char *why, const Variable *by) {
     Gradient *g = c->gradient;
-    if (g == NULL || g->passing || g->why != NULL) return;
+    if (g == NULL || c->passing || g->why != NULL) return;
     g->why = why;
     g->by = by == NULL ? "anything" : text_of(c->model, by->name);
     g->lost_at = c->state.t;
@@ -59,8 +59,6 @@ static double *part_of(const Instance *c, const Tangent *one, const double *valu
 static const double *copied(const Instance *c, const void *copy, const double *values) {
     return (const double *)(const void *)((const char *)copy + sizeof(State)) + (values - c->numbers);
 }
-
-/* ---- steps ------------------------------------------------------------------------------------------------------ */
 
 /* Parameters, inputs and discrete values move along a tangent; if `moving` (at the present point, where factor_implicit
  * has been called) also states, with the implicit unknowns. */
@@ -91,7 +89,6 @@ static void take_stage(Instance *c, Tangent *one, int i, double h) {
     if (i == N_STAGES - 1) memcpy(x, solved, n_x * sizeof(double));
 }
 
-/* Goes to a time in the present piece, from the present point. */
 void gradient_move(Instance *c, double end) {
     Gradient *g = c->gradient;
     const Model *m = c->model;
@@ -117,27 +114,21 @@ void gradient_move(Instance *c, double end) {
     }
 }
 
-/* ---- instants --------------------------------------------------------------------------------------------------- */
-
-/* The transition whose guard, or moment, tells when the present instant is; NULL: its time is given. */
-static const Transition *find_cause(Instance *c) {
-    const unsigned char *wanting = c->state.event_pending ? c->wanting : nothing_wanting(c);
-    if (!c->state.event_pending) find_wanting(c, c->wishes, 0);
-    for (int k = 0; k < c->model->n_transitions; k++)
-        if (wanting[k] && c->state.n_steps > 0) return &c->model->transitions[k];
-    return NULL;
-}
-
-/* By how much the instant comes later, per tangent. */
+/* By how much the instant comes later, per tangent: a guard, or moment, tells when it is, or its time is given. */
 static void find_shifts(Instance *c, Gradient *g) {
-    const Transition *cause = find_cause(c);
-    const Tape *tape = cause != NULL && cause->timed ? &c->model->tapes.moments : &c->model->tapes.guards;
-    double *values = tape == &c->model->tapes.moments ? c->guards : c->guards_before, speed = -1;
+    const Model *m = c->model;
+    const unsigned char *wanting = c->state.event_pending ? c->wanting : nothing_wanting(c);
+    double *values = c->outputs, speed = -1;
+    int k = 0;
+    if (!c->state.event_pending) find_wanting(c, c->wishes, 0);
+    while (k < m->n_transitions && !wanting[k]) k++;
     for (int j = 0; j < g->n; j++) g->tangents[j].shift = 0;
-    if (cause == NULL || !factor_implicit(c)) return;
-    evaluate_now(c, &c->model->tapes.rates, g->rates);
+    if (k == m->n_transitions || c->state.n_steps == 0 || !factor_implicit(c)) return;
+    const Transition *cause = &m->transitions[k];
+    const Tape *tape = cause->timed ? &m->tapes.moments : &m->tapes.guards;
+    evaluate_now(c, &m->tapes.rates, g->rates);
     evaluate_now(c, tape, values);
-    if (!cause->timed) speed = values[c->model->n_guards + cause->index];
+    if (!cause->timed) speed = values[m->n_guards + cause->index];
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);
         tangent_now(c, tape, values);
@@ -168,8 +159,8 @@ int gradient_round(Instance *c, int round, unsigned char *wanting, int any) {
     Gradient *g = c->gradient;
     size_t n = (size_t)c->model->n_transitions;
     if (g == NULL || g->why != NULL) return any;
-    if (g->passing && round < g->n_rounds) memcpy(wanting, g->rounds + n * (size_t)round, n);
-    if (g->passing) return round < g->n_rounds;
+    if (c->passing && round < g->n_rounds) memcpy(wanting, g->rounds + n * (size_t)round, n);
+    if (c->passing) return round < g->n_rounds;
     g->n_rounds = any ? round + 1 : round;
     if (any && round >= MOST_ROUNDS) gradient_lose(c, "that event has too many rounds", NULL);
     else if (any) memcpy(g->rounds + n * (size_t)round, wanting, n);
@@ -211,33 +202,24 @@ static void move_on(const Instance *c, const Gradient *g, const double *rates, d
             part_of(c, &g->tangents[j], c->x)[k] += part * g->tangents[j].shift * rates[k];
 }
 
-/* The tangents pass the instant that the run has passed. */
 static void pass_tangents(Instance *c, Gradient *g, Result (*pass)(Instance *c)) {
-    const Instance whole = *c;
     const Variable *other = NULL;
     move_on(c, g, g->rates, 1);
-    c->log = NULL;
-    c->noted = NULL;
-    c->struck = NULL;
-    g->passing = 1;
+    c->passing = 1;
     for (int j = 0; j < g->n && other == NULL; j++) {
         state_copy_in(c, g->before);
         if (!difference(c, g, &g->tangents[j], pass)) other = g->tangents[j].by;
     }
     state_copy_in(c, g->behind);
-    g->passing = 0;
-    c->log = whole.log;
-    c->noted = whole.noted;
-    c->struck = whole.struck;
+    c->passing = 0;
     if (other != NULL) gradient_lose(c, "a small change of it leads to other modes there", other);
     evaluate_now(c, &c->model->tapes.rates, c->rhs);
     move_on(c, g, c->rhs, -1);
 }
 
-/* Passes the start, or an event, with the tangents. */
 Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
     Gradient *g = c->gradient;
-    if (g == NULL || g->passing) return pass(c);
+    if (g == NULL || c->passing) return pass(c);
     for (int j = 0; j < g->n && start; j++) {
         g->why = NULL;
         g->tangents[j].shift = 0;
@@ -254,8 +236,6 @@ Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
     if (g->why == NULL) pass_tangents(c, g, pass);
     return RESULT_OK;
 }
-
-/* ---- for importers ---------------------------------------------------------------------------------------------- */
 
 void gradient_end(Instance *c) {
     Gradient *g = c->gradient;
@@ -296,41 +276,35 @@ static double *value_of(Instance *c, const Variable *v) {
     return &c->start_value[v->start];
 }
 
-static Result begin(Instance *c, const uint32_t by[], size_t n) {
-    if (!allowed(c, "modelica_like_gradient_start", PHASE_INITIALIZATION)) return RESULT_ERROR;
+int modelica_like_gradient_start(void *instance, const uint32_t by[], size_t n) {
+    Instance *c = instance;
+    if (c == NULL || !allowed(c, "modelica_like_gradient_start", PHASE_INITIALIZATION)) return 1;
     if (!c->co_simulation || c->model->settings->fixed_step > 0)
-        return fail(c, "Derivatives of a run need Co-Simulation with adaptive steps.");
-    if (by == NULL && n > 0) return fail(c, "The argument by is a null pointer.");
-    if (!check_knowns(c, by, n)) return RESULT_ERROR;
+        return !fail(c, "Derivatives of a run need Co-Simulation with adaptive steps.");
+    if (by == NULL && n > 0) return !fail(c, "The argument by is a null pointer.");
+    if (!check_knowns(c, by, n)) return 1;
     gradient_end(c);
-    if (n > 0 && (c->gradient = gradient_new(c, n)) == NULL) return fail(c, "There is not enough memory.");
+    if (n > 0 && (c->gradient = gradient_new(c, n)) == NULL) return !fail(c, "There is not enough memory.");
     for (size_t j = 0; j < n; j++) {
         c->gradient->tangents[j].by = find_variable(c->model, by[j]);
         c->gradient->tangents[j].place = value_of(c, c->gradient->tangents[j].by) - c->numbers;
     }
     c->state.solved = 0;
-    return RESULT_OK;
-}
-
-int modelica_like_gradient_start(void *instance, const uint32_t by[], size_t n) {
-    return instance == NULL || !begin(instance, by, n);
-}
-
-static Result read_gradient(Instance *c, const uint32_t of[], size_t n, double gradient[]) {
-    const Gradient *g = c->gradient;
-    if (!allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED)) return RESULT_ERROR;
-    if (g == NULL || of == NULL || gradient == NULL)
-        return fail(c, "An argument is a null pointer, or modelica_like_gradient_start has not been called.");
-    if (g->why != NULL)
-        return fail(c, "There are no derivatives with respect to %s after t = %.9g s: %s.", g->by, g->lost_at, g->why);
-    if (!check_unknowns(c, of, n) || !factor_implicit(c)) return RESULT_ERROR;
-    for (int j = 0; j < g->n; j++) {
-        load_tangent(c, &g->tangents[j], 1);
-        read_tangents(c, of, n, gradient + j, (size_t)g->n);
-    }
-    return RESULT_OK;
+    return 0;
 }
 
 int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, double gradient[]) {
-    return instance == NULL || !read_gradient(instance, of, n_of, gradient);
+    Instance *c = instance;
+    if (c == NULL || !allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED)) return 1;
+    const Gradient *g = c->gradient;
+    if (g == NULL || of == NULL || gradient == NULL)
+        return !fail(c, "An argument is a null pointer, or modelica_like_gradient_start has not been called.");
+    if (g->why != NULL)
+        return !fail(c, "There are no derivatives with respect to %s after t = %.9g s: %s.", g->by, g->lost_at, g->why);
+    if (!check_unknowns(c, of, n_of) || !factor_implicit(c)) return 1;
+    for (int j = 0; j < g->n; j++) {
+        load_tangent(c, &g->tangents[j], 1);
+        read_tangents(c, of, n_of, gradient + j, (size_t)g->n);
+    }
+    return 0;
 }

@@ -21,7 +21,6 @@ void find_held(Instance *c, Terms *terms, unsigned char *held) {
     mark_held(c, terms, held);
 }
 
-/* The largest variable with the unit of a node. */
 double largest_like(const Model *m, const double *values, int node) {
     double largest = 0;
     for (int n = 0; n < m->n_nodes; n++)
@@ -55,12 +54,10 @@ void rest_rates(Instance *c, double *rates) {
     }
 }
 
-/* ---- sharing ---------------------------------------------------------------------------------------------------- */
-
 /* Bring dependences to the form of an identity in one column each, the largest one left; write their shares. */
-static void eliminate(
-    int *pivots, int rows, int n, double *silent, double *weighted, const int *place, int members, double *switches) {
-    double *shares = switches + members;
+static void eliminate(Instance *c, const Circuit *one, int rows, int n, double *silent, double *weighted) {
+    int *pivots = c->pivots, *place = c->places;
+    double *switches = c->d + one->first, *shares = switches + one->n_members;
     for (int row = 0; row < rows; row++) {
         double *own = silent + (size_t)row * n;
         int pivot = 0;
@@ -79,7 +76,7 @@ static void eliminate(
         const double *own = weighted + (size_t)row * n;
         double largest = copysign(largest_of(n, own), own[pivots[row]]);
         switches[place[pivots[row]]] = 1;
-        for (int k = 0; k < n; k++) shares[place[pivots[row]] * members + place[k]] = own[k] / largest;
+        for (int k = 0; k < n; k++) shares[place[pivots[row]] * one->n_members + place[k]] = own[k] / largest;
     }
 }
 
@@ -98,9 +95,8 @@ static void weigh(const Model *m, const Terms *terms, double *weights) {
 static int dependences(Instance *c, const int *member, int n, double *silent) {
     const Model *m = c->model;
     double *slopes = c->square, *turns = slopes + (size_t)m->most_members * m->n_x;
-    double *sizes = c->sizes, *nothing = c->zeros;
+    double *sizes = c->sizes;
     int rows = 0;
-    memset(nothing, 0, (size_t)n * sizeof(double));
     for (int i = 0; i < n; i++) {
         double *slope = slopes + (size_t)i * m->n_x, square;
         slope_of_node(c, m->holds[member[i]].motion, i > 0, slope);
@@ -108,7 +104,7 @@ static int dependences(Instance *c, const int *member, int n, double *silent) {
         sizes[i] = square > 0 ? sqrt(square) : 1;
         for (int k = 0; k < m->n_x; k++) slope[k] /= sizes[i];
     }
-    make_orthogonal(n, m->n_x, slopes, turns, nothing);
+    make_orthogonal(n, m->n_x, slopes, turns, NULL);
     for (int i = 0; i < n; i++) {
         const double *slope = slopes + (size_t)i * m->n_x;
         if (sqrt(dot(m->n_x, slope, slope)) > DEPENDENT) continue;
@@ -177,7 +173,7 @@ static int share_circuit(Instance *c, const Circuit *one, const unsigned char *h
     if (n > 1) rows = dependences(c, member, n, silent);
     for (int k = 0; k < rows * n; k++) weighted[k] = silent[k] * weights[member[k % n]];
     memset(c->d + one->first, 0, (size_t)one->n_members * (size_t)(1 + one->n_members) * sizeof(double));
-    eliminate(c->pivots, rows, n, silent, weighted, place, one->n_members, c->d + one->first);
+    eliminate(c, one, rows, n, silent, weighted);
     for (int k = 0; k < n; k++) moved |= m->holds[member[k]].moved;
     if (rows > 0 && moved) yield_to_contradiction(c, one);
     return rows > 0;
@@ -210,8 +206,7 @@ static double use_of(Instance *c, const Terms *terms, double *use) {
 void share(Instance *c) {
     const Model *m = c->model;
     Terms *terms = c->terms;
-    double *weights = c->weights, *base = c->base_weights, *use = c->use;
-    double *best = c->best, least = INFINITY;
+    double *weights = c->weights, *base = c->base_weights, *use = c->use, *best = c->best, least = INFINITY;
     replace_dependent(c);
     if (m->n_circuits == 0) return;
     find_held(c, terms, c->held);

@@ -141,7 +141,6 @@ Result meet(Instance *c, double keep, int *any) {
     const Model *m = c->model;
     const double *values = variables_now(c);
     double limit = keep < 0 ? LOST : keep;
-    int *nodes = c->places;
     *any = 0;
     for (int k = 0; k < m->n_ideals; k++) {
         int node = zero_of(c, k), met;
@@ -154,11 +153,11 @@ Result meet(Instance *c, double keep, int *any) {
                 "path (a freewheeling diode), or put a resistance in series with a capacitor.",
                 c->state.t, text_of(m, m->ideals[k].name), fabs(values[node]));
         if (!met) continue;
-        nodes[(*any)++] = node;
+        c->places[(*any)++] = node;
         row_of(c, k)[1] = 0;
     }
     if (*any == 0) return RESULT_OK;
-    move_states(c, nodes, NULL, *any);
+    move_states(c, c->places, NULL, *any);
     c->variables_valid = 0;
     return solve_now(c, 0);
 }
@@ -169,14 +168,4 @@ Result renew(Instance *c) {
     if (c->model->n_ideals == 0) return RESULT_OK;
     replace_dependent(c);
     return meet(c, GIVEN_BACK, &any);
-}
-
-/* Whether ideal elements have the modes that they had before. */
-int same_modes(const Instance *c, const double *before) {
-    int same = c->model->n_ideals > 0;
-    for (int k = 0; k < c->model->n_ideals; k++) {
-        int mode = c->model->ideals[k].mode;
-        same &= c->d[mode] == before[mode];
-    }
-    return same;
 }

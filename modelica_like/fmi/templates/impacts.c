@@ -58,10 +58,9 @@ static int let_go_unbearable(const Instance *c, Strike *strike, const Terms *ter
 /* Puts back what was let go and would now move on against what nothing limits; tells whether anything would. */
 static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
-    double *x = c->x_kept;
     int any = 0;
     if (!any_of(strike->loose, m->n_holds)) return 0;
-    memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
+    memcpy(c->x_kept, c->x, (size_t)m->n_x * sizeof(double));
     for (int k = 0; k < m->n_x; k++) c->x[k] += strike->jump[k];
     const double *after = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
@@ -72,27 +71,25 @@ static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms)
         strike->loose[k] = 0;
         any = 1;
     }
-    memcpy(c->x, x, (size_t)m->n_x * sizeof(double));
+    memcpy(c->x, c->x_kept, (size_t)m->n_x * sizeof(double));
     return any;
 }
 
 /* Marks as loose also what bounces, or was moved in passing. */
 static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
-    unsigned char *held = c->held;
     const double *after = variables_now(c);
     double largest = 0;
-    mark_held(c, terms, held);
+    mark_held(c, terms, c->held);
     for (int k = 0; k < m->n_holds; k++) largest = fmax(largest, fabs(after[m->holds[k].motion] - strike->before[k]));
     for (int k = 0; k < m->n_holds; k++) {
         double now = after[m->holds[k].motion];
-        if (held[k] && !strike->loose[k] && now == 0) continue; /* it stays */
+        if (c->held[k] && !strike->loose[k] && now == 0) continue; /* it stays */
         if (fabs(now - strike->before[k]) > FELT * largest || (strike->approach[k] != 0 && now != 0))
             strike->loose[k] = 1;
     }
 }
 
-/* Tells what the impact has cost. */
 static void book(Instance *c, const Strike *strike, int first) {
     const double *after = variables_now(c);
     int any = 0;
@@ -129,7 +126,7 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
             c->x[one->state] = -terms[k].restitution * strike->before[k] / one->factor;
     }
     if (!solve_now(c, 0)) return RESULT_ERROR;
-    if (strike->hard && c->struck != NULL) book(c, strike, first);
+    if (strike->hard && c->struck != NULL && !c->passing) book(c, strike, first);
     if (strike->hard) mark_moved(c, strike, terms);
     return RESULT_OK;
 }
@@ -138,17 +135,16 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
 static void choose_again(Instance *c, const Strike *strike) {
     const Model *m = c->model;
     double *d = c->respond_d;
-    unsigned char *decided = c->decided;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
-    memset(decided, 1, (size_t)m->n_d);
+    memset(c->decided, 1, (size_t)m->n_d);
     evaluate_now(c, &m->tapes.discrete_starts, c->guards);
     for (int k = 0; k < m->n_holds; k++) {
         int mode = m->holds[k].mode;
         if (!strike->loose[k]) continue;
         c->d[mode] = c->guards[mode];
-        decided[mode] = 0;
+        c->decided[mode] = 0;
     }
-    choose_modes(c, decided);
+    choose_modes(c);
     for (int k = 0; k < m->n_holds; k++) {
         int mode = m->holds[k].mode, chosen = (int)c->d[mode];
         if (chosen == (int)d[mode]) continue;
@@ -156,17 +152,6 @@ static void choose_again(Instance *c, const Strike *strike) {
         note_change(c, m->holds[k].name, -1, mode, chosen);
         c->d[mode] = d[mode] = chosen;
     }
-}
-
-/* Hold again what finite forces have released since the first impact at this instant: they act after it. */
-static Result hold_again(Instance *c, const unsigned char *entered) {
-    for (int k = 0; k < c->model->n_holds; k++) {
-        const Held *one = &c->model->holds[k];
-        if (!entered[k] || c->d[one->mode] == one->number) continue;
-        note_change(c, one->name, -1, one->mode, one->number);
-        c->d[one->mode] = one->number;
-    }
-    return share_and_solve(c);
 }
 
 /* Speeds before an impact, and whether it is one. Friction stops nothing at once; where an importer lets it overrun
@@ -191,7 +176,6 @@ Result stop_motions(Instance *c, const double *before) {
     Strike *strike = &c->strike;
     Terms *terms = c->strike_terms;
     unsigned char *entered = c->entered;
-    double *x = c->impact_x;
     int first = !c->stopped;
     if (m->n_holds == 0) return RESULT_OK;
     memset(strike->loose, 0, (size_t)m->n_holds);
@@ -200,11 +184,18 @@ Result stop_motions(Instance *c, const double *before) {
     if (!any_of(strike->entering, m->n_holds)) return RESULT_OK;
     begin_strike(c, strike, terms);
     if (strike->hard) {
-        for (int k = 0; k < m->n_holds; k++) strike->entering[k] = entered[k] |= strike->entering[k];
-        if (first) memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
+        for (int k = 0; k < m->n_holds; k++) {
+            const Held *one = &m->holds[k];
+            strike->entering[k] = entered[k] |= strike->entering[k];
+            if (!entered[k] || c->d[one->mode] == one->number) continue;
+            /* Finite forces have released it since the first impact at this instant: they act after it. */
+            note_change(c, one->name, -1, one->mode, one->number);
+            c->d[one->mode] = one->number;
+        }
+        if (first) memcpy(c->impact_x, c->x, (size_t)m->n_x * sizeof(double));
         c->stopped = 1;
-        memcpy(c->x, x, (size_t)m->n_x * sizeof(double));
-        if (!hold_again(c, entered)) return RESULT_ERROR;
+        memcpy(c->x, c->impact_x, (size_t)m->n_x * sizeof(double));
+        if (!share_and_solve(c)) return RESULT_ERROR;
         begin_strike(c, strike, terms);
     }
     if (!carry_out(c, strike, first)) return RESULT_ERROR;

@@ -6,14 +6,12 @@ static const char *const categories[] = {
     "logStatusError", "logStatusWarning", "logEvents", "logIntegrator"}; /* by the bits of LogCategory */
 enum { N_CATEGORIES = sizeof categories / sizeof categories[0] };
 
-/* ---- logging ---------------------------------------------------------------------------------------------------- */
-
 /* Errors are always told, the rest if its category is on. Returns `result`. */
 Result report(Instance *c, LogCategory category, Result result, const char *format, ...) {
     char message[MESSAGE_LENGTH];
     const char *name = "";
     va_list arguments;
-    if (c->log == NULL || (category != LOG_ERROR && !(c->log_enabled & category))) return result;
+    if (c->log == NULL || c->passing || (category != LOG_ERROR && !(c->log_enabled & category))) return result;
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
@@ -43,8 +41,6 @@ Result allowed(Instance *c, const char *function, int phases) {
     return fail(c, "%s is not allowed now: %s.", function, names[phase]);
 }
 
-/* ---- memory ----------------------------------------------------------------------------------------------------- */
-
 static uint64_t larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
 
 /* The next part of the memory, for an array; with memory == NULL it is only measured. */
@@ -60,14 +56,13 @@ static uint64_t lay_out(Instance *c, double *memory) {
     const Model *m = c->model;
     Strike *strike = &c->strike;
     uint64_t n = m->n_unknowns, n_x = m->n_x, n_z = m->n_z, n_d = m->n_d, holds = m->n_holds, guards = m->n_guards;
-    uint64_t starts = m->n_starts, delays = m->n_delays, slots = m->n_slots,
-             steady = m->settings->steady ? m->n_steady : 0;
+    uint64_t starts = m->n_starts, slots = m->n_slots, delays = m->n_delays, used = 0, left = 0;
     uint64_t members = m->most_members + 1, ideal = m->n_ideals > 0 ? n_z : 0, dense = n_z * n_z;
-    uint64_t jacobian = larger(m->n_jacobian, m->n_start_jacobian), system = larger(n, m->start.size), used = 0,
-             left = 0;
+    uint64_t jacobian = larger(m->n_jacobian, m->n_start_jacobian), system = larger(n, m->start.size);
+    uint64_t steady = m->settings->steady ? m->n_steady : 0;
     uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), larger(m->n_updates, holds + m->n_ideals));
     uint64_t small = larger(larger(guards, m->n_moments), larger(larger(m->n_start_modes, n_d), m->n_derived));
-    uint64_t outputs = larger(larger(n, m->n_nodes), larger(m->n_derived, 2 * guards));
+    uint64_t outputs = larger(larger(n, m->n_nodes), larger(larger(m->n_derived, m->n_moments), 2 * guards));
     uint64_t square = larger(larger(2 * steady * steady, resets * n_x), members * (n_x + 3 * members));
     square = larger(square, ideal * (ideal + 2));
 #define OF_INSTANCE(name, size) TAKE(c->name, size)
@@ -99,18 +94,14 @@ static uint64_t lay_out(Instance *c, double *memory) {
     return used;
 }
 
-static void set_tolerance(State *s, const Model *m, double relative) {
-    s->tolerance = relative;
-    s->absolute = relative * m->settings->absolute_to_relative;
-}
-
 void instance_reset(Instance *c) {
     const Model *m = c->model;
     State *s = &c->state;
     memset(s, 0, sizeof *s);
     memset(c->numbers, 0, c->n_numbers * sizeof(double));
     s->phase = PHASE_INSTANTIATED;
-    set_tolerance(s, m, m->settings->default_tolerance);
+    s->tolerance = m->settings->default_tolerance;
+    s->absolute = s->tolerance * m->settings->absolute_to_relative;
     c->variables_valid = c->look_valid = 0;
     gradient_end(c);
     memcpy(c->p, m->parameters, m->n_p * sizeof(double));
@@ -118,15 +109,23 @@ void instance_reset(Instance *c) {
     memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
 }
 
-static Instance *instance_make(const Instance *bare) {
-    const Model *m = bare->model;
-    Instance measured = *bare, *c;
-    size_t length = strlen(bare->name) + 1, head = (sizeof *c + length) / sizeof(double) + 1;
+/* An instance of a model, which must outlive it; NULL, with a message in the log, if there is none. `bare` has the
+ * model, a name, and what belongs to the caller; log_enabled tells whether there is to be logged more than errors. */
+Instance *instance_new(Instance bare, const char *token) {
+    const Model *m = bare.model;
+    const char *name = bare.name;
+    if (name == NULL || *name == 0) bare.name = "?";
+    bare.log_enabled = bare.log_enabled ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
+    if (name != bare.name) return fail(&bare, "The instance needs a name."), NULL;
+    if (token == NULL || strcmp(token, m->token) != 0)
+        return fail(&bare, "The instantiation token is that of another export of the model."), NULL;
+    Instance measured = bare;
+    size_t length = strlen(name) + 1, head = (sizeof bare + length) / sizeof(double) + 1;
     uint64_t size = head + lay_out(&measured, NULL);
-    c = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
-    if (c == NULL) return NULL;
-    *c = *bare;
-    c->name = memcpy(c + 1, bare->name, length);
+    Instance *c = size > SIZE_MAX / sizeof(double) ? NULL : bare.allocate((size_t)size, sizeof(double));
+    if (c == NULL) return fail(&bare, "There is not enough memory."), NULL;
+    *c = bare;
+    c->name = memcpy(c + 1, name, length);
     c->numbers = (double *)(void *)c + head;
     lay_out(c, c->numbers);
     c->z = c->x + m->n_x;
@@ -135,38 +134,14 @@ static Instance *instance_make(const Instance *bare) {
     return c;
 }
 
-/* An instance of a model, which must outlive it; NULL, with a message in the log, if there is none. `bare` has the
- * model, a name, and what belongs to the caller; log_enabled tells whether there is to be logged more than errors. */
-Instance *instance_new(Instance bare, const char *token) {
-    Instance *c = NULL;
-    const char *name = bare.name;
-    if (name == NULL || *name == 0) bare.name = "?";
-    bare.log_enabled = bare.log_enabled ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
-    if (name != bare.name) fail(&bare, "The instance needs a name.");
-    else if (token == NULL || strcmp(token, bare.model->token) != 0)
-        fail(&bare, "The instantiation token is that of another export of the model.");
-    else if ((c = instance_make(&bare)) == NULL) fail(&bare, "There is not enough memory.");
-    return c;
-}
-
-/* The same for a program that has loaded this library. */
-Instance *instance_for(const Model *m, void *environment) {
-    Instance bare = {.model = m, .name = "native", .environment = environment, .allocate = calloc, .release = free};
-    bare.co_simulation = 1;
-    return instance_new(bare, m->token);
-}
-
 /* The same with a model of its own: the one that is compiled in, or else the one in the folder of resources. */
 Instance *instance_open(Instance bare, const char *token, const char *location) {
     char message[MESSAGE_LENGTH];
     Model *own = model_data_size > 0 ? model_read((const unsigned char *)model_data, model_data_size, bare.allocate,
                                            bare.release, message)
                                      : model_open(location, bare.allocate, bare.release, message);
-    if (own == NULL) {
-        if (bare.name == NULL) bare.name = "?";
-        fail(&bare, "%s", message);
-        return NULL;
-    }
+    if (own == NULL && bare.name == NULL) bare.name = "?";
+    if (own == NULL) return fail(&bare, "%s", message), NULL;
     bare.model = own;
     Instance *c = instance_new(bare, token);
     if (c == NULL) model_free(own);
@@ -187,21 +162,19 @@ Result set_experiment(
         return fail(c, "The start time %g s must be finite and not after the stop time %g s.", start, stop);
     if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
         return fail(c, "The tolerance must be between 0 and 1, not %g.", tolerance);
-    if (tolerance_defined) set_tolerance(s, c->model, tolerance);
+    if (tolerance_defined) s->tolerance = tolerance;
+    if (tolerance_defined) s->absolute = tolerance * c->model->settings->absolute_to_relative;
     s->t = s->start_time = s->u_time = start;
     s->stop_time_defined = stop_defined && isfinite(stop);
     s->stop_time = s->stop_time_defined ? stop : 0;
     return RESULT_OK;
 }
 
-/* ---- copies of the state ---------------------------------------------------------------------------------------- */
-
 typedef struct {
     char magic[8];
     uint64_t size, model, check;
 } Header;
 
-/* A copy is the state, and then its numbers. */
 static size_t copy_size(const Instance *c) { return sizeof(State) + c->n_numbers * sizeof(double); }
 
 static Header header_of(const Instance *c, const void *copy) {

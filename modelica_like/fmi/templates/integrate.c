@@ -68,7 +68,6 @@ static Result take_step(Instance *c, double limit) {
         s->t);
 }
 
-/* Makes a point of the piece the present one. */
 Result move_to(Instance *c, double t) {
     gradient_move(c, t);
     piece_at(c->model, c->piece, t, c->x);

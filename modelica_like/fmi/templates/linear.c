@@ -69,10 +69,9 @@ int lu_factor(int n, double *m, int *order) {
     double largest = 0, smallest = DBL_MAX;
     for (int j = 0; j < n; j++) {
         int pivot = j;
-        double size;
         for (int i = j + 1; i < n; i++)
             if (fabs(m[i + n * j]) > fabs(m[pivot + n * j])) pivot = i;
-        size = fabs(m[pivot + n * j]);
+        double size = fabs(m[pivot + n * j]);
         if (!isfinite(size) || size == 0) return 0;
         if (size > largest) largest = size;
         if (size < smallest) smallest = size;
@@ -119,8 +118,9 @@ double dot(int n, const double *p, const double *q) {
     return sum;
 }
 
-/* Turns the rows of A until they are orthogonal, by one-sided Jacobi rotations (Hestenes); b is rotated along. `turns`,
- * if it is there, becomes the combinations of rows of A that have come out. Returns the square of the largest row. */
+/* Turns the rows of A until they are orthogonal, by one-sided Jacobi rotations (Hestenes); b is rotated along, `turns`
+ * becomes the combinations of rows of A that have come out, where they are not NULL. Returns the square of the largest
+ * row. */
 double make_orthogonal(int rows, int columns, double *a, double *turns, double *b) {
     double largest = 0;
     for (int k = 0; k < rows * rows && turns != NULL; k++) turns[k] = k % (rows + 1) == 0;
@@ -137,7 +137,7 @@ double make_orthogonal(int rows, int columns, double *a, double *turns, double *
                 c = 1 / sqrt(1 + t * t);
                 rotate(columns, p, q, c, c * t);
                 if (turns != NULL) rotate(rows, turns + (size_t)i * rows, turns + (size_t)j * rows, c, c * t);
-                rotate(1, b + i, b + j, c, c * t);
+                if (b != NULL) rotate(1, b + i, b + j, c, c * t);
             }
         if (!rotated) break;
     }

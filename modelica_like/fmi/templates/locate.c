@@ -78,26 +78,23 @@ double cubic_guess(double g0, double r0, double g1, double r1) {
     return high;
 }
 
-/* Where the cubic through two looks says that a guard has a zero, or its top. */
 static double guess(const Look *before, const Look *after, int g) {
     double h = after->t - before->t;
     return before->t + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g], after->rates[g] * h);
 }
 
-/* Kinds of candidates per guard. */
 enum { QUIET, CROSSING, HUMP };
 
 static int find_candidates(Instance *c, const Look *before, const Look *after) {
-    unsigned char *kinds = c->kinds;
     double h = after->t - before->t;
     for (int g = 0; g < c->model->n_guards; g++) {
         double g0 = before->values[g], g1 = after->values[g];
-        kinds[g] = QUIET;
+        c->kinds[g] = QUIET;
         if (!guard_active(c, g) || g0 > 0) continue;
-        if (g1 > 0) kinds[g] = CROSSING;
-        else if (is_hump(g0, before->rates[g] * h, g1, after->rates[g] * h)) kinds[g] = HUMP;
+        if (g1 > 0) c->kinds[g] = CROSSING;
+        else if (is_hump(g0, before->rates[g] * h, g1, after->rates[g] * h)) c->kinds[g] = HUMP;
     }
-    return any_of(kinds, c->model->n_guards);
+    return any_of(c->kinds, c->model->n_guards);
 }
 
 /* Newton's step to the earliest zero of a candidate; tells whether one is positive already. */
@@ -151,7 +148,6 @@ static int locate(Instance *c, const Look *before, const Look *after, Look *look
     return step_to(c, last, look);
 }
 
-/* Which of the located guards want to fire. */
 static int mark_wanting(Instance *c, const Look *look, double tolerance) {
     const Model *m = c->model;
     double *soon = look->rates + m->n_guards;

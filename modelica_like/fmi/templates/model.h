@@ -118,44 +118,32 @@ typedef struct {
 } Settings;
 
 typedef struct Model { /* tables lie in the bytes of the file; texts are offsets in `text` */
+    int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables, n_rising, n_transitions, n_guards;
+    int n_resets, n_reset_nodes, n_updates, n_modes, n_mode_names, n_holds, n_circuits, n_members, n_ideals, n_units;
+    int n_start_modes, n_start_direct, n_start_default, n_start_guess, n_start_dependent, n_guesses, n_start_zero;
+    int n_start_unknowns, n_steady, n_jacobian, n_delays;
     const Settings *settings;
     const char *text, *token;
-    int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables, n_rising;
     const double *constants, *parameters, *parameter_min, *parameter_max, *inputs, *guesses, *nominals;
-    const int *state_names, *implicit_names, *singular_names;
     const Variable *variables;
     const Rising *rising;
-
-    int n_transitions, n_guards, n_resets, n_reset_nodes, n_updates, n_modes, n_mode_names;
     const Transition *transitions; /* in the order in which they are declared */
-    const int *guard_transition;   /* transition of every guard */
     const Reset *resets;
-    const int *reset_nodes;
     const Update *updates; /* results of the tape `updates` */
     const Mode *modes;     /* by position in d */
-    const int *mode_names;
-
-    int n_holds, n_circuits, n_members, n_ideals, n_units;
     const Held *holds;
     const Circuit *circuits; /* those that depend on each other; in d from `first`: switches, then shares */
-    const int *members;
     const Ideal *ideals;
-    const int *units; /* by node: which have the same unit; empty where nothing is held */
-
-    int n_delays;
     const Delay *delays; /* in the order of the tape's results, each with value and time */
-
-    int n_start_modes, n_start_direct, n_start_default, n_start_guess, n_start_dependent, n_guesses;
-    int n_start_zero, n_start_unknowns, n_steady;
     const StartMode *start_modes;
     const StartOf *start_direct, *start_default, *start_guess;
     const StartRow *start_rows, *start_dependent;
-    const int *start_zero, *start_columns;
+    const int *state_names, *implicit_names, *singular_names, *mode_names, *reset_nodes, *members;
+    const int *guard_transition, *start_zero, *start_columns;
+    const int *units;  /* by node: which have the same unit; empty where nothing is held */
     const int *steady; /* unknowns that follow from zero rates, those of states first; empty for another start */
-
-    int n_jacobian;
-    const int *jacobian_to_step; /* nonzero of the Jacobian -> nonzero of the step matrix */
-    const int *step_diagonal;    /* nonzero of the step matrix on the diagonal of state k */
+    /* Nonzeros of the step matrix: for every nonzero of the Jacobian, and for the diagonal of state k. */
+    const int *jacobian_to_step, *step_diagonal;
     QrPattern step, start;
     struct {
         Tape rates, jacobian, alg, alg_jacobian, variables, guards, guards_soon, moments, resets, updates,
@@ -183,10 +171,6 @@ Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Re
 void model_free(Model *m);
 uint32_t crc32_of(const unsigned char *bytes, size_t size);
 static inline const char *text_of(const Model *m, int place) { return m->text + place; }
-
-/* model_check.c */
-int damaged(char *message, const char *what);
-int check_model(const Model *m, char *message);
 
 /* model_file.c */
 Model *model_open(const char *location, Allocate allocate, Release release, char *message);

@@ -13,9 +13,7 @@
 #define EXPORTED __attribute__((visibility("default")))
 #endif
 
-/* In initialization mode: by what to differentiate; n = 0: by nothing. A reset, or going back to a copy, ends the
- * derivatives.
- */
+/* In initialization mode: by what to differentiate; n = 0: by nothing. A reset, or going back to a copy, ends them. */
 EXPORTED int modelica_like_gradient_start(void *instance, const uint32_t by[], size_t n);
 
 /* Behind it: derivatives of variables at the present time, that of variable k by parameter j in gradient[k * n + j]. */

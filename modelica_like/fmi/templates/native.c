@@ -9,8 +9,7 @@ enum { NATIVE_OK, NATIVE_FAILED, NATIVE_MORE, NATIVE_PAUSED };
 #define SAME 1e-12
 
 /* What a run writes, by rows; NULL: it is not wanted. Where room ends it returns NATIVE_MORE, where `steps` are done
- * (0: any number) NATIVE_PAUSED; called again, it goes on from there. Points are results and both sides of every event.
- */
+ * (0: any number) NATIVE_PAUSED; called again, it goes on from there. Points are results and both sides of events. */
 typedef struct {
     double *times, *states, *outputs; /* by point: time; states and implicit unknowns; outputs */
     double *modes, *firsts;           /* by segment: d (modes, discrete values, what holds need); its first point */
@@ -35,13 +34,10 @@ typedef struct {
 
 static void keep_message(const Instance *c, int status, const char *category, const char *message) {
     Native *n = c->environment;
-    (void)category;
     if (!status) snprintf(n->message, sizeof n->message, "%s", message);
 }
 
 static int code(Result result) { return result ? NATIVE_OK : NATIVE_FAILED; }
-
-/* ---- models and handles ----------------------------------------------------------------------------------------- */
 
 /* Returns NULL, and why in `message` (of 512 characters), if the bytes are no model. They are copied. */
 EXPORTED Model *native_open(const unsigned char *bytes, size_t size, char *message) {
@@ -55,15 +51,21 @@ EXPORTED Model *native_open(const unsigned char *bytes, size_t size, char *messa
 
 EXPORTED void native_close(Model *m) { model_free(m); }
 
+/* An instance for a program that has loaded this library. */
+Instance *instance_for(const Model *m, void *environment) {
+    Instance bare = {.model = m, .name = "native", .environment = environment, .allocate = calloc, .release = free};
+    bare.co_simulation = 1;
+    return instance_new(bare, m->token);
+}
+
 /* A handle of a model, which must outlive it; NULL if there is no memory. */
 EXPORTED Native *native_new(const Model *m) {
     Native *n = calloc(1, sizeof *n);
-    if (n == NULL) return NULL;
-    n->c = instance_for(m, n);
-    if (n->c != NULL) n->c->log = keep_message;
-    if (n->c != NULL) return n;
-    free(n);
-    return NULL;
+    Instance *c = n == NULL ? NULL : instance_for(m, n);
+    if (c == NULL) return free(n), NULL;
+    c->log = keep_message;
+    n->c = c;
+    return n;
 }
 
 EXPORTED void native_free(Native *n) {
@@ -79,9 +81,8 @@ EXPORTED const char *native_message(const Native *n) { return n->message; }
 
 /* Back to the model's values; start and end (infinite: unknown) in s, relative tolerance, absolute one in nominals. */
 Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol) {
-    Result result;
     instance_reset(c);
-    result = set_experiment(c, 1, rtol, start, isfinite(stop), stop);
+    Result result = set_experiment(c, 1, rtol, start, isfinite(stop), stop);
     c->state.absolute = atol;
     c->state.phase = PHASE_INITIALIZATION;
     return result;
@@ -90,8 +91,6 @@ Result instance_prepare(Instance *c, double start, double stop, double rtol, dou
 EXPORTED int native_reset(Native *n, double start, double stop, double rtol, double atol) {
     return code(instance_prepare(n->c, start, stop, rtol, atol));
 }
-
-/* ---- values ----------------------------------------------------------------------------------------------------- */
 
 /* Before the begin: parameters, inputs and start values; later: inputs, and parameters that are tunable. */
 EXPORTED int native_set(Native *n, int64_t count, const uint32_t *references, const double *values) {
@@ -119,8 +118,6 @@ EXPORTED int native_get(Native *n, int64_t count, const uint32_t *references, do
     if (event_first(n->c) && !handle_event(n->c)) return NATIVE_FAILED;
     return read_values(n->c, count, references, values);
 }
-
-/* ---- start, steps, copies --------------------------------------------------------------------------------------- */
 
 /* Events at the start come first, whatever is asked for next. */
 Result instance_begin(Instance *c) {
@@ -167,8 +164,6 @@ EXPORTED void native_counts(const Native *n, double *counts) {
     memcpy(counts, found, sizeof found);
 }
 
-/* ---- runs ------------------------------------------------------------------------------------------------------- */
-
 static void note_event(Instance *c, int transition, int mode, int target) {
     NativeRun *r = ((Native *)c->environment)->run;
     if (r == NULL || r->events == NULL) return;
@@ -185,15 +180,11 @@ static void note_impact(Instance *c, int held, double energy, int first) {
     NativeRun *r = n->run;
     if (r == NULL || r->impacts == NULL) return;
     if (first) n->strikes = r->n_impacts;
-    if (held < 0) {
-        r->n_impacts = n->strikes;
-        return;
-    }
-    if (r->n_impacts < r->room_impacts) {
+    if (held >= 0 && r->n_impacts < r->room_impacts) {
         double row[] = {c->state.t, held, energy};
         memcpy(r->impacts + 3 * r->n_impacts, row, sizeof row);
     }
-    r->n_impacts++;
+    r->n_impacts = held < 0 ? n->strikes : r->n_impacts + 1;
 }
 
 static int write_point(Native *n, NativeRun *r) {
@@ -250,7 +241,6 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
     double width = (end - r->begin) / (double)results;
     while (s->t < end || event_first(n->c) || r->n_segments == 0) {
         double t = r->begin + (end - r->begin) * ((double)r->next / (double)results);
-        Arrival arrival;
         if (event_first(n->c) || r->n_segments == 0) {
             int result = instant(n, r, width);
             if (result != NATIVE_OK) return result;
@@ -260,7 +250,7 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
         if (r->n_points == r->room_points) return NATIVE_MORE;
         if (r->next++ < results && t <= s->t + fmin(0.5 * NEAR_EVENT * width, SAME * fmax(1, fabs(s->t)))) continue;
         t = r->next <= results ? t : end;
-        arrival = integrate_to(n->c, t, 1);
+        Arrival arrival = integrate_to(n->c, t, 1);
         if (arrival == FAILED) return NATIVE_FAILED;
         if (arrival == AT_EVENT || s->t < t) r->next--;
         if (arrival == AT_EVENT) continue;
@@ -272,7 +262,6 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
 
 /* Runs to `end`, with results at `results` equal distances. All counts of `run` are zero at first. */
 EXPORTED int native_run(Native *n, double end, int64_t results, NativeRun *run) {
-    int result;
     if (run->n_segments == 0) {
         run->begin = n->c->state.t;
         run->next = 1;
@@ -283,7 +272,7 @@ EXPORTED int native_run(Native *n, double end, int64_t results, NativeRun *run) 
     n->c->noted = note_event;
     n->c->struck = note_impact;
     n->c->step_finished = run->steps > 0 ? pause_after : NULL;
-    result = run_on(n, end, results, run);
+    int result = run_on(n, end, results, run);
     n->run = NULL;
     n->c->step_finished = NULL;
     return result;

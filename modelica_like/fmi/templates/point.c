@@ -13,12 +13,11 @@ void load(Instance *c, double t, const double *point) {
     slots[0] = t;
     memcpy(slots + m->slot_x, point, m->n_unknowns * sizeof(double));
     for (int k = 0; k < m->n_u; k++) slots[m->slot_u + k] = input_at(c, k, t);
-    if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) != 0) {
+    if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) != 0)
         for (int k = 0; k < m->n_p; k++) {
             if (slots[m->slot_p + k] != c->p[k] && !c->tuned[k]) c->decided_by++;
             slots[m->slot_p + k] = c->p[k];
         }
-    }
     if (memcmp(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double)) != 0) {
         memcpy(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double));
         c->decided_by++;

@@ -114,7 +114,6 @@ void run_special(Instance *c, const Tape *tape, double *outputs) {
     write_special(c, s, tape);
 }
 
-/* The same at a point. */
 void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
     load(c, t, point);
     run_special(c, tape, outputs);

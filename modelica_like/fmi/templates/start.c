@@ -13,13 +13,13 @@ void start_values(Instance *c) {
         if (c->start_given[k]) c->start_values[k] = c->start_value[k];
 }
 
-static Result apply_direct(Instance *c, const double *values) {
+static Result apply_direct(Instance *c) {
     const Model *m = c->model;
     unsigned char *known = memset(c->known, 0, (size_t)m->n_x);
     double *x = c->x;
     for (int k = 0; k < m->n_start_direct; k++) {
         const StartOf *one = &m->start_direct[k];
-        double value = values[one->start] / one->factor;
+        double value = c->start_values[one->start] / one->factor;
         if (known[one->position] && fabs(value - x[one->position]) > CONSISTENT * (1 + fabs(x[one->position])))
             return fail(c, "Two start values of %s contradict each other: %.9g and %.9g.",
                 text_of(m, m->state_names[one->position]), x[one->position], value);
@@ -35,7 +35,7 @@ static void apply(Instance *c, const StartOf *starts, int count) {
 }
 
 /* Newton's method on the equations between free states, the variables that follow from them, and start values. */
-static Result solve_start_system(Instance *c, const double *values) {
+static Result solve_start_system(Instance *c) {
     const Model *m = c->model;
     double *residual = c->start_residual, *step = c->start_unknowns, error = 0;
     if (m->n_start_unknowns == 0) return RESULT_OK;
@@ -48,7 +48,7 @@ static Result solve_start_system(Instance *c, const double *values) {
         error = 0;
         for (int k = 0; k < m->n_start_unknowns; k++) {
             int given = m->start_rows[k].start;
-            double target = given == AT_REST ? 0 : values[given];
+            double target = given == AT_REST ? 0 : c->start_values[given];
             step[k] = residual[m->start_rows[k].row] - target;
             error = fmax(error, isfinite(step[k]) ? fabs(step[k]) / (1 + fabs(target)) : INFINITY);
         }
@@ -71,21 +71,16 @@ static Result solve_start_system(Instance *c, const double *values) {
     return fail(c, "No start was found that meets all start values. Give others, or start values of states.");
 }
 
-static Result check_dependent(Instance *c, const double *values) {
+static Result check_dependent(Instance *c) {
     const Model *m = c->model;
     if (m->n_start_dependent == 0) return RESULT_OK;
     variables_now(c);
     for (int k = 0; k < m->n_start_dependent; k++) {
-        double value = values[m->start_dependent[k].start], actual = c->variables[m->start_dependent[k].node];
+        double value = c->start_values[m->start_dependent[k].start], actual = c->variables[m->start_dependent[k].node];
         if (!(fabs(actual - value) <= CONSISTENT * (1 + fabs(value))))
             return fail(c, "A start value of %.9g cannot be met: the variable would be %.9g.", value, actual);
     }
     return RESULT_OK;
-}
-
-static Result solve_states(Instance *c) {
-    const double *values = c->start_values;
-    return apply_direct(c, values) && solve_start_system(c, values) && solve_now(c, 0) && check_dependent(c, values);
 }
 
 /* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. */
@@ -135,13 +130,12 @@ static void start_equations(Instance *c) {
 }
 
 /* Choose modes that are not decided by their start conditions: the first that holds wins. */
-void choose_modes(Instance *c, unsigned char *decided) {
-    double *holds = c->guards;
-    evaluate_now(c, &c->model->tapes.start_conditions, holds);
+void choose_modes(Instance *c) {
+    evaluate_now(c, &c->model->tapes.start_conditions, c->guards);
     for (int k = 0; k < c->model->n_start_modes; k++) {
         const StartMode *one = &c->model->start_modes[k];
-        if (holds[k] == 0 || decided[one->mode]) continue;
-        decided[one->mode] = 1;
+        if (c->guards[k] == 0 || c->decided[one->mode]) continue;
+        c->decided[one->mode] = 1;
         c->d[one->mode] = one->target;
     }
 }
@@ -152,7 +146,7 @@ static int choose_start_modes(Instance *c, const double *begun) {
     const Model *m = c->model;
     memcpy(c->decided, c->mode_given, (size_t)m->n_d);
     memcpy(c->d_before, c->d, (size_t)m->n_d * sizeof(double));
-    choose_modes(c, c->decided);
+    choose_modes(c);
     if (begun) variables_now(c);
     for (int k = 0; k < m->n_holds && begun; k++) {
         const Held *one = &m->holds[k];
@@ -168,7 +162,7 @@ static Result find_steady(Instance *c, double *begun) {
     const Model *m = c->model;
     int count = 0;
     apply(c, m->start_default, m->n_start_default);
-    if (!apply_direct(c, c->start_values)) return RESULT_ERROR;
+    if (!apply_direct(c)) return RESULT_ERROR;
     if (m->n_holds > 0) find_held(c, c->terms, c->held);
     variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
@@ -182,12 +176,11 @@ static Result find_steady(Instance *c, double *begun) {
 /* Surfaces that stick against too large a torque are not in equilibrium. */
 static Result check_modes_hold(Instance *c) {
     const Model *m = c->model;
-    double *guards = c->guards_before;
     if (m->n_guards == 0 || !m->settings->steady) return RESULT_OK;
-    evaluate_now(c, &m->tapes.guards, guards);
+    evaluate_now(c, &m->tapes.guards, c->guards_before);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
-        if (guard_active(c, k) && guards[k] > 0 && one->target != (int)c->d[one->mode])
+        if (guard_active(c, k) && c->guards_before[k] > 0 && one->target != (int)c->d[one->mode])
             return fail(c, "No steady state was found at t = %.9g s: %s does not stay in its mode.", c->state.t,
                 text_of(m, one->name));
     }
@@ -197,7 +190,6 @@ static Result check_modes_hold(Instance *c) {
 static Result pass_start(Instance *c) {
     const Model *m = c->model;
     double *begun = m->settings->steady ? c->begun : NULL;
-    int round;
     if (!check_tables(c)) return RESULT_ERROR;
     memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
@@ -209,17 +201,19 @@ static Result pass_start(Instance *c) {
     apply(c, m->start_guess, m->n_start_guess);
     if (begun) {
         apply(c, m->start_default, m->n_start_default);
-        if (!apply_direct(c, c->start_values)) return RESULT_ERROR;
+        if (!apply_direct(c)) return RESULT_ERROR;
         choose_start_modes(c, NULL);
         share(c);
     }
-    for (round = 0; round < MODE_ROUNDS; round++) {
-        if (!(begun ? find_steady(c, begun) : solve_states(c))) return RESULT_ERROR;
+    for (int round = 0;; round++) {
+        if (round == MODE_ROUNDS)
+            return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
+        if (!(begun ? find_steady(c, begun)
+                    : apply_direct(c) && solve_start_system(c) && solve_now(c, 0) && check_dependent(c)))
+            return RESULT_ERROR;
         if (!choose_start_modes(c, begun)) break;
         share(c);
     }
-    if (round == MODE_ROUNDS)
-        return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
     rest(c);
     replace_dependent(c);
     if (!solve_now(c, 0) || !check_singular(c) || !check_modes_hold(c)) return RESULT_ERROR;

@@ -41,7 +41,6 @@ void tape_run(const Tape *tape, double *slots, double *outputs) {
         int count = tape->runs[r].count;
         switch (tape->runs[r].operation) {
 #include "operations.h"
-            default: break;
         }
         operand += count;
         result += count;
@@ -65,7 +64,6 @@ void tape_tangent(const Tape *tape, const double *slots, double *dots, double *o
         int end = k + tape->runs[r].count;
         switch (tape->runs[r].operation) {
 #include "operations.h"
-            default: break;
         }
     }
 #undef OPERATION

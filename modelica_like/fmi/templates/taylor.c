@@ -167,9 +167,8 @@ Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
         lu_solve(m->n_z, c->dense_matrix, c->order, c->vector);
         for (int k = 0; k < m->n_z; k++) terms[(n - 1) * m->n_slots + m->slot_z + k] = -c->vector[k];
     }
-    c->variables_valid = 0;
-    if (v->kind == KIND_VARIABLE) run_series(c, &m->tapes.variables, order, c->variables);
-    *value = factorial *
-             (v->kind == KIND_STATE ? terms[(order - 1) * m->n_slots + m->slot_x + v->index] : c->variables[v->index]);
+    if (v->kind == KIND_VARIABLE) run_series(c, &m->tapes.variables, order, c->outputs);
+    else memcpy(c->outputs, terms + (order - 1) * m->n_slots + m->slot_x, m->n_x * sizeof(double));
+    *value = factorial * c->outputs[v->index];
     return RESULT_OK;
 }

@@ -81,11 +81,10 @@ void get_derivatives(Instance *c, double *derivatives) {
  * an offset. It shifts no event, as it is gone above zero; its size is that of rounding, and products of it do not
  * underflow, by whose sign root finders judge. */
 void get_indicators(Instance *c, double *indicators) {
-    double *values = c->guards;
-    evaluate_now(c, &c->model->tapes.guards_soon, values);
-    drop_balanced(c, values);
+    evaluate_now(c, &c->model->tapes.guards_soon, c->guards);
+    drop_balanced(c, c->guards);
     for (int k = 0; k < c->model->n_guards; k++) {
-        double value = guard_active(c, k) ? number_or_false(values[k]) : -1;
+        double value = guard_active(c, k) ? number_or_false(c->guards[k]) : -1;
         indicators[k] = value > 0 ? value : value - OFFSET;
     }
 }
