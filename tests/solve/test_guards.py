@@ -1,12 +1,14 @@
 """Guards: which may fire in which mode, and where they are looked for."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from modelica_like import simulate
 from modelica_like.initialize import Point
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var
-from modelica_like.solve.guards import Candidate, _cubic, _hermite, _nearly, _newton, candidates, locate
+from modelica_like.solve.guards import Candidate, _cubic, _hermite, _nearly, _newton, _positive_top, candidates, locate
 
 
 class Steps(Component):
@@ -107,6 +109,24 @@ def test_the_first_guess_of_a_hump_is_the_top_of_the_cubic(top: float, bottom: f
     assert _cubic(*ends(value), inside=True) == pytest.approx(top, abs=1e-9)
     assert not _nearly(*ends(value))
     assert _nearly(*ends(value - value(top)))
+
+
+@pytest.mark.parametrize(("top", "height"), [(0.37, 1e-4), (0.6, 1e-6), (0.8, 1e-8)])
+def test_a_hump_is_found_where_the_cubic_through_its_ends_misses_it(top: float, height: float) -> None:
+    inner = np.poly1d([3.0, 0.0, 1.0]) * np.poly1d([1.0, -top])
+    value = height - inner * inner
+    tried: list[float] = []
+
+    def trial(t: float) -> Any:
+        tried.append(t)
+        return None, [np.array([value(t)]), np.array([value.deriv()(t)]), np.array([value(t)])]
+
+    found = _positive_top(trial, 1.0, {0: ends(value)}, [Candidate(0, 0, True)])
+    assert value(tried[0]) < 0
+    assert found is not None
+    assert value(found) > 0
+    value = value - 2 * height
+    assert _positive_top(trial, 1.0, {0: ends(value)}, [Candidate(0, 0, True)]) is None
 
 
 def test_a_cubic_is_known_by_its_ends() -> None:
