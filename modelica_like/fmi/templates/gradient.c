@@ -258,9 +258,8 @@ static Gradient *gradient_new(const Instance *c, size_t n) {
     g->rounds = (unsigned char *)(g->rates + n_y);
     g->tangents = (Tangent *)(void *)(g->rates + n_y + marks);
     for (size_t j = 0; j < n; j++) {
-        g->tangents[j].now = g->rates + n_y + marks + list + j * one;
-        g->tangents[j].next = g->tangents[j].now + c->n_smooth;
-        g->tangents[j].stages = g->tangents[j].next + c->n_smooth;
+        double *now = g->rates + n_y + marks + list + j * one, *next = now + c->n_smooth;
+        g->tangents[j] = (Tangent){.now = now, .next = next, .stages = next + c->n_smooth};
     }
     return g;
 }
@@ -268,8 +267,7 @@ static Gradient *gradient_new(const Instance *c, size_t n) {
 /* The value of a parameter, an input or a start value, which is then given, among the numbers of the state. */
 static double *value_of(Instance *c, const Variable *v) {
     if (v->kind == KIND_INPUT) return &c->u[v->index];
-    if (v->kind == KIND_PARAMETER) mark_tuned(c, v->index);
-    if (v->kind == KIND_PARAMETER) return &c->p[v->index];
+    if (v->kind == KIND_PARAMETER) return mark_tuned(c, v->index), &c->p[v->index];
     start_values(c);
     c->start_value[v->start] = c->start_values[v->start];
     c->start_given[v->start] = 1;
