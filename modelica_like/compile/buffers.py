@@ -74,7 +74,7 @@ class BufferedFunction:
         return dict(self._buffer.stats())
 
 
-_BLOCKS = 4096, 512, 64
+_BLOCKS = 4096, 512, 64, 8
 """Points per call: many, about as many as a run has results, and the rest."""
 _GROUP, _SMALL = 8, 2000
 """Points whose operations are unrolled, and largest number of operations of one point for this."""
