@@ -38,7 +38,7 @@ class BufferedFunction:
         for k, array in self._filled:
             array[:] = arguments[k]
         self._evaluate()
-        return self.latest()
+        return [array.copy() for array in self._results]
 
     def latest(self) -> list[Vector]:
         """Return the results of the last call, even if it failed."""
@@ -71,10 +71,10 @@ class BufferedFunction:
 
     def statistics(self) -> dict[str, Any]:
         """Return the statistics of the last call, if the function has them."""
-        return dict(self._buffer.stats())
+        return self._buffer.stats()
 
 
-_BLOCKS = 4096, 512, 64
+_BLOCKS = 4096, 512, 64, 8
 """Points per call: many, about as many as a run has results, and the rest."""
 _GROUP, _SMALL = 8, 2000
 """Points whose operations are unrolled, and largest number of operations of one point for this."""

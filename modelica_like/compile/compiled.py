@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from threading import get_ident
 from typing import Any, TypeVar
@@ -304,8 +304,8 @@ class CompiledDae:
 
     def twin(self, **changes: Any) -> CompiledDae:
         """Return the same model with other attributes and the same cache."""
-        twin = replace(self, **changes)
-        twin.__dict__.update({k: v for k, v in self.__dict__.items() if k not in twin.__dict__})
+        twin = object.__new__(type(self))
+        twin.__dict__.update(self.__dict__, **changes)
         return twin
 
     def once(self, key: Any, make: Callable[[], Made]) -> Made:

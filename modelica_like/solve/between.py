@@ -56,8 +56,10 @@ class Between:
     def ask(self, looks: Looks, times: Vector, last: int) -> Piece:
         """Return arrays for results at times between looks, for `fill` to fill in."""
         x, z = (np.empty((len(part), len(times))) for part in (looks.x, looks.z))
-        self._pieces.append(Piece(looks, times, last, x, z))
-        return self._pieces[-1]
+        piece = Piece(looks, times, last, x, z)
+        if len(times):
+            self._pieces.append(piece)
+        return piece
 
     def now(self, looks: Looks, times: Vector, last: int) -> Piece:
         """Return results at times between looks at once."""

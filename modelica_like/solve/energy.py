@@ -222,9 +222,10 @@ def energy_balance(
     audit, totals = _Audit(count), np.zeros((POWERS, count))
     options = options or Options()
     powers = Powers(model, options, sum(len(segment.times) for segment in segments))
-    for some in results(model, segments):
-        totals += powers.integrals(some)
-        audit.see(some)
+    with powers.integrator.interrupts.watched():
+        for some in results(model, segments):
+            totals += powers.integrals(some)
+            audit.see(some)
     lost, source, inflow, rate = totals
     starts, ends = (np.concatenate(parts, axis=1) for parts in (audit.starts, audit.ends))
     struck, given, at_start = _impacts(model, impacts, float(audit.times[0][0]), starts[:, 0])
@@ -262,10 +263,11 @@ class _Audit:
     def see(self, some: Results) -> None:
         """Audit some results of the run."""
         stored, lost, source, inflow, rate, _ = some.terms
-        starts = np.unique(some.first)
+        places = np.arange(len(some.times))
+        starts = places == some.first
         self.times.append(some.times[starts])
         self.starts.append(stored[:, starts])
-        self.ends.append(stored[:, np.unique(some.last)])
+        self.ends.append(stored[:, places == some.last])
         self._largest = np.maximum(self._largest, np.max(np.abs(some.terms[1:]), axis=(0, 2), initial=0.0))
         for k, values in enumerate((np.abs(inflow + source - lost - rate), -lost)):
             worst = np.max(values, axis=1)
@@ -273,8 +275,8 @@ class _Audit:
             self._when[k, later] = some.times[np.argmax(values[later], axis=1)]
             self._worst[k, later] = worst[later]
             if k == 0:
-                places = np.argmax(values, axis=1)
-                self._points |= {int(n): some.point(int(places[n])) for n in np.flatnonzero(later & self._counts()[0])}
+                at = np.argmax(values, axis=1)
+                self._points |= {int(n): some.point(int(at[n])) for n in np.flatnonzero(later & self._counts()[0])}
 
     def _counts(self) -> Any:
         """Return which imbalances and negative losses are no rounding of the component's own powers."""

@@ -171,18 +171,17 @@ class EventLoop:
             piece = self.between.ask(looks, times, last)
         self.delays.keep(first, looks, last, self.now.d)
         while just_after(tick := self.instants.next_moment(self.now)) < end:
-            self._add(piece, first, self.pace.before(tick))
+            self._add(piece, self.pace.results(first, self.pace.before(tick)))
             self._move(self.ticks.point(looks, tick, last, self._closer))
             self.record.add(np.array([tick]), self.now.x[:, None], self.now.z[:, None])
             if self._event(self.instants.due(self.now)):
                 return False
-            first = tick
-        self._add(piece, first, until)
+            times = self.pace.results(first := tick, until)
+        self._add(piece, times)
         return True
 
-    def _add(self, piece: Piece, first: float, end: float) -> None:
-        """Record the results of a piece between two times."""
-        times = self.pace.results(first, end)
+    def _add(self, piece: Piece, times: Vector) -> None:
+        """Record the results of a piece at some of its times."""
         if len(times):
             some = slice(begin := int(np.searchsorted(piece.times, times[0])), begin + len(times))
             self.record.add(times, piece.x[:, some], piece.z[:, some])

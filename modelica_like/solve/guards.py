@@ -14,7 +14,6 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.flatten.conditions import JUST_TRUE
 from modelica_like.initialize import Point, is_linear, newton_at
-from modelica_like.solve.idas import along
 
 _LOCATED = 1e-13
 _NOISE = 1e-30
@@ -79,7 +78,7 @@ class Guards:
         Shapes (guards, times), (guards, times), (nx, times).
         """
         count, model = len(times), self.model
-        seen = model.fast(("seen", count), lambda: along(model.once("seen", lambda: _seen(model)), count))
+        seen = model.fast(("seen", count), lambda: _along(*model.once("seen", lambda: _apart(_seen(model))), count))
         results = seen(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)
         values, rates, slopes = (v.reshape(count, -1).T for v in results)
         return values, rates, slopes
@@ -92,6 +91,21 @@ def _seen(model: CompiledDae) -> ca.Function:
     rates = ca.densify(ca.if_else(ca.fabs(rates) <= _LARGE, rates, 0))
     results = [_numbers(model.guards(*arguments)), rates, model.ode(*arguments)]
     return ca.Function("seen", arguments, ca.cse(results))
+
+
+def _apart(function: ca.Function) -> tuple[ca.Function, ca.Function]:
+    """Split a function of (t, x, z, p, u, d): what depends on the last three only becomes its last argument."""
+    arguments = function.sx_in()
+    moving, symbols, fixed = ca.extract_parametric(function.call(arguments), ca.vertcat(*arguments[3:]))
+    known = ca.Function("fixed", arguments[3:], [ca.vertcat(ca.SX(0, 1), *fixed)])
+    return ca.Function("moving", [*arguments, ca.vertcat(ca.SX(0, 1), *symbols)], moving), known
+
+
+def _along(moving: ca.Function, fixed: ca.Function, count: int) -> ca.Function:
+    """Return both parts as one function at `count` times with the same parameters, inputs and modes."""
+    everywhere = moving.map("moving_along", "serial", count, [3, 4, 5, 6], [])
+    arguments = everywhere.mx_in()[:6]
+    return ca.Function("seen_along", arguments, everywhere.call([*arguments, fixed(*arguments[3:])]))
 
 
 def _clean(model: CompiledDae, events: list[CompiledTransition]) -> ca.Function:
@@ -154,12 +168,12 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Itera
     humps = up[:, :-1] > up[:, 1:]
     humps &= below[:, :-1]
     humps &= below[:, 1:]
-    for k in np.flatnonzero((rises | humps).any(axis=0)):
-        group = [Candidate(int(active[g]), int(k), False) for g in rises[:, k].nonzero()[0]]
+    for k in np.flatnonzero((rises | humps).any(axis=0)).tolist():
+        group = [Candidate(int(active[g]), k, False) for g in rises[:, k].nonzero()[0]]
         for g in humps[:, k].nonzero()[0]:
             ends = values[g, k : k + 2], rates[g, k : k + 2] * step
             if _nearly(*ends[0].tolist(), *ends[1].tolist()):
-                group.append(Candidate(int(active[g]), int(k), True))
+                group.append(Candidate(int(active[g]), k, True))
         if group:
             yield group
 
@@ -216,7 +230,8 @@ def locate(trial: Trial, span: float, ends: Ends, group: list[Candidate], t: flo
     best: tuple[Point, list[Vector]] | None = None
     for _ in range(_MAX_TRIALS):
         now = trial(guess)
-        watched = [(float(now[1][0][g]), float(now[1][1][g])) for g in ends]
+        found, slopes = now[1][0].tolist(), now[1][1].tolist()
+        watched = [(found[g], slopes[g]) for g in ends]
         if any(value > 0 for value, _ in watched):
             high, best = guess, now
         else:

@@ -44,11 +44,10 @@ _PANEL_STEPS = 300
 """Largest number of steps between two results of a panel; with more, it has probably passed an event, and ends."""
 
 
-def scaled_problem(model: CompiledDae, *, gentle: bool = False, scaled: bool = True) -> dict[str, Any]:
-    """Return the equations in scaled time s in [0, 1], with parameters (t0, span, p, u, d).
+def scaled_problem(model: CompiledDae, *, gentle: bool, scaled: bool) -> tuple[dict[str, Any], ca.Function]:
+    """Return the equations in scaled time s in [0, 1] for `casadi.integrator`, and a function for its parameters.
 
-    In addition to the entries for `casadi.integrator`: `inner`, the arguments of the model's functions, and `span`,
-    dt/ds.
+    This function of (t0, span, p, u, d) also evaluates what depends on nothing else: once, not in every step.
 
     Args:
         model: the compiled model.
@@ -59,14 +58,16 @@ def scaled_problem(model: CompiledDae, *, gentle: bool = False, scaled: bool = T
     return model.once(("scaled", gentle, scaled), lambda: _scaled_problem(model, gentle, scaled))
 
 
-def _scaled_problem(model: CompiledDae, gentle: bool, scaled: bool) -> dict[str, Any]:
+def _scaled_problem(model: CompiledDae, gentle: bool, scaled: bool) -> tuple[dict[str, Any], ca.Function]:
     s, t0, span = ca.SX.sym("s"), ca.SX.sym("t0"), ca.SX.sym("span")
     x, z, p, u, d = (model.arguments[name] for name in ("x", "z", "p", "u", "d"))
     passed, speed = (s * s * span, 2 * s * span) if gentle else (s * span, span) if scaled else (s, 1.0)
     inner = [t0 + passed, x, z, p, u, d]
     ode, alg = ca.cse([speed * model.ode(*inner), model.alg(*inner)])
     parameters = ca.vertcat(t0, span, p, u, d)
-    return {"t": s, "x": x, "z": z, "p": parameters, "ode": ode, "alg": alg, "inner": inner, "span": speed}
+    (ode, alg), symbols, fixed = ca.extract_parametric([ode, alg], parameters)
+    known = ca.Function("known", [parameters], [ca.densify(ca.vertcat(parameters, *fixed))])
+    return {"t": s, "x": x, "z": z, "p": ca.vertcat(parameters, *symbols), "ode": ode, "alg": alg}, known
 
 
 def linear_solver(unknowns: int) -> str:
@@ -86,11 +87,13 @@ class Integrator:
         model: the compiled model.
         options: tolerances.
         whole: whether intervals are whole runs: then large models get an instance for each length, which is faster.
+        counted: whether to count steps and evaluations, which costs as much as five steps.
     """
 
-    def __init__(self, model: CompiledDae, options: Options, *, whole: bool = False) -> None:
+    def __init__(self, model: CompiledDae, options: Options, *, whole: bool = False, counted: bool = True) -> None:
         self.model = model
         self.options = options
+        self.counted = counted
         self.calls = 0
         self.steps = 0
         self.evaluations = 0
@@ -136,8 +139,7 @@ class Integrator:
 
     def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
         length = 1.0 if gentle or self._seconds is None else self._seconds
-        problem = dict(scaled_problem(self.model, gentle=gentle, scaled=self._seconds is None))
-        del problem["inner"], problem["span"]
+        problem, _ = scaled_problem(self.model, gentle=gentle, scaled=self._seconds is None)
         grid = np.arange(1, outputs + 1) / outputs
         grid = (np.sqrt(grid) if gentle else grid * length).tolist()
         return ca.integrator("segment", "idas", problem, 0, grid, self._settings(steps, gentle, first * length))
@@ -210,19 +212,22 @@ class Integrator:
             KeyboardInterrupt: the run was interrupted; IDAS treats this as an error in the equations.
         """
         first = self._first_step(start, p[1]) if gentle else _FIRST_STEP
-        instance = self._instance(outputs, steps, gentle, first)
+        instance, scaled = self._instance(outputs, steps, gentle, first), self._seconds is None
+        known = self.model.fast(
+            ("known", gentle, scaled), lambda: scaled_problem(self.model, gentle=gentle, scaled=scaled)[1]
+        )
         instance.forget()
         screen, sys.stderr = sys.stderr, io.StringIO()
         why = ""
         try:
             with self.interrupts.watched(), self.interrupts.swallowed():
-                x, z = instance(start.x, start.z, p)
+                x, z = instance(start.x, start.z, known(p)[0])
         except RuntimeError as error:
             why = f"{sys.stderr.getvalue()} {error}"
             x, z = instance.latest()
         finally:
             sys.stderr = screen
-        if not why:
+        if self.counted and not why:
             self._count(instance.statistics())
         return x.reshape(outputs, -1).T, z.reshape(outputs, -1).T, why
 

@@ -82,6 +82,7 @@ class Instants:
         self._round = 0
         self._modes = [one.mode for one in model.ideal.elements] if model.ideal else []
         self.timed = [t for t in model.transitions if t.timed]
+        self._moments: tuple[bytes, list[tuple[CompiledTransition, float]]] = b"", []
         self._numbers = {id(transition): k for k, transition in enumerate(model.transitions)}
 
     def next_moment(self, now: Point) -> float:
@@ -90,18 +91,23 @@ class Instants:
 
     def ahead(self, now: Point) -> list[tuple[CompiledTransition, float]]:
         """Time events that come, with their times."""
-        if not self.timed:
-            return []
-        moments = call(self.model, self.model.moments, now).tolist()
         here = just_after(now.t)
-        return [(t, moments[t.index]) for t in self.timed if moments[t.index] > here and _is_source(now, t)]
+        return [one for one in self._planned(now) if one[1] > here]
 
     def due(self, now: Point) -> list[CompiledTransition]:
         """Time events whose time is reached."""
+        here = just_after(now.t)
+        return [one for one, moment in self._planned(now) if moment <= here]
+
+    def _planned(self, now: Point) -> list[tuple[CompiledTransition, float]]:
+        """Time events of the present modes with their times, which only discrete values change."""
         if not self.timed:
             return []
-        moments = call(self.model, self.model.moments, now)
-        return [t for t in self.timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
+        key = now.d.tobytes()
+        if key != self._moments[0]:
+            moments = call(self.model, self.model.moments, now).tolist()
+            self._moments = key, [(t, moments[t.index]) for t in self.timed if _is_source(now, t)]
+        return self._moments[1]
 
     def settle(self, now: Point, wanting: list[CompiledTransition], *, begins: bool = False) -> None:
         """Fire transitions until none is left and no discrete variable changes; `now` becomes the point after.

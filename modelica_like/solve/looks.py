@@ -41,7 +41,8 @@ class Scheme:
         self.precise = np.array([self._basis(0, nodes, cell) for cell in cells])
         self.coarse = np.array([self._basis(start, fewer, cell) for start, cell in zip(starts, cells, strict=True)])
         # The middle is representative of the interval: near a look both agree with it, even with a wrong slope.
-        self.doubt = 0.5**EXPONENTS @ (self.precise - self.coarse)
+        self.middle = 0.5**EXPONENTS @ np.stack([self.precise, self.coarse], axis=1)
+        self.doubt = self.middle[:, 0] - self.middle[:, 1]
 
     def _basis(self, first: int, count: int, cell: int) -> Vector:
         """Coefficients of each datum, in powers of the passed share of a cell; (powers, data).
@@ -77,23 +78,20 @@ class Cell:
         number: its place among the intervals of the polynomial.
         base: states at its beginning, shape (nx,).
         data: values relative to `base`, and perhaps slopes times `width`, shape (8, nx).
+
+    Attributes:
+        middle: states in its middle by the polynomials of both degrees, shape (2, nx).
     """
 
     def __init__(self, scheme: Scheme, t: float, width: float, k: int, number: int, base: Vector, data: Vector) -> None:
         self.t, self.width, self.k, self._base = t, width, k, base
-        self._precise, self._coarse = scheme.precise[number] @ data, scheme.coarse[number] @ data
-
-    def _powers(self, t: float) -> Vector:
-        return ((t - self.t) / self.width) ** EXPONENTS
+        self._precise, self.middle = scheme.precise[number] @ data, base + scheme.middle[number] @ data
 
     def states(self, t: float) -> Vector:
         """Return the states at a time in it, by the polynomial of degree seven; shape (nx,)."""
-        return self._base + self._powers(t) @ self._precise if t > self.t else self._base.copy()
-
-    def both(self, t: float) -> tuple[Vector, Vector]:
-        """Return the states at a time in it by the polynomials of both degrees, shapes (nx,)."""
-        powers = self._powers(t)
-        return self._base + powers @ self._precise, self._base + powers @ self._coarse
+        if t <= self.t:
+            return self._base.copy()
+        return self._base + ((t - self.t) / self.width) ** EXPONENTS @ self._precise
 
 
 class Looks:
@@ -187,7 +185,7 @@ class Looks:
 
     def is_precise(self, cell: Cell) -> bool:
         """Whether interpolated states in the middle of an interval are within the tolerances."""
-        precise, coarse = cell.both(cell.t + 0.5 * cell.width)
+        precise, coarse = cell.middle
         return bool((np.abs(precise - coarse) <= PRECISE * self.integrator.weights(precise)).all())
 
     def is_sharp(self, cell: Cell, ends: Ends, *, fresh: bool) -> bool:
@@ -198,10 +196,9 @@ class Looks:
         """
         if not self.is_precise(cell):
             return False
-        t = cell.t + 0.5 * cell.width
-        precise, coarse = cell.both(t)
-        weights = self.integrator.weights(precise)
-        near = self.guards.near(t, np.array([precise, coarse, precise + weights]), self._guess(t, cell), self.d)
+        t, precise = cell.t + 0.5 * cell.width, cell.middle[:1]
+        states = np.concatenate([cell.middle, precise + self.integrator.weights(precise[0])])
+        near = self.guards.near(t, states, self._guess(t, cell), self.d)
         rough, moved = np.abs(near[1:] - near[0]).tolist()
         sizes = [(g, abs(g0) + abs(g1)) for g, (g0, g1, *_) in ends.items()]
         return all(rough[g] <= _SHARP * size and (fresh or moved[g] <= size) for g, size in sizes)

@@ -63,6 +63,7 @@ class Results:
         first: the first result of the smooth piece each one belongs to, shape (n,).
         last: its last result, shape (n,).
         terms: energy terms in the order of `CompiledDae.energy`, shape (6, components, n).
+        shaken: changes of the terms by the last digits of all unknowns, in size, at a few results.
     """
 
     times: Vector
@@ -72,6 +73,7 @@ class Results:
     first: Places
     last: Places
     terms: Vector
+    shaken: Vector
 
     def point(self, k: int) -> Point:
         """Return one result."""
@@ -101,8 +103,14 @@ def _together(model: CompiledDae, segments: list[Segment]) -> Results:
     x, z = (np.concatenate([getattr(segment, name) for segment in segments], axis=1) for name in "xz")
     d = np.repeat(np.array([segment.d for segment in segments]).T, sizes, axis=1)
     function = model.along("energy terms", lambda: _terms(model))
-    terms = function(times, x, z, model.p, model.u, d)[0].reshape(-1, len(model.components), len(times))
-    return Results(times, x, z, d, np.repeat(ends - sizes, sizes), np.repeat(ends - 1, sizes), terms)
+    some = [0, len(times) // 2, len(times) - 1]
+    signs = np.where(np.add.outer(np.arange(len(x) + len(z)), np.arange(len(some))) % 2, 1.0, -1.0)
+    moved = np.concatenate([x, z])[:, some] * (1.0 + _DIGITS * signs)
+    more = times[some], moved[: len(x)], moved[len(x) :], d[:, some]
+    at, x_at, z_at, d_at = (np.append(*pair, axis=-1) for pair in zip((times, x, z, d), more, strict=True))
+    found = function(at, x_at, z_at, model.p, model.u, d_at)[0].reshape(-1, len(model.components), len(at))
+    terms, first, last = found[..., : len(times)], np.repeat(ends - sizes, sizes), np.repeat(ends - 1, sizes)
+    return Results(times, x, z, d, first, last, terms, np.abs(found[..., len(times) :] - terms[..., some]))
 
 
 def _terms(model: CompiledDae) -> ca.Function:
@@ -129,7 +137,8 @@ class Powers:
         self._share = min(_SHARE, _ALL / count)
         self.stored, self.moved, self._noise = 0.0, _NOTHING, np.zeros(2)
         rtol = min(options.rtol, max(_FINER * options.rtol, _FINEST))
-        self._integrator = Integrator(model, replace(options, rtol=rtol, atol=options.atol * rtol / options.rtol))
+        finer = replace(options, rtol=rtol, atol=options.atol * rtol / options.rtol)
+        self.integrator = Integrator(model, finer, counted=False)
 
     def integrals(self, every: Results, depth: int = 0) -> Vector:
         """Integrate all powers over some results; shape (4, components), in J.
@@ -183,7 +192,7 @@ class Powers:
         start = every.point(begin)
         span, count = float(every.times[end]) - start.t, _MORE * 2 ** math.ceil(math.log2(max(intervals, _LEAST)))
         try:
-            x, z = self._integrator.run(start, span, count)
+            x, z = self.integrator.run(start, span, count)
         except StepFailed:
             return None
         times = start.t + span * np.arange(count + 1) / count
@@ -205,16 +214,9 @@ class Powers:
         self.moved = max(self.moved, self.stored, float(least), float(most))
 
     def _hear(self, every: Results) -> None:
-        """Estimate the rounding of stored energies in J and of powers in W: what the last digits of unknowns change."""
-        places = np.unique([0, len(every.times) // 2, len(every.times) - 1])
-        unknowns = np.concatenate([every.x, every.z])[:, places]
-        function = self.model.along("energy terms", lambda: _terms(self.model))
-        signs = np.where(np.add.outer(np.arange(len(unknowns)), np.arange(len(places))) % 2, 1.0, -1.0)
-        x, z = np.split(unknowns * (1.0 + _DIGITS * signs), [len(every.x)])
-        changed = function(every.times[places], x, z, self.model.p, self.model.u, every.d[:, places])[0]
-        changes = np.abs(changed.reshape(-1, len(self.model.components), len(places)) - every.terms[..., places])
-        found = _ROUNDING * np.array([np.max(np.sum(one, axis=0)) for one in (changes[0], changes[1:].sum(axis=0))])
-        self._noise = np.maximum(self._noise, found)
+        """Estimate the rounding of stored energies in J and of powers in W."""
+        changes = np.stack([every.shaken[0], every.shaken[1:].sum(axis=0)])
+        self._noise = np.maximum(self._noise, _ROUNDING * np.max(np.sum(changes, axis=1), axis=1))
 
     def _bends(self, every: Results, ends: Places) -> Vector:
         """Return the part of slopes of powers in the integrals of the first two rules; shape (2, 4 components, m)."""

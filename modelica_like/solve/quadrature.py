@@ -16,6 +16,10 @@ _WIDTH = 8
 _ORDERS = np.array([0, 2, 4])
 """Reductions of the orders of the rules."""
 _UNIFORM, _ROUNDING = 1e-9, 1e-15
+_POINTS = 0.5 + np.sqrt((15 + np.array([2, -2, -2, 2]) * np.sqrt(30.0)) / 140) * [-1, -1, 1, 1]
+_SHARES = 0.25 + np.sqrt(30.0) / 72 * np.array([-1, 1, 1, -1])
+"""Gauss' rule in [0, 1]."""
+_OTHERS = ~np.eye(_WIDTH, dtype=bool)
 
 
 def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, Vector]:
@@ -58,20 +62,17 @@ def _equidistant() -> Vector:
 
 
 def _rules(places: Vector, sizes: Places, offsets: Places) -> Vector:
-    """Weights of integrals from 0 to 1 over the first `sizes` places, of which `offsets` is 0; (m, 8), (m, 3, 8)."""
+    """Weights of integrals from 0 to 1 over the first `sizes` places, of which `offsets` is 0; (m, 8), (m, 3, 8).
+
+    They integrate Lagrange's polynomials by Gauss' rule, which is exact for them; its points are no places.
+    """
     fewer = np.maximum(sizes[:, None] - _ORDERS, 1)
     starts = np.clip(offsets[:, None] - (fewer - 1) // 2, 0, sizes[:, None] - fewer)
-    found = np.zeros((len(places), len(_ORDERS), _WIDTH))
-    for count in np.flatnonzero(np.bincount(fewer.ravel())):
-        row, order = np.nonzero(fewer == count)
-        columns = starts[row, order][:, None] + np.arange(count)
-        found[row[:, None], order[:, None], columns] = _weights(places[row[:, None], columns])
-    return found
-
-
-def _weights(places: Vector) -> Vector:
-    """Weights of the integral from 0 to 1 of the polynomials through values at some places; shapes (m, size)."""
-    powers = np.arange(places.shape[1])
-    scale = np.maximum(np.max(np.abs(places), axis=1, keepdims=True), 1.0)
-    moments = scale**-powers / (powers + 1.0)
-    return np.linalg.solve((places / scale)[:, None, :] ** powers[None, :, None], moments[:, :, None])[:, :, 0]
+    passed = np.arange(_WIDTH) - starts[:, :, None]
+    used = (passed >= 0) & (passed < fewer[:, :, None])
+    away = _POINTS[:, None] - places[:, None, :]
+    products = np.prod(np.where(used[:, :, None], away[:, None], 1.0), axis=-1, keepdims=True)
+    apart = places[:, :, None] - places[:, None, :]
+    others = used[..., None] & used[:, :, None] & _OTHERS
+    scales = np.prod(np.where(others, apart[:, None], 1.0), axis=-1)
+    return np.where(used, _SHARES @ (products / away[:, None]) / scales, 0.0)

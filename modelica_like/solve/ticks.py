@@ -44,10 +44,10 @@ class Ticks:
 
         Of ticks that fall together, those count as its cause that have been one before.
         """
-        moved = bool((before.x != after.x).any() or (before.d[self._felt] != after.d[self._felt]).any())
         ticks, quiet = [id(one) for one in fired if one.timed], self._quiet
         if len(ticks) < len(fired):
             return True
+        moved = bool((before.x != after.x).any() or (before.d[self._felt] != after.d[self._felt]).any())
         for one in [tick for tick in ticks if not (moved and quiet[tick])] or ticks:
             quiet[one] = 0 if moved else quiet[one] + 1
         return moved
