@@ -19,7 +19,7 @@ _TEMPLATES = Path(__file__).parent / "templates"
 
 RUNTIME = (
     "model.c", "model_file.c", "tape.c", "linear.c", "special.c", "point.c", "start.c", "holds.c",
-    "ideal.c", "impacts.c", "events.c", "rosenbrock.c", "locate.c", "integrate.c", "values.c",
+    "ideal.c", "impacts.c", "events.c", "rosenbrock.c", "locate.c", "integrate.c", "fixed.c", "values.c",
     "delay.c", "derivatives.c", "gradient.c", "taylor.c", "instance.c",
 )  # fmt: skip
 LOG_CATEGORIES = {

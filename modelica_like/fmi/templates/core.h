@@ -270,6 +270,11 @@ Result handle_event(Instance *c);
 Result finish(Instance *c);
 Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
+Result move_to(Instance *c, double t);
+Result take_changes(Instance *c, int *event);
+int is_due(Instance *c);
+/* fixed.c */
+Arrival step_fixed(Instance *c, double target);
 /* values.c */
 const Variable *find_variable(const Model *m, uint32_t reference);
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type);
