@@ -50,7 +50,7 @@ CASES = [
     ("msl/rotational/CoupledClutches.toml", "2.0"),
     ("msl/rotational/CoupledClutches.toml", "3.0"),
     ("dc_bench.toml", "3.0"),
-    (Echo(), "2.0"),
+    pytest.param(Echo(), "2.0", marks=pytest.mark.slow),
 ]
 
 
