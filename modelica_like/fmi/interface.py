@@ -131,6 +131,12 @@ def interface(model: CompiledDae, outputs: Sequence[str] = (), modes: ModesAs = 
     )  # fmt: skip
 
 
+def _times_of_delays(model: CompiledDae) -> set[int]:
+    """Numbers of the parameters on which times of delays depend: these do not change during a run."""
+    pattern = model.delays.jac_sparsity(0, model.delays.name_in().index("p"))
+    return {number for row, number in zip(*pattern.get_triplet(), strict=True) if row % 2}
+
+
 class _Builder:
     def __init__(self, model: CompiledDae, outputs: Sequence[str]) -> None:
         self.model = model
@@ -155,8 +161,9 @@ class _Builder:
 
     def parameters(self) -> None:
         """Independent parameters, and those that follow from others."""
+        fixed = _times_of_delays(self.model)
         for k, one in enumerate(self.model.flat_parameters):
-            variability, start = "tunable" if one.tunable else "fixed", float(self.model.p[k])
+            variability, start = "tunable" if one.tunable and k not in fixed else "fixed", float(self.model.p[k])
             self.add(one.path, ("parameter", k), "parameter", variability, None, start=start, **_about(one))
         for k, one in enumerate(self.model.flat_derived):
             self.add(one.path, ("derived", k), "calculatedParameter", "tunable", **_about(one))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
-from modelica_like import export_fmu
+from modelica_like import build, export_fmu
+from modelica_like.errors import ValueOutOfRange
 from modelica_like.language import (
     Component,
     Equations,
@@ -113,3 +114,14 @@ def test_held_inputs_come_again(exported, step: float) -> None:
     exact = np.interp(times[1:] - 0.25, times, steps)
     assert total == pytest.approx(exact, abs=1e-9)
     fmu.freeInstance()
+
+
+def test_times_of_delays_are_fixed_with_the_start(exported) -> None:
+    case = exported(Loop(y=1.0))
+    kinds = {name: case.face.by_name[name].variability for name in ("T", "tau", "period")}
+    assert kinds == {"T": "fixed", "tau": "fixed", "period": "tunable"}  # 0.3·tau delays the wave
+    run = build(Loop(y=1.0)).native(outputs=["y"])
+    run.reset({"T": 0.5})
+    assert run.step(1.0)[0] == pytest.approx(1 - 1.0 + 0.5**2 / 2, abs=1e-7)
+    with pytest.raises(ValueOutOfRange, match="T cannot be set: it is a fixed parameter"):
+        run.set({"T": 0.7})

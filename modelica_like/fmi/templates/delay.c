@@ -1,6 +1,6 @@
 /* Delayed values: Chebyshev series of time in d, through what a run has been before. The past is rows of a time and the
- * values that are delayed: four for an own step, one for an importer's. A row behind a jump or kink begins anew; what
- * was there comes again exactly one delay later, where a series ends at the latest. See solve/delays.py. */
+ * values that are delayed: four or more for an own step, one for an importer's. A row behind a jump or kink begins
+ * anew; what was there comes again exactly one delay later, where a series ends at the latest. See solve/delays.py. */
 #include "core.h"
 
 #define LAST 3 /* terms that must be below the tolerance */
