@@ -4,8 +4,12 @@
 """
 
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 
+import components
+from modelica_like import Component
 from modelica_like.netlist import library_types
 
 LIST = Path(__file__).with_name("declarations.txt")
@@ -33,6 +37,15 @@ def test_declarations_are_what_netlists_rely_on() -> None:
     changed += [f"+ {line}" for line in found if line not in set(known)]
     assert changed == []
     assert known == found
+
+
+def test_what_netlists_cannot_name_is_only_a_base() -> None:
+    """A base class that could be made by mistake would be a part that lacks equations."""
+    modules = (import_module(one.name) for one in walk_packages(components.__path__, "components."))
+    kinds = {kind for module in modules for kind in vars(module).values() if isinstance(kind, type)}
+    ours = {kind for kind in kinds if issubclass(kind, Component) and kind.__module__.startswith("components.")}
+    whole = {kind.__name__ for kind in ours if not kind._partial}
+    assert whole - {*library_types()} == {"Chained"}  # of which a transfer function consists
 
 
 if __name__ == "__main__":
