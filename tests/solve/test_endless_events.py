@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from modelica_like import Solution, simulate
-from modelica_like.errors import Chattering
+from modelica_like.errors import Chattering, Source
 from modelica_like.language import (
     Component,
     Discrete,
@@ -21,6 +21,8 @@ from modelica_like.language import (
     param,
     var,
 )
+from modelica_like.solve.instants import chattering
+from modelica_like.solve.recorder import Event
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 
@@ -176,3 +178,13 @@ def test_a_panel_that_runs_past_an_event_into_nonsense_is_shortened():
     # sqrt(level + d) = sqrt(1 + d) - t / 2, zero level at sqrt(d).
     np.testing.assert_allclose(times(run), [2 * (math.sqrt(1.0001) - 0.01)], rtol=0, atol=1e-9)
     assert run.final["level"] == 0.0
+
+
+def test_what_switches_most_is_told_with_three_of_its_places():
+    places = [Source("drive.py", line) for line in (7, 8, 9, 10)]
+    often = [Event(0.1 * k, "relay.mode", *pair, place) for k, (pair, place) in enumerate(
+        zip([("on", "off"), ("off", "on")] * 2, places, strict=True)
+    )]  # fmt: skip
+    told = chattering([*often, Event(0.5, "clutch.mode", "free", "stuck", Source("other.py", 1))], "it does", "stop")
+    assert told.what == "relay.mode switched 4 times in t = 0…0.3 s (on ⇄ off)."
+    assert told.where == tuple(places[:3])

@@ -41,6 +41,14 @@ def test_an_interrupt_of_foreign_code_is_raised_behind_it() -> None:
     assert signal.getsignal(signal.SIGINT) is before
 
 
+def test_an_interrupt_before_foreign_code_is_raised_once() -> None:
+    interrupts = Interrupts()
+    with pytest.raises(KeyboardInterrupt):
+        own(interrupts)
+    with interrupts.swallowed():
+        pass
+
+
 def test_there_are_no_signals_in_other_threads() -> None:
     found = []
 
