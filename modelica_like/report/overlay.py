@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from modelica_like.errors import UnknownName
 from modelica_like.report.sources import trajectories
+from modelica_like.solve.bands import bands_of, listed, marks_of
 from modelica_like.solve.display import Display
-from modelica_like.solve.panels import Panel, bands_of, draw_panels, listed, marks_of
+from modelica_like.solve.panels import Panel, draw_panels
 from modelica_like.solve.plot import usual
 from modelica_like.solve.signals import Signal, named, read_signals
 from modelica_like.solve.style import COLOURS

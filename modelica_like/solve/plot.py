@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.errors import NetlistError
+from modelica_like.solve.bands import bands_of, listed, marks_of
 from modelica_like.solve.display import QUANTITIES, Display
-from modelica_like.solve.panels import Panel, bands_of, draw_panels, listed, marks_of
+from modelica_like.solve.panels import Panel, draw_panels
 from modelica_like.solve.signals import Signal, evaluated, named, read_signals
 from modelica_like.solve.style import COLOURS
 from modelica_like.solve.trajectories import Trajectories

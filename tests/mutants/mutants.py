@@ -37,7 +37,7 @@ from lines import CACHE, FILES, ROOT, Lines
 FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
     "structure", "initialize", "solve", "flatten", "compile",
 )))  # fmt: skip
-PICTURES = ("icons.py", "plot.py", "sankey.py", "style.py")
+PICTURES = ("icons.py", "panels.py", "plot.py", "sankey.py", "style.py")
 """They draw; what they draw is looked at."""
 DECLARED = "tests/library/test_declarations.py::test_declarations_are_what_netlists_rely_on"
 """They tell defaults and limits."""

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from modelica_like.solve.bands import mode_spans
 from modelica_like.solve.display import Display
-from modelica_like.solve.panels import mode_spans
 from modelica_like.solve.plot import for_page, quantity_of
 from modelica_like.solve.signals import evaluated
 from modelica_like.solve.style import with_unit
