@@ -111,9 +111,10 @@ def test_the_first_guess_of_a_hump_is_the_top_of_the_cubic(top: float, bottom: f
     assert _nearly(*ends(value - value(top)))
 
 
+@pytest.mark.parametrize("way", [np.poly1d([1.0, 0.0]), np.poly1d([-1.0, 1.0])], ids=["forward", "backward"])
 @pytest.mark.parametrize(("top", "height"), [(0.37, 1e-4), (0.6, 1e-6), (0.8, 1e-8)])
-def test_a_hump_is_found_where_the_cubic_through_its_ends_misses_it(top: float, height: float) -> None:
-    inner = np.poly1d([3.0, 0.0, 1.0]) * np.poly1d([1.0, -top])
+def test_a_hump_is_found_where_the_cubic_through_its_ends_misses_it(top: float, height: float, way: np.poly1d) -> None:
+    inner = np.polyval(np.poly1d([3.0, 0.0, 1.0]) * np.poly1d([1.0, -top]), way)
     value = height - inner * inner
     tried: list[float] = []
 
@@ -127,6 +128,24 @@ def test_a_hump_is_found_where_the_cubic_through_its_ends_misses_it(top: float, 
     assert value(found) > 0
     value = value - 2 * height
     assert _positive_top(trial, 1.0, {0: ends(value)}, [Candidate(0, 0, True)]) is None
+
+
+@pytest.mark.parametrize("top", [0.25, 0.6])
+@pytest.mark.parametrize("astray", [-0.4, 0.4])
+def test_the_top_of_a_parabola_is_where_the_straight_line_of_slopes_is_zero(top: float, astray: float) -> None:
+    """After a first guess that misses it."""
+    value = 1e-9 - np.poly1d([1.0, -top]) ** 2
+    tried: list[float] = []
+
+    def trial(t: float) -> Any:
+        tried.append(t)
+        return None, [np.array([value(t)]), np.array([value.deriv()(t)]), np.array([value(t)])]
+
+    slope, span = value.deriv(), 2.0
+    seen = value(0.0) + astray, value(span), span * slope(0.0), span * slope(span)
+    found = _positive_top(trial, span, {0: seen}, [Candidate(0, 0, True)])
+    assert len(tried) == 3  # the second one halves what is left
+    assert found == pytest.approx(top, abs=1e-5)
 
 
 def test_a_cubic_is_known_by_its_ends() -> None:
