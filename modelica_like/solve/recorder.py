@@ -100,7 +100,7 @@ class Recorder:
     @property
     def fresh(self) -> bool:
         """Whether the open segment has no more than its first point."""
-        return len(self._open) < 2 and sum(len(times) for times, *_ in self._open) < 2
+        return len(self._open) < 2
 
     def note(
         self, model: CompiledDae, time: float, number: int, change: tuple[int, int], transition: int, round: int
