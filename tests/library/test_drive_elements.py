@@ -332,17 +332,6 @@ def test_clutch_actuator_that_is_switched_off_again_too_soon() -> None:
     assert np.all(run["actuator.y"] == 0.0)
 
 
-@pytest.mark.parametrize(("before", "torque"), [(1.0, 1.0), (0.0, 0.0)])
-def test_clutch_actuator_stays_as_it_is_at_half_a_signal(before: float, torque: float) -> None:
-    """Above a half it is switched on, below off."""
-    step = Step(offset=before, height=0.5 - before, start_time=0.5)
-    actuator = ClutchActuator(t12=0.1, t2=0.05)
-    loop = Assembly("loop", parts={"step": step, "actuator": actuator}, connect={"on": ["step.y", "actuator.on"]})
-    run = simulate(loop, "1 s")
-    assert run.final["step.y"] == 0.5
-    assert run.final["actuator.y"] == torque
-
-
 def test_clutch_actuator_of_a_coil() -> None:
     """Exponential: 90 % after t12, 10 % after t2; switched off during the rise, it falls from where it is."""
     pulse = Pulse(start_time=0.1, period=2.0, width=0.085)

@@ -219,6 +219,31 @@ class Forms(Component):
         yield self.steps == floor(0.5 - self.f * self.time, events=True)
 
 
+class Whole(Component):
+    """Floors of whole numbers that stay, and of one that is passed upwards and again downwards."""
+
+    x: Variable = var("1", "stays at two")
+    up: Variable = var("1", "floor of that")
+    f: Parameter = param("Hz", "rate", default=1.0)
+    turn: Variable = var("1", "from 0.5 up to 1.5 at 1 s and back")
+    number: Variable = var("1", "floor of that")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 0 * self.f
+        yield self.up == floor(self.x, events=True)
+        yield self.turn == 1.5 - absolute(self.f * self.time - 1)
+        yield self.number == floor(self.turn, events=True)
+
+
+def test_a_whole_number_is_its_floor(solver):
+    found = run(Whole(x=2.0), 2.0, solver)
+    assert found.final["up"] == 2.0
+    assert [(one.mode, one.time) for one in found.events] == [
+        ("floor[2]", pytest.approx(0.5)), ("floor[2]", pytest.approx(1.5)),
+    ]  # fmt: skip
+    assert (found.at(0.2)["number"], found.at(1.0)["number"], found.at(1.8)["number"]) == (0.0, 1.0, 0.0)
+
+
 def test_functions_with_events(solver):
     found = run(Forms(), 3.0, solver)
     t = found.time
