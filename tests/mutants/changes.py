@@ -26,6 +26,8 @@ _CALLS = {
     "floor": "ceil", "logic_or": "logic_and", "logic_and": "logic_or", "setdefault": "__setitem__",
     "minimum": "maximum", "maximum": "minimum", "argmax": "argmin", "argmin": "argmax", "sin": "cos", "cos": "sin",
 }  # fmt: skip
+_SYMMETRIC = ("min", "max", "fmin", "fmax", "minimum", "maximum", "all_of", "any_of", "logic_and", "logic_or", "hypot")
+"""Functions whose arguments have no order."""
 _TOLERANCE = 1e-6
 """What is smaller is one, or a limit beside zero; how small it is no test can tell."""
 _PRINTS = ("__str__", "__repr__", "_repr_html_")
@@ -172,7 +174,7 @@ class _Finder:
         if name in ("abs", "fabs", "sqrt", "sign", "not_"):
             yield *self._span(node), f"({self._source(node.args[0])})", node.lineno
         plain = [one for one in node.args if isinstance(one, ast.Name | ast.Attribute)]
-        if len(node.args) >= 2 and plain[:2] == node.args[:2]:
+        if len(node.args) >= 2 and plain[:2] == node.args[:2] and name not in _SYMMETRIC:
             (first, _), (_, last) = self._span(node.args[0]), self._span(node.args[1])
             yield first, last, f"{self._source(node.args[1])}, {self._source(node.args[0])}", node.lineno
 
