@@ -29,7 +29,7 @@ def blocks(segments: Sequence[Segment]) -> Iterator[Block]:
     for segment in segments:
         for first in range(0, len(segment.times), _BLOCK):
             part = slice(first, min(first + _BLOCK, len(segment.times)))
-            if held and count + part.stop - first > _BLOCK:
+            if count + part.stop - first > _BLOCK:
                 yield _merged(held)
                 held, count = [], 0
             held.append((segment, part))

@@ -103,9 +103,7 @@ class _Finder:
             if node.name in _PRINTS:
                 return
             place = node.name if place == "module" else f"{place}.{node.name}"
-        elif isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom | ast.Assert) or (
-            isinstance(node, ast.keyword) and node.arg == "strict"  # of zip: another assertion
-        ):
+        elif _is_left_alone(node):
             return
         for start, end, after, at in self._of(node):
             before = self.text[start:end]
@@ -177,6 +175,17 @@ class _Finder:
         if len(node.args) >= 2 and plain[:2] == node.args[:2] and name not in _SYMMETRIC:
             (first, _), (_, last) = self._span(node.args[0]), self._span(node.args[1])
             yield first, last, f"{self._source(node.args[1])}, {self._source(node.args[0])}", node.lineno
+
+
+def _is_left_alone(node: ast.AST) -> bool:
+    """Messages, imports, assertions (`strict` of `zip` is one), and the seeds of random numbers."""
+    match node:
+        case ast.Raise() | ast.JoinedStr() | ast.Import() | ast.ImportFrom() | ast.Assert():
+            return True
+        case ast.keyword(arg="strict") | ast.Call(func=ast.Attribute(attr="default_rng")):
+            return True
+        case _:
+            return False
 
 
 def _other(value: float) -> str:
