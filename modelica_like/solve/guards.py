@@ -6,6 +6,8 @@ import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import casadi as ca
@@ -34,7 +36,7 @@ class Guards:
         self.count = len(self.state_events)
         self.positions = {id(one): k for k, one in enumerate(self.state_events)}
         self._at = model.fast("guards at", lambda: _clean(model, self.state_events))
-        self._modes = sorted({one.mode for one in self.state_events})
+        self._modes = np.array(sorted({one.mode for one in self.state_events}), int)
         self._active: dict[bytes, Any] = {}
 
     def active(self, d: Vector) -> Any:
@@ -162,20 +164,19 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Itera
         active: numbers of the active ones.
         step: longest distance of two times in s.
     """
-    values, rates = values[active], rates[active]
+    values, rates = values.take(active, 0), rates.take(active, 0)
     below, up = values <= 0, rates > _NOISE / step
-    rises = below[:, :-1] > below[:, 1:]
-    humps = up[:, :-1] > up[:, 1:]
-    humps &= below[:, :-1]
-    humps &= below[:, 1:]
-    for k in np.flatnonzero((rises | humps).any(axis=0)).tolist():
-        group = [Candidate(int(active[g]), k, False) for g in rises[:, k].nonzero()[0]]
-        for g in humps[:, k].nonzero()[0]:
-            ends = values[g, k : k + 2], rates[g, k : k + 2] * step
-            if _nearly(*ends[0].tolist(), *ends[1].tolist()):
-                group.append(Candidate(int(active[g]), k, True))
-        if group:
-            yield group
+    some = below[:, :-1] & ((below > up)[:, 1:] & up[:, :-1] | ~below[:, 1:])
+    pairs = zip(*(part.tolist() for part in some.T.nonzero()), strict=True)
+    for k, those in groupby(pairs, key=itemgetter(0)):
+        rises, humps = list[Candidate](), list[Candidate]()
+        for _, g in those:
+            if not below[g, k + 1]:
+                rises.append(Candidate(int(active[g]), k, False))
+            elif _nearly(*values[g, k : k + 2].tolist(), *(rates[g, k : k + 2] * step).tolist()):
+                humps.append(Candidate(int(active[g]), k, True))
+        if rises or humps:
+            yield rises + humps
 
 
 def _nearly(g0: float, g1: float, r0: float, r1: float) -> bool:

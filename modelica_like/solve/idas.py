@@ -100,25 +100,25 @@ class Integrator:
         self.gave_up: StepFailed
         self.interrupts = Interrupts()
         self._relaxed = 1.0
+        self.rtol, self._absolute = self._tolerances()
         self._gentle_from = np.inf
         self._whole = whole and len(model.states) >= _SPARSE_FROM
         self._seconds: float | None = None
         self._tail = np.concatenate([model.p, model.u])
 
-    @property
-    def rtol(self) -> float:
-        """Present relative tolerance."""
-        return self.options.rtol * self._relaxed
+    def _tolerances(self) -> tuple[float, Vector]:
+        """Return the present relative tolerance, and the absolute tolerances of the states."""
+        return self.options.rtol * self._relaxed, self.options.atol * self._relaxed * self.model.nominals
 
     def weights(self, x: Vector) -> Vector:
         """Error weights of states from relative and absolute tolerance; shape as x, (nx,) or (nx, n)."""
-        absolute = self.options.atol * self._relaxed * self.model.nominals
-        return self.rtol * np.abs(x) + (absolute if x.ndim == 1 else absolute[:, None])
+        return self.rtol * np.abs(x) + (self._absolute if x.ndim == 1 else self._absolute[:, None])
 
     def relax(self) -> bool:
         """Relax the tolerances by ten, once; False if they are already."""
         first = self._relaxed == 1.0
         self._relaxed = _RELAXATION
+        self.rtol, self._absolute = self._tolerances()
         return first
 
     def _instance(self, outputs: int, steps: int, gentle: bool, first: float) -> BufferedFunction:
@@ -220,7 +220,7 @@ class Integrator:
         screen, sys.stderr = sys.stderr, io.StringIO()
         why = ""
         try:
-            with self.interrupts.watched(), self.interrupts.swallowed():
+            with self.interrupts:
                 x, z = instance(start.x, start.z, known(p)[0])
         except RuntimeError as error:
             why = f"{sys.stderr.getvalue()} {error}"

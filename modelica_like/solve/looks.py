@@ -43,6 +43,7 @@ class Scheme:
         # The middle is representative of the interval: near a look both agree with it, even with a wrong slope.
         self.middle = 0.5**EXPONENTS @ np.stack([self.precise, self.coarse], axis=1)
         self.doubt = self.middle[:, 0] - self.middle[:, 1]
+        self.both = np.concatenate([self.precise, self.middle], axis=1)
 
     def _basis(self, first: int, count: int, cell: int) -> Vector:
         """Coefficients of each datum, in powers of the passed share of a cell; (powers, data).
@@ -85,7 +86,8 @@ class Cell:
 
     def __init__(self, scheme: Scheme, t: float, width: float, k: int, number: int, base: Vector, data: Vector) -> None:
         self.t, self.width, self.k, self._base = t, width, k, base
-        self._precise, self.middle = scheme.precise[number] @ data, base + scheme.middle[number] @ data
+        found = scheme.both[number] @ data
+        self._precise, self.middle = found[:_TERMS], base + found[_TERMS:]
 
     def states(self, t: float) -> Vector:
         """Return the states at a time in it, by the polynomial of degree seven; shape (nx,)."""
@@ -160,7 +162,7 @@ class Looks:
         for scheme in SCHEMES:
             if scheme.nodes > self.count + 1:
                 continue
-            first = int(scheme.first(k, max(last, scheme.nodes - 1)))
+            first = max(min(k - scheme.nodes // 2, max(last - scheme.nodes, -1)) + 1, 0)
             nodes = slice(first, first + scheme.nodes)
             data = (self.x[:, nodes] - base[:, None]).T
             if scheme.slopes:
@@ -180,13 +182,20 @@ class Looks:
         return point, guards
 
     def _guess(self, t: float, cell: Cell) -> Vector:
+        if not len(self.z):
+            return self.z[:, 0]
         begin, end = self.z[:, cell.k], self.z[:, cell.k + 1]
-        return begin + (t - cell.t) / cell.width * (end - begin) if len(begin) else begin
+        return begin + (t - cell.t) / cell.width * (end - begin)
 
     def is_precise(self, cell: Cell) -> bool:
         """Whether interpolated states in the middle of an interval are within the tolerances."""
+        return self._tolerated(cell) is not None
+
+    def _tolerated(self, cell: Cell) -> Vector | None:
+        """Return the tolerances of the states in the middle of an interval, if interpolation is within them."""
         precise, coarse = cell.middle
-        return bool((np.abs(precise - coarse) <= PRECISE * self.integrator.weights(precise)).all())
+        weights = self.integrator.weights(precise)
+        return weights if (np.abs(precise - coarse) <= PRECISE * weights).all() else None
 
     def is_sharp(self, cell: Cell, ends: Ends, *, fresh: bool) -> bool:
         """Whether interpolated states in the middle are precise, and precise enough for guards with these values.
@@ -194,10 +203,10 @@ class Looks:
         A guard may depend on states that are small compared with their tolerances: it is trusted only if the
         integrator has just started (`fresh`).
         """
-        if not self.is_precise(cell):
+        weights = self._tolerated(cell)
+        if weights is None:
             return False
-        t, precise = cell.t + 0.5 * cell.width, cell.middle[:1]
-        states = np.concatenate([cell.middle, precise + self.integrator.weights(precise[0])])
+        t, states = cell.t + 0.5 * cell.width, np.array([*cell.middle, cell.middle[0] + weights])
         near = self.guards.near(t, states, self._guess(t, cell), self.d)
         rough, moved = np.abs(near[1:] - near[0]).tolist()
         sizes = [(g, abs(g0) + abs(g1)) for g, (g0, g1, *_) in ends.items()]

@@ -121,12 +121,12 @@ class Recorder:
             self._closed.append((self._open, d.copy()))
             self._open = []
 
-    def build(self) -> None:
-        """Build the finished segments of known points."""
+    def build(self, *, complete: bool = True) -> None:
+        """Build the finished segments; unless `complete`, of points that are not nan only."""
         for parts, d in self._closed:
             times, x, z = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
-            known = ~np.isnan(x).any(axis=0)
-            if not known.all():
+            if not complete:
+                known = ~np.isnan(x).any(axis=0)
                 times, x, z = times[known], x[:, known], z[:, known]
             self.segments.append(Segment(times, x, z, d))
         self._closed = []
