@@ -268,7 +268,7 @@ class _Audit:
         self.times.append(some.times[starts])
         self.starts.append(stored[:, starts])
         self.ends.append(stored[:, places == some.last])
-        self._largest = np.maximum(self._largest, np.max(np.abs(some.terms[1:]), axis=(0, 2), initial=0.0))
+        self._largest = np.maximum(self._largest, np.abs(some.terms[1:]).max(axis=2).max(axis=0))
         for k, values in enumerate((np.abs(inflow + source - lost - rate), -lost)):
             worst = np.max(values, axis=1)
             later = worst > self._worst[k]

@@ -48,6 +48,8 @@ _BESIDE = np.array([[1 / 2, 1 / 2], [2 / 3, 1 / 3], [1 / 2, 1 / 2]])
 """Weights of the powers at both ends of an interval: with slopes at both, at the first, and without slopes."""
 _NOTHING = 1e-15
 """Energy, in J, that counts as rest: it is rounding."""
+_DECAYED = 1e-200
+"""Power in W that counts as none."""
 _CLOSE = 0.1
 """Distance of two results, relative to the next one, below which one of them is left out."""
 
@@ -249,7 +251,7 @@ class Powers:
             # There is no information between the results.
             return np.ones(len(places), bool)
         mixed, stored = _mixed(terms[1 : 1 + POWERS]), _mixing(terms[0].shape[0]) @ terms[0]
-        best, lower, lowest = np.matmul(weights, mixed.T[places]).transpose(1, 2, 0).copy()
+        best, lower, lowest = np.matmul(weights, mixed.T.take(places, 0)).transpose(1, 2, 0).copy()
         if len(bent):
             for rule, more in zip((best, lower), bends, strict=True):
                 rule[:, bent] += _mixed(more.reshape(POWERS, terms.shape[1], -1))
@@ -298,7 +300,10 @@ def _ratio(small: Vector, large: Vector) -> Vector:
 def _mixed(powers: Vector) -> Vector:
     """Return two sums each, with different weights, of powers and of rates of stored energies; (4, n)."""
     flat, rates = powers.reshape(-1, powers.shape[-1]), powers[-1]
-    return np.concatenate([_mixing(len(flat)) @ flat, _mixing(len(rates)) @ rates])
+    mixed = np.concatenate([_mixing(len(flat)) @ flat, _mixing(len(rates)) @ rates])
+    # Processors are slow with numbers near the smallest one, which are left of a decay.
+    mixed[np.abs(mixed) < _DECAYED] = 0.0
+    return mixed
 
 
 @cache
