@@ -43,7 +43,6 @@ class Scheme:
         # The middle is representative of the interval: near a look both agree with it, even with a wrong slope.
         self.middle = 0.5**EXPONENTS @ np.stack([self.precise, self.coarse], axis=1)
         self.doubt = self.middle[:, 0] - self.middle[:, 1]
-        self.both = np.concatenate([self.precise, self.middle], axis=1)
 
     def _basis(self, first: int, count: int, cell: int) -> Vector:
         """Coefficients of each datum, in powers of the passed share of a cell; (powers, data).
@@ -81,19 +80,18 @@ class Cell:
         data: values relative to `base`, and perhaps slopes times `width`, shape (8, nx).
 
     Attributes:
-        middle: states in its middle by the polynomials of both degrees, shape (2, nx).
+        middle: weights of the data in the states in its middle by the polynomials of both degrees, shape (2, 8).
     """
 
     def __init__(self, scheme: Scheme, t: float, width: float, k: int, number: int, base: Vector, data: Vector) -> None:
-        self.t, self.width, self.k, self._base = t, width, k, base
-        found = scheme.both[number] @ data
-        self._precise, self.middle = found[:_TERMS], base + found[_TERMS:]
+        self.t, self.width, self.k, self.base, self.data = t, width, k, base, data
+        self._precise, self.middle = scheme.precise[number] @ data, scheme.middle[number]
 
     def states(self, t: float) -> Vector:
         """Return the states at a time in it, by the polynomial of degree seven; shape (nx,)."""
         if t <= self.t:
-            return self._base.copy()
-        return self._base + ((t - self.t) / self.width) ** EXPONENTS @ self._precise
+            return self.base.copy()
+        return self.base + ((t - self.t) / self.width) ** EXPONENTS @ self._precise
 
 
 class Looks:
@@ -189,13 +187,8 @@ class Looks:
 
     def is_precise(self, cell: Cell) -> bool:
         """Whether interpolated states in the middle of an interval are within the tolerances."""
-        return self._tolerated(cell) is not None
-
-    def _tolerated(self, cell: Cell) -> Vector | None:
-        """Return the tolerances of the states in the middle of an interval, if interpolation is within them."""
-        precise, coarse = cell.middle
-        weights = self.integrator.weights(precise)
-        return weights if (np.abs(precise - coarse) <= PRECISE * weights).all() else None
+        precise, coarse = cell.base + cell.middle @ cell.data
+        return bool((np.abs(precise - coarse) <= PRECISE * self.integrator.weights(precise)).all())
 
     def is_sharp(self, cell: Cell, ends: Ends, *, fresh: bool) -> bool:
         """Whether interpolated states in the middle are precise, and precise enough for guards with these values.
@@ -203,11 +196,10 @@ class Looks:
         A guard may depend on states that are small compared with their tolerances: it is trusted only if the
         integrator has just started (`fresh`).
         """
-        weights = self._tolerated(cell)
-        if weights is None:
+        t, tolerances = cell.t + 0.5 * cell.width, self.integrator.tolerances
+        guess = self._guess(t, cell)
+        doubt, rough, moved = self.guards.near(t, cell.base, cell.data, cell.middle, tolerances, guess, self.d)
+        if doubt > PRECISE:
             return False
-        t, states = cell.t + 0.5 * cell.width, np.array([*cell.middle, cell.middle[0] + weights])
-        near = self.guards.near(t, states, self._guess(t, cell), self.d)
-        rough, moved = np.abs(near[1:] - near[0]).tolist()
         sizes = [(g, abs(g0) + abs(g1)) for g, (g0, g1, *_) in ends.items()]
         return all(rough[g] <= _SHARP * size and (fresh or moved[g] <= size) for g, size in sizes)
