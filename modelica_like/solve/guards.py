@@ -138,12 +138,11 @@ def _clean(model: CompiledDae, events: list[CompiledTransition]) -> ca.Function:
 def _near(model: CompiledDae, terms: int) -> ca.Function:
     nx = len(model.states)
     shapes = {"base": (nx, 1), "data": (nx, terms), "two": (terms, 2), "relative": (1, 1), "absolute": (nx, 1)}
-    base, data, two, relative, absolute = symbols = [ca.SX.sym(name, *shape) for name, shape in shapes.items()]
+    base, data, two, relative, absolute = given = [ca.MX.sym(name, *shape) for name, shape in shapes.items()]
     precise, coarse = ca.horzsplit(ca.repmat(base, 1, 2) + data @ two)
     allowed = relative * ca.fabs(precise) + absolute
     doubts = ca.fabs(precise - coarse) / allowed
-    doubt = ca.mmax(ca.vertcat(0, ca.if_else(doubts < np.inf, doubts, np.inf)))
-    middle = ca.Function("middle", symbols, [doubt, ca.horzcat(precise, coarse, precise + allowed)])
+    doubt = ca.mmax(ca.densify(ca.vertcat(0, ca.if_else(doubts < np.inf, doubts, np.inf))))
     arguments = list(model.arguments.values())
     values = ca.Function("guards", arguments, [_numbers(model.guards(*arguments))], {"cse": True})
     if model.implicit:
@@ -151,8 +150,7 @@ def _near(model: CompiledDae, terms: int) -> ca.Function:
         values = ca.Function("guards", arguments := following.mx_in(), following.call(arguments)[:1])
     everywhere = values.map("guards_near", "serial", 3, [0, 2, 3, 4, 5], [])
     t, _, *rest = everywhere.mx_in()
-    doubt, states = middle.call(given := middle.mx_in())
-    first, second, third = ca.horzsplit(everywhere(t, states, *rest))
+    first, second, third = ca.horzsplit(everywhere(t, ca.horzcat(precise, coarse, precise + allowed), *rest))
     return ca.Function("near", [t, *given, *rest], [doubt, ca.fabs(second - first), ca.fabs(third - first)])
 
 
