@@ -2,6 +2,8 @@
 
 Run with `python benchmarks/segments.py [name …]`. The floor restarts IDAS at every event, too, with as many results as
 the run has there, but looks at no guard and searches for nothing. Both in one process, CPU time, best of several.
+All calls of compiled functions in a run are then repeated with the same arguments and nothing between: what is left
+of the run is Python.
 """
 
 from __future__ import annotations
@@ -12,7 +14,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from modelica_like import Solution, build, simulate
+from modelica_like.compile.buffers import BufferedFunction
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.solve.idas import Integrator
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -53,16 +59,40 @@ def segment_calls(run: Solution) -> Callable[[], None]:
     return integrate
 
 
+def compiled_calls(model: CompiledDae) -> tuple[Callable[[], None], int]:
+    """Return the calls of compiled functions in a run as an action, and their number."""
+    calls: list[tuple[BufferedFunction, list[Any]]] = []
+    ordinary = BufferedFunction.__call__
+
+    def recorded(self: BufferedFunction, *arguments: Any) -> list[Vector]:
+        calls.append((self, [np.array(one) for one in arguments]))
+        return ordinary(self, *arguments)
+
+    BufferedFunction.__call__ = recorded
+    try:
+        simulate(model)
+    finally:
+        BufferedFunction.__call__ = ordinary
+
+    def repeat() -> None:
+        for function, arguments in calls:
+            function(*arguments)
+
+    return repeat, len(calls)
+
+
 def measure(name: str) -> str:
     model = build(EXAMPLES / f"{NETLISTS[name]}.toml")
     run = simulate(model)
     floor = segment_calls(run)
     floor()
-    with_events, alone = best(lambda: simulate(model)), best(floor)
+    repeat, count = compiled_calls(model)
+    with_events, alone, compiled = best(lambda: simulate(model)), best(floor), best(repeat)
     return (
         f"{name:16s} {with_events * 1e3:8.2f} ms with {len(run.events):4d} mode changes, "
         f"{run.statistics.integrations:4d} IDAS calls, {run.statistics.steps:6d} steps; "
-        f"{len(run.segments):4d} segments alone {alone * 1e3:8.2f} ms; ratio {with_events / alone:5.2f}"
+        f"{len(run.segments):4d} segments alone {alone * 1e3:8.2f} ms; ratio {with_events / alone:5.2f}; "
+        f"{count:4d} compiled calls {compiled * 1e3:8.2f} ms"
     )
 
 

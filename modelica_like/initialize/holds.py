@@ -200,7 +200,7 @@ def _yield_to_contradiction(
 
 def _capacities(limits: Any) -> Vector:
     """Capacities for the split: an unlimited element takes nearly all, one without capacity nearly nothing."""
-    given = np.nan_to_num(limits.max(axis=1))
+    given = np.fmax(limits.max(axis=1), 0.0)
     limited = given[(given < UNLIMITED) & (given > 0.0)]
     largest = float(limited.max(initial=0.0)) or 1.0
     return np.clip(given, _SMALL * largest, _LARGE * largest)

@@ -111,13 +111,15 @@ def interpolate(integrator: Integrator, pieces: list[Piece]) -> list[tuple[int, 
     k: Any = np.minimum(passed.astype(int), counts[owner] - 1)
     place: Any = (np.cumsum(counts + 1) - counts - 1)[owner] + k
     share = passed - k
-    new = np.diff(place, prepend=-1) > 0
+    new = np.append(True, place[1:] > place[:-1])
     cell: Any = np.cumsum(new) - 1
     changes, left = _cells(integrator, pieces, x, owner[new], k[new])
     powers = np.vander(share, len(EXPONENTS), increasing=True)
     found = x[:, place] + np.einsum("np,inp->in", powers, changes[:, cell])
     guess = z[:, place] + share * (z[:, place + 1] - z[:, place])
-    implicit = integrator.polished(times, found, guess, np.array([one.d for one in looks])[owner].T)
+    implicit = (
+        integrator.polished(times, found, guess, np.array([one.d for one in looks])[owner].T) if len(z) else guess
+    )
     for piece, end, length in zip(pieces, np.cumsum(lengths), lengths, strict=True):
         piece.x[:], piece.z[:] = found[:, end - length : end], implicit[:, end - length : end]
     return list(zip(owner[new][left].tolist(), k[new][left].tolist(), strict=True))
@@ -151,7 +153,7 @@ def _cells(integrator: Integrator, pieces: list[Piece], x: Vector, owner: Any, k
         if scheme.slopes:
             data = np.concatenate([data, widths[owner[those], None] * np.take(slopes, nodes, axis=1)], axis=2)
         number = k[those] - first
-        for one in range(scheme.nodes - 1):
+        for one in set(number.tolist()):
             changes[:, those[number == one]] = data[:, number == one] @ scheme.precise[one].T
         doubt = np.abs(np.einsum("ink,nk->in", data, scheme.doubt[number]))
         left[those] = ~(doubt <= PRECISE * integrator.weights(base[:, those])).all(axis=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -222,10 +223,9 @@ def energy_balance(
     audit, totals = _Audit(count), np.zeros((POWERS, count))
     options = options or Options()
     powers = Powers(model, options, sum(len(segment.times) for segment in segments))
-    with powers.integrator.interrupts.watched():
-        for some in results(model, segments):
-            totals += powers.integrals(some)
-            audit.see(some)
+    for some in results(model, segments):
+        totals += powers.integrals(some)
+        audit.see(some)
     lost, source, inflow, rate = totals
     starts, ends = (np.concatenate(parts, axis=1) for parts in (audit.starts, audit.ends))
     struck, given, at_start = _impacts(model, impacts, float(audit.times[0][0]), starts[:, 0])
@@ -236,7 +236,7 @@ def energy_balance(
         inflow, source + work, change, lost + impact, at_once, inflow + source - lost - rate, change - at_once - rate,
         impact, *audit.found(model),
     )  # fmt: skip
-    rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
+    rows = tuple(map(EnergyRow, model.components, *(column.tolist() for column in columns)))
     exchanged = (inflow, source + work, lost + impact)
     throughput = max([powers.stored, powers.cancelled, *(float(np.sum(np.abs(part))) for part in exchanged)])
     reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
@@ -268,7 +268,7 @@ class _Audit:
         self.times.append(some.times[starts])
         self.starts.append(stored[:, starts])
         self.ends.append(stored[:, places == some.last])
-        self._largest = np.maximum(self._largest, np.max(np.abs(some.terms[1:]), axis=(0, 2), initial=0.0))
+        self._largest = np.maximum(self._largest, np.abs(some.terms[1:]).max(axis=2).max(axis=0))
         for k, values in enumerate((np.abs(inflow + source - lost - rate), -lost)):
             worst = np.max(values, axis=1)
             later = worst > self._worst[k]
@@ -340,20 +340,20 @@ def _impacts(
 
 def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], told: Sequence[tuple[float, float]]) -> float:
     """Return the largest unexplained change of all stored energies together at an instant, in J."""
-    instants, place = np.unique(times, return_inverse=True)
-    if not len(instants):
-        return 0.0
-    left = np.bincount(place, jumps)
+    left: dict[float, float] = {}
+    for time, jump in zip(times.tolist(), jumps.tolist(), strict=True):
+        left[time] = left.get(time, 0.0) + jump
+    instants = list(left)
 
-    def at(time: float) -> int | None:
+    def at(time: float) -> float | None:
         near = _SAME_TIME * max(1.0, abs(time))
-        k = int(np.searchsorted(instants, time - near))
-        return k if k < len(instants) and instants[k] <= time + near else None
+        k = bisect_left(instants, time - near)
+        return instants[k] if k < len(instants) and instants[k] <= time + near else None
 
     for time, lost in told:
-        if (k := at(time)) is not None:
-            left[k] += lost
+        if (instant := at(time)) is not None:
+            left[instant] += lost
     for time in reset:
-        if (k := at(time)) is not None:
-            left[k] = 0.0
-    return float(np.max(np.abs(left)))
+        if (instant := at(time)) is not None:
+            left[instant] = 0.0
+    return max(map(abs, left.values()), default=0.0)

@@ -111,7 +111,7 @@ class EventLoop:
     def _write(self, *, precisely: bool = True) -> None:
         """Interpolate results, and build the finished segments."""
         self.between.fill(precisely=precisely)
-        self.record.build()
+        self.record.build(complete=precisely)
 
     def _known(self) -> float:
         """Return the time up to which delayed values are known, renewed where they end."""
@@ -183,7 +183,7 @@ class EventLoop:
     def _add(self, piece: Piece, times: Vector) -> None:
         """Record the results of a piece at some of its times."""
         if len(times):
-            some = slice(begin := int(np.searchsorted(piece.times, times[0])), begin + len(times))
+            some = slice(begin := int(piece.times.searchsorted(times[0])), begin + len(times))
             self.record.add(times, piece.x[:, some], piece.z[:, some])
 
     def _closer(self, looks: Looks, k: int) -> Looks:

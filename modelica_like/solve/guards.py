@@ -34,7 +34,7 @@ class Guards:
         self.count = len(self.state_events)
         self.positions = {id(one): k for k, one in enumerate(self.state_events)}
         self._at = model.fast("guards at", lambda: _clean(model, self.state_events))
-        self._modes = sorted({one.mode for one in self.state_events})
+        self._modes = np.array(sorted({one.mode for one in self.state_events}), int)
         self._active: dict[bytes, Any] = {}
 
     def active(self, d: Vector) -> Any:
@@ -60,11 +60,28 @@ class Guards:
         *found, point.z = follow(point.t, point.x, point.z, model.p, model.u, point.d)
         return found
 
-    def near(self, t: float, x: Vector, z: Vector, d: Vector) -> Vector:
-        """Return guards at three nearby points that share a guess for the implicit unknowns; shapes (3, nx), (3, n)."""
+    def near(
+        self, t: float, base: Vector, data: Vector, two: Vector, tolerances: tuple[float, Vector], z: Vector, d: Vector
+    ) -> tuple[float, list[float], list[float]]:
+        """Judge two interpolations of the states at a time by the states, and by the guards they give.
+
+        Args:
+            t: in s.
+            base: is added to both, shape (nx,).
+            data: what is interpolated, shape (terms, nx).
+            two: weights of the data in both, shape (2, terms).
+            tolerances: relative one, and absolute ones of the states.
+            z: guess for the implicit unknowns.
+            d: modes and discrete values.
+
+        Returns:
+            The largest difference of a state in tolerances (infinite if one is no number), the differences of the
+            guards, and their changes if the states of the first interpolation change by their tolerances.
+        """
         model = self.model
-        near = model.fast("guards near", lambda: _near(model))
-        return near(t, x.ravel(), z, model.p, model.u, d)[0].reshape(len(x), -1)
+        near = model.fast("guards near", lambda: _near(model, len(data)))
+        doubt, rough, moved = near(t, base, data.ravel(), two.ravel(), *tolerances, z, model.p, model.u, d)
+        return float(doubt[0]), rough.tolist(), moved.tolist()
 
     def wanting(self, point: Point) -> list[CompiledTransition]:
         """State events that fire now: positive, or positive within the time resolution."""
@@ -118,13 +135,23 @@ def _clean(model: CompiledDae, events: list[CompiledTransition]) -> ca.Function:
     return ca.Function("guards_at", arguments, [ca.densify(one) for one in ca.cse([results[0], rates, results[1]])])
 
 
-def _near(model: CompiledDae) -> ca.Function:
+def _near(model: CompiledDae, terms: int) -> ca.Function:
+    nx = len(model.states)
+    shapes = {"base": (nx, 1), "data": (nx, terms), "two": (terms, 2), "relative": (1, 1), "absolute": (nx, 1)}
+    base, data, two, relative, absolute = given = [ca.MX.sym(name, *shape) for name, shape in shapes.items()]
+    precise, coarse = ca.horzsplit(ca.repmat(base, 1, 2) + data @ two)
+    allowed = relative * ca.fabs(precise) + absolute
+    doubts = ca.fabs(precise - coarse) / allowed
+    doubt = ca.mmax(ca.densify(ca.vertcat(0, ca.if_else(doubts < np.inf, doubts, np.inf))))
     arguments = list(model.arguments.values())
     values = ca.Function("guards", arguments, [_numbers(model.guards(*arguments))], {"cse": True})
     if model.implicit:
         following = _following(model, values)
         values = ca.Function("guards", arguments := following.mx_in(), following.call(arguments)[:1])
-    return values.map("guards_near", "serial", 3, [0, 2, 3, 4, 5], [])
+    everywhere = values.map("guards_near", "serial", 3, [0, 2, 3, 4, 5], [])
+    t, _, *rest = everywhere.mx_in()
+    first, second, third = ca.horzsplit(everywhere(t, ca.horzcat(precise, coarse, precise + allowed), *rest))
+    return ca.Function("near", [t, *given, *rest], [doubt, ca.fabs(second - first), ca.fabs(third - first)])
 
 
 def _following(model: CompiledDae, at: ca.Function) -> ca.Function:
@@ -162,20 +189,18 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Itera
         active: numbers of the active ones.
         step: longest distance of two times in s.
     """
-    values, rates = values[active], rates[active]
+    values, rates = values.take(active, 0), rates.take(active, 0)
     below, up = values <= 0, rates > _NOISE / step
-    rises = below[:, :-1] > below[:, 1:]
-    humps = up[:, :-1] > up[:, 1:]
-    humps &= below[:, :-1]
-    humps &= below[:, 1:]
-    for k in np.flatnonzero((rises | humps).any(axis=0)).tolist():
-        group = [Candidate(int(active[g]), k, False) for g in rises[:, k].nonzero()[0]]
-        for g in humps[:, k].nonzero()[0]:
-            ends = values[g, k : k + 2], rates[g, k : k + 2] * step
-            if _nearly(*ends[0].tolist(), *ends[1].tolist()):
-                group.append(Candidate(int(active[g]), k, True))
-        if group:
-            yield group
+    some = below[:, :-1] & ((below > up)[:, 1:] & up[:, :-1] | ~below[:, 1:])
+    for k in np.logical_or.reduce(some, axis=0).nonzero()[0].tolist():
+        rises, humps = list[Candidate](), list[Candidate]()
+        for g in some[:, k].nonzero()[0].tolist():
+            if not below[g, k + 1]:
+                rises.append(Candidate(int(active[g]), k, False))
+            elif _nearly(*values[g, k : k + 2].tolist(), *(rates[g, k : k + 2] * step).tolist()):
+                humps.append(Candidate(int(active[g]), k, True))
+        if rises or humps:
+            yield rises + humps
 
 
 def _nearly(g0: float, g1: float, r0: float, r1: float) -> bool:

@@ -88,6 +88,9 @@ class Integrator:
         options: tolerances.
         whole: whether intervals are whole runs: then large models get an instance for each length, which is faster.
         counted: whether to count steps and evaluations, which costs as much as five steps.
+
+    Attributes:
+        tolerances: present relative one, and absolute ones of the states.
     """
 
     def __init__(self, model: CompiledDae, options: Options, *, whole: bool = False, counted: bool = True) -> None:
@@ -99,7 +102,7 @@ class Integrator:
         self.evaluations = 0
         self.gave_up: StepFailed
         self.interrupts = Interrupts()
-        self._relaxed = 1.0
+        self._relax(1.0)
         self._gentle_from = np.inf
         self._whole = whole and len(model.states) >= _SPARSE_FROM
         self._seconds: float | None = None
@@ -108,18 +111,22 @@ class Integrator:
     @property
     def rtol(self) -> float:
         """Present relative tolerance."""
-        return self.options.rtol * self._relaxed
+        return self.tolerances[0]
 
     def weights(self, x: Vector) -> Vector:
         """Error weights of states from relative and absolute tolerance; shape as x, (nx,) or (nx, n)."""
-        absolute = self.options.atol * self._relaxed * self.model.nominals
-        return self.rtol * np.abs(x) + (absolute if x.ndim == 1 else absolute[:, None])
+        relative, absolute = self.tolerances
+        return relative * np.abs(x) + (absolute if x.ndim == 1 else absolute[:, None])
 
     def relax(self) -> bool:
         """Relax the tolerances by ten, once; False if they are already."""
         first = self._relaxed == 1.0
-        self._relaxed = _RELAXATION
+        self._relax(_RELAXATION)
         return first
+
+    def _relax(self, factor: float) -> None:
+        self._relaxed = factor
+        self.tolerances = self.options.rtol * factor, self.options.atol * factor * self.model.nominals
 
     def _instance(self, outputs: int, steps: int, gentle: bool, first: float) -> BufferedFunction:
         key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first, None if gentle else self._seconds
@@ -220,7 +227,7 @@ class Integrator:
         screen, sys.stderr = sys.stderr, io.StringIO()
         why = ""
         try:
-            with self.interrupts.watched(), self.interrupts.swallowed():
+            with self.interrupts:
                 x, z = instance(start.x, start.z, known(p)[0])
         except RuntimeError as error:
             why = f"{sys.stderr.getvalue()} {error}"

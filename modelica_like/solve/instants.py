@@ -54,7 +54,7 @@ SAME_TIME = 1e-12
 
 def just_after(t: float) -> float:
     """Return the latest time that counts as equal."""
-    return t + SAME_TIME * max(1.0, abs(t))
+    return t + (SAME_TIME * t if t > 1.0 else SAME_TIME if t > -1.0 else -SAME_TIME * t)
 
 
 class Instants:
@@ -87,7 +87,7 @@ class Instants:
 
     def next_moment(self, now: Point) -> float:
         """Time of the next time event, or infinity."""
-        return min((t for _, t in self.ahead(now)), default=np.inf)
+        return min((t for _, t in self.ahead(now)), default=np.inf) if self.timed else np.inf
 
     def ahead(self, now: Point) -> list[tuple[CompiledTransition, float]]:
         """Time events that come, with their times."""
@@ -96,13 +96,13 @@ class Instants:
 
     def due(self, now: Point) -> list[CompiledTransition]:
         """Time events whose time is reached."""
+        if not self.timed:
+            return []
         here = just_after(now.t)
         return [one for one, moment in self._planned(now) if moment <= here]
 
     def _planned(self, now: Point) -> list[tuple[CompiledTransition, float]]:
         """Time events of the present modes with their times, which only discrete values change."""
-        if not self.timed:
-            return []
         key = now.d.tobytes()
         if key != self._moments[0]:
             moments = call(self.model, self.model.moments, now).tolist()

@@ -19,39 +19,42 @@ class Interrupts:
 
     def __init__(self) -> None:
         self._previous: Any = None
-        self._foreign = False
+        self._foreign = self._alone = False
         self._raised: BaseException | None = None
 
     @contextmanager
     def watched(self) -> Iterator[None]:
         """Replace the program's handler; once for many calls, because it costs as much as a short call."""
-        alone = self._previous is None and threading.current_thread() is threading.main_thread()
-        previous = signal.getsignal(signal.SIGINT) if alone else None
+        alone = self._replace()
+        try:
+            yield
+        finally:
+            self._give_back(alone)
+
+    def __enter__(self) -> None:
+        """Run foreign code: an interrupt (or another exception of the program's handler) is raised at its end."""
+        self._alone, self._foreign = self._replace(), True
+
+    def __exit__(self, *_: object) -> None:
+        self._foreign = False
+        self._give_back(self._alone)
+        if self._raised is not None:
+            raised, self._raised = self._raised, None
+            raise raised from None
+
+    def _replace(self) -> bool:
+        if self._previous is not None or threading.current_thread() is not threading.main_thread():
+            return False
+        previous = signal.getsignal(signal.SIGINT)
         if callable(previous):
             self._previous = previous
             signal.signal(signal.SIGINT, self._note)
-        try:
-            yield
-        finally:
-            if callable(previous):
-                signal.signal(signal.SIGINT, previous)
-                self._previous = None
+        return callable(previous)
 
-    @contextmanager
-    def swallowed(self) -> Iterator[None]:
-        """Run foreign code.
-
-        Raises:
-            KeyboardInterrupt: or another exception of the program's handler.
-        """
-        self._foreign = True
-        try:
-            yield
-        finally:
-            self._foreign = False
-            if self._raised is not None:
-                raised, self._raised = self._raised, None
-                raise raised from None
+    def _give_back(self, alone: bool) -> None:
+        if alone:
+            signal.signal(signal.SIGINT, self._previous)
+            self._previous = None
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         try:

@@ -80,18 +80,18 @@ class Cell:
         data: values relative to `base`, and perhaps slopes times `width`, shape (8, nx).
 
     Attributes:
-        middle: states in its middle by the polynomials of both degrees, shape (2, nx).
+        middle: weights of the data in the states in its middle by the polynomials of both degrees, shape (2, 8).
     """
 
     def __init__(self, scheme: Scheme, t: float, width: float, k: int, number: int, base: Vector, data: Vector) -> None:
-        self.t, self.width, self.k, self._base = t, width, k, base
-        self._precise, self.middle = scheme.precise[number] @ data, base + scheme.middle[number] @ data
+        self.t, self.width, self.k, self.base, self.data = t, width, k, base, data
+        self._precise, self.middle = scheme.precise[number] @ data, scheme.middle[number]
 
     def states(self, t: float) -> Vector:
         """Return the states at a time in it, by the polynomial of degree seven; shape (nx,)."""
         if t <= self.t:
-            return self._base.copy()
-        return self._base + ((t - self.t) / self.width) ** EXPONENTS @ self._precise
+            return self.base.copy()
+        return self.base + ((t - self.t) / self.width) ** EXPONENTS @ self._precise
 
 
 class Looks:
@@ -160,7 +160,7 @@ class Looks:
         for scheme in SCHEMES:
             if scheme.nodes > self.count + 1:
                 continue
-            first = int(scheme.first(k, max(last, scheme.nodes - 1)))
+            first = max(min(k - scheme.nodes // 2, max(last - scheme.nodes, -1)) + 1, 0)
             nodes = slice(first, first + scheme.nodes)
             data = (self.x[:, nodes] - base[:, None]).T
             if scheme.slopes:
@@ -180,12 +180,14 @@ class Looks:
         return point, guards
 
     def _guess(self, t: float, cell: Cell) -> Vector:
+        if not len(self.z):
+            return self.z[:, 0]
         begin, end = self.z[:, cell.k], self.z[:, cell.k + 1]
-        return begin + (t - cell.t) / cell.width * (end - begin) if len(begin) else begin
+        return begin + (t - cell.t) / cell.width * (end - begin)
 
     def is_precise(self, cell: Cell) -> bool:
         """Whether interpolated states in the middle of an interval are within the tolerances."""
-        precise, coarse = cell.middle
+        precise, coarse = cell.base + cell.middle @ cell.data
         return bool((np.abs(precise - coarse) <= PRECISE * self.integrator.weights(precise)).all())
 
     def is_sharp(self, cell: Cell, ends: Ends, *, fresh: bool) -> bool:
@@ -194,11 +196,10 @@ class Looks:
         A guard may depend on states that are small compared with their tolerances: it is trusted only if the
         integrator has just started (`fresh`).
         """
-        if not self.is_precise(cell):
+        t, tolerances = cell.t + 0.5 * cell.width, self.integrator.tolerances
+        guess = self._guess(t, cell)
+        doubt, rough, moved = self.guards.near(t, cell.base, cell.data, cell.middle, tolerances, guess, self.d)
+        if doubt > PRECISE:
             return False
-        t, precise = cell.t + 0.5 * cell.width, cell.middle[:1]
-        states = np.concatenate([cell.middle, precise + self.integrator.weights(precise[0])])
-        near = self.guards.near(t, states, self._guess(t, cell), self.d)
-        rough, moved = np.abs(near[1:] - near[0]).tolist()
         sizes = [(g, abs(g0) + abs(g1)) for g, (g0, g1, *_) in ends.items()]
         return all(rough[g] <= _SHARP * size and (fresh or moved[g] <= size) for g, size in sizes)

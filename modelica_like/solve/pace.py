@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 
 import numpy as np
 
@@ -48,6 +49,7 @@ class Pace:
     def __init__(self, begin: float, end: float, options: Options, *, guarded: bool, timed: bool) -> None:
         self.begin, self.end, self.points = begin, end, options.points
         self.step = (end - begin) / options.points
+        self._grid = begin + (end - begin) * (np.arange(options.points + 1) / options.points)
         self.on_grid = not (guarded or timed)
         self._even = -(-options.points // -(-options.points // _LARGEST))
         self._density = 1 / self.step / _SPARE
@@ -64,7 +66,7 @@ class Pace:
                 span = min(span, max(math.sqrt(_COST * self._span / self._density), _COST / self._density))
             if t + 1.1 * span >= stop:
                 span = stop - t
-            return span, next((size for size in _SIZES if size >= span * density), _SIZES[-1])
+            return span, _SIZES[min(bisect_left(_SIZES, span * density), len(_SIZES) - 1)]
         whole = math.floor(float(t - self.begin) / self.step + _ON_GRID)
         span = self.begin + (whole + self._even) * self.step - t
         if just_after(t + span) < stop:
@@ -73,21 +75,18 @@ class Pace:
 
     def snap(self, times: Vector) -> None:
         """Put times exactly on the regular grid, so that they do not collect rounding errors."""
-        grid = self._at(np.rint((times - self.begin) / self.step))
+        grid = self.begin + (self.end - self.begin) * (np.rint((times - self.begin) / self.step) / self.points)
         # Equal times, but no others on the grid.
         same = np.minimum(_ON_GRID * self.step, SAME_TIME * np.maximum(1.0, np.abs(grid)))
         on_grid = np.abs(times - grid) <= same
         times[on_grid] = grid[on_grid]
-
-    def _at(self, numbers: Vector) -> Vector:
-        return self.begin + (self.end - self.begin) * (numbers / self.points)
 
     def results(self, first: float, last: float) -> Vector:
         """Return the times of results after `first` up to `last`, with a tolerance."""
         same = min(_ON_GRID * self.step, SAME_TIME * max(1.0, abs(first), abs(last)))
         low = math.floor((first + same - self.begin) / self.step) + 1
         high = math.floor((last + same - self.begin) / self.step)
-        return self._at(np.arange(low, high + 1, dtype=float))
+        return self._grid[low : high + 1]
 
     def before(self, t: float) -> float:
         """Return the latest time of results before an event."""

@@ -33,6 +33,7 @@ _NEAR = 8
 """Intervals that are also integrated again, because a new start would cost more."""
 _DIGITS = 4e-16
 """Relative change of states that shows what in the energies is rounding."""
+_SIGNS = np.array([-1.0, 1.0, -1.0])
 _ROUNDING = 10.0
 """Errors that are left, in such changes."""
 _CANCELLED = 0.1
@@ -47,6 +48,8 @@ _BESIDE = np.array([[1 / 2, 1 / 2], [2 / 3, 1 / 3], [1 / 2, 1 / 2]])
 """Weights of the powers at both ends of an interval: with slopes at both, at the first, and without slopes."""
 _NOTHING = 1e-15
 """Energy, in J, that counts as rest: it is rounding."""
+_DECAYED = 1e-200
+"""Power in W that counts as none."""
 _CLOSE = 0.1
 """Distance of two results, relative to the next one, below which one of them is left out."""
 
@@ -97,20 +100,24 @@ def results(model: CompiledDae, segments: Sequence[Segment]) -> Iterator[Results
 
 
 def _together(model: CompiledDae, segments: list[Segment]) -> Results:
-    sizes = [len(segment.times) for segment in segments]
-    ends = np.cumsum(sizes)
-    times = np.concatenate([segment.times for segment in segments])
-    x, z = (np.concatenate([getattr(segment, name) for segment in segments], axis=1) for name in "xz")
-    d = np.repeat(np.array([segment.d for segment in segments]).T, sizes, axis=1)
+    sizes = np.array([len(segment.times) for segment in segments])
+    ends = sizes.cumsum()
+    count, nx = int(ends[-1]), len(segments[0].x)
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    # One array, so that the results whose last digits are changed stand at its end.
+    some, whole = [0, count // 2, count - 1], np.empty((1 + nx + len(segments[0].z), count + 3))
+    for one, rows in (("times", 0), ("x", slice(1, 1 + nx)), ("z", slice(1 + nx, None))):
+        np.concatenate([getattr(segment, one) for segment in segments], axis=-1, out=whole[rows, :count])
+    whole[:, count:] = whole[:, some]
+    whole[1::2, count:] *= 1.0 + _DIGITS * _SIGNS
+    whole[2::2, count:] *= 1.0 - _DIGITS * _SIGNS
+    d = np.array([segment.d for segment in segments]).T[:, np.append(owner, owner[some])]
     function = model.along("energy terms", lambda: _terms(model))
-    some = [0, len(times) // 2, len(times) - 1]
-    signs = np.where(np.add.outer(np.arange(len(x) + len(z)), np.arange(len(some))) % 2, 1.0, -1.0)
-    moved = np.concatenate([x, z])[:, some] * (1.0 + _DIGITS * signs)
-    more = times[some], moved[: len(x)], moved[len(x) :], d[:, some]
-    at, x_at, z_at, d_at = (np.append(*pair, axis=-1) for pair in zip((times, x, z, d), more, strict=True))
-    found = function(at, x_at, z_at, model.p, model.u, d_at)[0].reshape(-1, len(model.components), len(at))
-    terms, first, last = found[..., : len(times)], np.repeat(ends - sizes, sizes), np.repeat(ends - 1, sizes)
-    return Results(times, x, z, d, first, last, terms, np.abs(found[..., len(times) :] - terms[..., some]))
+    found = function(whole[0], whole[1 : 1 + nx], whole[1 + nx :], model.p, model.u, d)[0]
+    found, whole = found.reshape(-1, len(model.components), count + 3), whole[:, :count]
+    terms, first, last = found[..., :count], (ends - sizes)[owner], (ends - 1)[owner]
+    shaken = np.abs(found[..., count:] - terms[..., some])
+    return Results(whole[0], whole[1 : 1 + nx], whole[1 + nx :], d[:, :count], first, last, terms, shaken)
 
 
 def _terms(model: CompiledDae) -> ca.Function:
@@ -138,35 +145,35 @@ class Powers:
         self.stored, self.moved, self._noise = 0.0, _NOTHING, np.zeros(2)
         rtol = min(options.rtol, max(_FINER * options.rtol, _FINEST))
         finer = replace(options, rtol=rtol, atol=options.atol * rtol / options.rtol)
-        self.integrator = Integrator(model, finer, counted=False)
+        self._integrator = Integrator(model, finer, counted=False)
 
     def integrals(self, every: Results, depth: int = 0) -> Vector:
         """Integrate all powers over some results; shape (4, components), in J.
 
         Where these are too coarse, finer ones are computed between them, if needed repeatedly.
         """
-        kept = _apart(every)
-        first, last = (np.searchsorted(kept, ends[kept]) for ends in (every.first, every.last))
+        steps = every.times[1:] - every.times[:-1]
+        kept = _apart(every, steps)
+        first, last = (kept.searchsorted(ends[kept]) for ends in (every.first, every.last))
         intervals, places, weights = rules(every.times[kept], first, last)
         first, last = first[intervals], last[intervals]
-        terms = np.take(every.terms, kept, axis=-1)
-        powers = terms[1 : 1 + POWERS].reshape(-1, len(kept))
-        self._move(terms[0], powers, np.diff(every.times[kept]))
+        ends, places = kept[np.array([intervals, intervals + 1])], kept[places]
+        powers = every.terms[1 : 1 + POWERS].reshape(-1, len(every.times))
+        self._move(every.terms[0], powers, steps)
         if not depth:
             self._hear(every)
         bent, bends = intervals[:0], np.zeros((2, len(powers), 0))
-        coarse = self._coarse(terms, intervals, places, weights, bent, bends, depth)
-        ends = np.stack([kept[intervals], kept[intervals + 1]])
-        few = np.flatnonzero(coarse & (last - first < _FEW))
+        coarse = self._coarse(every.terms, ends, places, weights, bent, bends, depth)
+        few = (coarse & (last - first < _FEW)).nonzero()[0]
         if len(few) > 1 and self.model.states and not self.model.implicit:
             bent, bends = few, self._bends(every, ends[:, few])
-            places[bent, :2] = intervals[bent, None] + np.arange(2)
+            places[bent, :2] = ends[:, bent].T
             weights[bent] = 0.0
             weights[bent, :, :2] = _BESIDE * np.diff(every.times[ends[:, bent]], axis=0)[0][:, None, None]
-            coarse = self._coarse(terms, intervals, places, weights, bent, bends, depth)
+            coarse = self._coarse(every.terms, ends, places, weights, bent, bends, depth)
         again, finer = self._again(every, ends, _stretches(coarse, first) if depth < _DEEPEST else [])
         weights[again] = 0.0
-        total = powers @ np.bincount(places.ravel(), weights[:, 0].ravel(), len(kept)) + bends[0] @ ~again[bent]
+        total = powers @ np.bincount(places.ravel(), weights[:, 0].ravel(), len(every.times)) + bends[0] @ ~again[bent]
         parts = (self.integrals(some, depth + 1) for some in results(self.model, finer))
         return sum(parts, total.reshape(POWERS, -1))
 
@@ -176,15 +183,18 @@ class Powers:
         If IDAS gives up, stretches are divided; some may remain without finer results.
         """
         again, finer, failures = np.zeros(ends.shape[1], bool), list[Segment](), 0
-        while stretches and failures < _FAILURES:
-            stretch = stretches.pop()
-            segment = self._finer(every, ends[0, stretch[0]], ends[1, stretch[-1]], len(stretch))
-            if segment is not None:
-                finer.append(segment)
-                again[stretch] = True
-                continue
-            failures += 1
-            stretches += np.array_split(stretch, 2) if len(stretch) > 1 else []
+        if not stretches:
+            return again, finer
+        with self._integrator.interrupts.watched():
+            while stretches and failures < _FAILURES:
+                stretch = stretches.pop()
+                segment = self._finer(every, ends[0, stretch[0]], ends[1, stretch[-1]], len(stretch))
+                if segment is not None:
+                    finer.append(segment)
+                    again[stretch] = True
+                    continue
+                failures += 1
+                stretches += np.array_split(stretch, 2) if len(stretch) > 1 else []
         return again, finer
 
     def _finer(self, every: Results, begin: int, end: int, intervals: int) -> Segment | None:
@@ -192,7 +202,7 @@ class Powers:
         start = every.point(begin)
         span, count = float(every.times[end]) - start.t, _MORE * 2 ** math.ceil(math.log2(max(intervals, _LEAST)))
         try:
-            x, z = self.integrator.run(start, span, count)
+            x, z = self._integrator.run(start, span, count)
         except StepFailed:
             return None
         times = start.t + span * np.arange(count + 1) / count
@@ -206,17 +216,17 @@ class Powers:
 
     def _move(self, stored: Vector, powers: Vector, steps: Vector) -> None:
         """Update the energies that results store and exchange."""
-        self.stored = max(self.stored, float(np.max(np.sum(np.abs(stored), axis=0))))
+        self.stored = max(self.stored, float(np.abs(stored).sum(axis=0).max()))
         # After a sudden start, the power of a single result would fill an interval in which it decays at once.
         sizes = np.abs(powers)
-        least = np.max(np.minimum(sizes[:, :-1], sizes[:, 1:]) @ steps, initial=0.0)
-        most = 0.0 if least else np.max(sizes[:, 1:] @ steps, initial=0.0)
+        least = (np.minimum(sizes[:, :-1], sizes[:, 1:]) @ steps).max(initial=0.0)
+        most = 0.0 if least else (sizes[:, 1:] @ steps).max(initial=0.0)
         self.moved = max(self.moved, self.stored, float(least), float(most))
 
     def _hear(self, every: Results) -> None:
         """Estimate the rounding of stored energies in J and of powers in W."""
-        changes = np.stack([every.shaken[0], every.shaken[1:].sum(axis=0)])
-        self._noise = np.maximum(self._noise, _ROUNDING * np.max(np.sum(changes, axis=1), axis=1))
+        changes = every.shaken[0].sum(axis=0).max(), every.shaken[1:].sum(axis=(0, 1)).max()
+        self._noise = np.maximum(self._noise, _ROUNDING * np.array(changes))
 
     def _bends(self, every: Results, ends: Places) -> Vector:
         """Return the part of slopes of powers in the integrals of the first two rules; shape (2, 4 components, m)."""
@@ -228,7 +238,7 @@ class Powers:
         return squares * np.stack([(slopes[:, 0] - slopes[:, 1]) / 12.0, slopes[:, 0] / 6.0])
 
     def _coarse(
-        self, terms: Vector, intervals: Places, places: Places, weights: Vector, bent: Places, bends: Vector, depth: int
+        self, terms: Vector, ends: Places, places: Places, weights: Vector, bent: Places, bends: Vector, depth: int
     ) -> Places:
         """Return the intervals in which the powers are integrated too coarsely.
 
@@ -239,14 +249,14 @@ class Powers:
         """
         if not self.model.states and not depth:
             # There is no information between the results.
-            return np.ones(len(intervals), bool)
+            return np.ones(len(places), bool)
         mixed, stored = _mixed(terms[1 : 1 + POWERS]), _mixing(terms[0].shape[0]) @ terms[0]
-        best, lower, lowest = np.matmul(weights, mixed.T[places]).transpose(1, 2, 0).copy()
+        best, lower, lowest = np.matmul(weights, mixed.T.take(places, 0)).transpose(1, 2, 0).copy()
         if len(bent):
             for rule, more in zip((best, lower), bends, strict=True):
                 rule[:, bent] += _mixed(more.reshape(POWERS, terms.shape[1], -1))
         near, far = np.abs(best - lower), np.abs(lower - lowest)
-        known = np.maximum(*np.abs(stored[:, intervals + 1] - stored[:, intervals] - best[2:]))
+        known = np.maximum(*np.abs(stored[:, ends[1]] - stored[:, ends[0]] - best[2:]))
         smooth = np.maximum(*near[2:])
         gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(known, smooth))
         errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(known, smooth))
@@ -263,16 +273,15 @@ def _slopes(model: CompiledDae) -> ca.Function:
     return ca.Function("slopes", arguments, [ca.densify(slopes)], {"cse": True})
 
 
-def _apart(every: Results) -> Places:
+def _apart(every: Results, gaps: Vector) -> Places:
     """Return the ends of segments, and results between them with enough distance from their neighbours.
 
     Results may be arbitrarily close to an event; a polynomial through both would follow their errors.
     """
-    gaps = np.diff(every.times)
-    before, after = np.append(0.0, gaps), np.append(gaps, 0.0)
     places = np.arange(len(every.times))
-    inner = (places > every.first) & (places < every.last)
-    return np.flatnonzero(~inner | (np.minimum(before, after) >= _CLOSE * np.maximum(before, after)))
+    kept = (places == every.first) | (places == every.last)
+    kept[1:-1] |= np.minimum(gaps[:-1], gaps[1:]) >= _CLOSE * np.maximum(gaps[:-1], gaps[1:])
+    return kept.nonzero()[0]
 
 
 def _stretches(coarse: Places, piece: Places) -> list[Places]:
@@ -291,7 +300,10 @@ def _ratio(small: Vector, large: Vector) -> Vector:
 def _mixed(powers: Vector) -> Vector:
     """Return two sums each, with different weights, of powers and of rates of stored energies; (4, n)."""
     flat, rates = powers.reshape(-1, powers.shape[-1]), powers[-1]
-    return np.concatenate([_mixing(len(flat)) @ flat, _mixing(len(rates)) @ rates])
+    mixed = np.concatenate([_mixing(len(flat)) @ flat, _mixing(len(rates)) @ rates])
+    # Processors are slow with numbers near the smallest one, which are left of a decay.
+    mixed[np.abs(mixed) < _DECAYED] = 0.0
+    return mixed
 
 
 @cache

@@ -19,7 +19,7 @@ _UNIFORM, _ROUNDING = 1e-9, 1e-15
 _POINTS = 0.5 + np.sqrt((15 + np.array([2, -2, -2, 2]) * np.sqrt(30.0)) / 140) * [-1, -1, 1, 1]
 _SHARES = 0.25 + np.sqrt(30.0) / 72 * np.array([-1, 1, 1, -1])
 """Gauss' rule in [0, 1]."""
-_OTHERS = ~np.eye(_WIDTH, dtype=bool)
+_OTHERS = ~np.eye(_WIDTH, dtype=bool)[:, :, None, None]
 
 
 def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, Vector]:
@@ -34,8 +34,8 @@ def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, V
         The m intervals by the result before; the results for each, shape (m, 8); their weights, in s, shape (m, 3,
         8).
     """
-    steps = np.diff(times, append=times[-1])
-    k = np.flatnonzero((np.arange(len(times)) < last) & (steps > 0))
+    steps = np.append(times[1:] - times[:-1], 0.0)
+    k = ((np.arange(len(times)) < last) & (steps > 0)).nonzero()[0]
     first, last = first[k], last[k]
     sizes = np.minimum(last - first + 1, _WIDTH)
     starts = np.clip(k - (sizes - 1) // 2, first, last + 1 - sizes)
@@ -43,9 +43,9 @@ def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, V
     offsets = k - starts
     weights = _equidistant()[sizes, offsets]
     # Times have rounding errors.
-    uneven = np.abs(np.diff(steps)) > _UNIFORM * steps[:-1] + _ROUNDING * np.abs(times[:-1])
-    before = np.append(0, np.cumsum(uneven))
-    odd = np.flatnonzero(before[np.maximum(starts + sizes - 2, starts)] != before[starts])
+    uneven = np.abs(steps[1:] - steps[:-1]) > _UNIFORM * steps[:-1] + _ROUNDING * np.abs(times[:-1])
+    before = np.append(0, uneven.cumsum())
+    odd = (before[np.maximum(starts + sizes - 2, starts)] != before[starts]).nonzero()[0]
     now = (times[places[odd]] - times[k[odd]][:, None]) / steps[k[odd]][:, None]
     weights[odd] = _rules(now, sizes[odd], offsets[odd])
     return k, places, weights * steps[k][:, None, None]
@@ -66,13 +66,14 @@ def _rules(places: Vector, sizes: Places, offsets: Places) -> Vector:
 
     They integrate Lagrange's polynomials by Gauss' rule, which is exact for them; its points are no places.
     """
-    fewer = np.maximum(sizes[:, None] - _ORDERS, 1)
-    starts = np.clip(offsets[:, None] - (fewer - 1) // 2, 0, sizes[:, None] - fewer)
-    passed = np.arange(_WIDTH) - starts[:, :, None]
-    used = (passed >= 0) & (passed < fewer[:, :, None])
-    away = _POINTS[:, None] - places[:, None, :]
-    products = np.prod(np.where(used[:, :, None], away[:, None], 1.0), axis=-1, keepdims=True)
-    apart = places[:, :, None] - places[:, None, :]
-    others = used[..., None] & used[:, :, None] & _OTHERS
-    scales = np.prod(np.where(others, apart[:, None], 1.0), axis=-1)
-    return np.where(used, _SHARES @ (products / away[:, None]) / scales, 0.0)
+    fewer = np.maximum(sizes - _ORDERS[:, None], 1)
+    starts = np.clip(offsets - (fewer - 1) // 2, 0, sizes - fewer)
+    # The longest axis is the last one.
+    passed, places = np.arange(_WIDTH)[:, None, None] - starts, places.T.copy()
+    used = (passed >= 0) & (passed < fewer)
+    away = _POINTS[:, None] - places[:, None]
+    products = np.where(used[:, :, None], away[:, None], 1.0).prod(axis=0)
+    others = used[:, None] & used & _OTHERS
+    scales = np.where(others, (places - places[:, None])[:, :, None], 1.0).prod(axis=0)
+    integrals = (_SHARES[:, None] * products / away[:, None]).sum(axis=2)
+    return np.where(used, integrals / scales, 0.0).transpose(2, 1, 0)

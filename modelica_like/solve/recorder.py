@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -69,6 +70,7 @@ class Segment:
 
 
 Points = tuple[Vector, Vector, Vector]
+_NOTHING = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
 
 
 @dataclass
@@ -121,12 +123,14 @@ class Recorder:
             self._closed.append((self._open, d.copy()))
             self._open = []
 
-    def build(self) -> None:
-        """Build the finished segments of known points."""
+    def build(self, *, complete: bool = True) -> None:
+        """Build the finished segments; unless `complete`, of points that are not nan only."""
+        every = [part for parts, _ in self._closed for part in parts]
+        times, x, z = (np.concatenate(part, axis=-1) for part in zip(*every, strict=True)) if every else _NOTHING
+        last = 0
         for parts, d in self._closed:
-            times, x, z = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
-            known = ~np.isnan(x).any(axis=0)
-            if not known.all():
-                times, x, z = times[known], x[:, known], z[:, known]
-            self.segments.append(Segment(times, x, z, d))
+            those: Any = slice(first := last, last := first + sum(len(part[0]) for part in parts))
+            if not complete:
+                those = first + np.flatnonzero(~np.isnan(x[:, those]).any(axis=0))
+            self.segments.append(Segment(times[those], x[:, those], z[:, those], d))
         self._closed = []

@@ -36,6 +36,8 @@ class Ticks:
 
         One that does change something takes the run back to its time.
         """
+        if not self._instants.timed:
+            return np.inf
         ahead = self._instants.ahead(now)
         return min((t + _TRUST * self._quiet[id(one)] * (t - now.t) for one, t in ahead), default=np.inf)
 

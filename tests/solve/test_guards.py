@@ -5,10 +5,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modelica_like import simulate
+from modelica_like import build, simulate
 from modelica_like.initialize import Point
-from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var
-from modelica_like.solve.guards import Candidate, _cubic, _hermite, _nearly, _newton, _positive_top, candidates, locate
+from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, guess, param, var
+from modelica_like.solve.guards import (
+    Candidate,
+    Guards,
+    _cubic,
+    _hermite,
+    _nearly,
+    _newton,
+    _positive_top,
+    candidates,
+    locate,
+)
 
 
 class Steps(Component):
@@ -146,6 +156,50 @@ def test_the_top_of_a_parabola_is_where_the_straight_line_of_slopes_is_zero(top:
     found = _positive_top(trial, span, {0: seen}, [Candidate(0, 0, True)])
     assert len(tried) == 3  # the second one halves what is left
     assert found == pytest.approx(top, abs=1e-5)
+
+
+class Two(Component):
+    """Two states, an implicit unknown, and guards on all of them."""
+
+    a: Variable = var("1", "state", default=1.0)
+    b: Variable = var("1", "state of another size", default=1.0, nominal=1e3)
+    y: Variable = var("1", "implicit", default=guess(1.0))
+    side = Mode("below", "above")
+    cubic: Parameter = param("1", "factor of y³", default=1.0)
+    unit: Parameter = param("s", "unit", default=1.0)
+
+    def equations(self) -> Equations:
+        yield self.unit * der(self.a) == 1
+        yield self.unit * der(self.b) == self.a
+        yield self.y + self.cubic * self.y**3 == self.a
+
+    def events(self) -> Events:
+        yield self.side.go("below", "above", when=self.a * self.b > 7.0)
+        yield self.side.go("above", "below", when=self.y < 0.3)
+
+
+@pytest.mark.parametrize("cubic", [0.0, 1.0])
+def test_what_two_interpolations_of_the_states_make_of_guards(cubic: float) -> None:
+    """The first is base + 0.5·data[0], the second base + 0.5·data[1]; then y of y + cubic·y³ = a."""
+    model = build(Two(cubic=cubic))
+    assert model.implicit
+    base, tolerances = np.array([2.0, 4.0]), (1e-3, np.array([1e-6, 1e-3]))
+    data, two = np.zeros((8, 2)), np.zeros((2, 8))
+    data[:2], two[[0, 1], [0, 1]] = [[0.4, 0.0], [0.41, 0.004]], 0.5
+
+    def near(data: np.ndarray) -> tuple[float, list[float], list[float]]:
+        return Guards(model).near(0.0, base, data, two, tolerances, np.array([y(2.2)]), np.zeros(model.discrete_size))
+
+    def y(a: float) -> float:
+        return next(float(np.real(one)) for one in np.roots([cubic, 0.0, 1.0, -a]) if abs(np.imag(one)) < 1e-9)
+
+    doubt, rough, moved = near(data)
+    assert doubt == pytest.approx(0.005 / (2.2e-3 + 1e-6), rel=1e-9)
+    assert rough == pytest.approx([2.205 * 4.002 - 2.2 * 4.0, y(2.205) - y(2.2)], rel=1e-6)
+    changed = 2.2 + 2.2e-3 + 1e-6, 4.0 + 4e-3 + 1e-3
+    assert moved == pytest.approx([changed[0] * changed[1] - 2.2 * 4.0, y(changed[0]) - y(2.2)], rel=1e-6)
+    data[1, 1] = np.nan
+    assert near(data)[0] == np.inf
 
 
 def test_a_cubic_is_known_by_its_ends() -> None:

@@ -16,7 +16,7 @@ def ctrl_c() -> None:
 
 
 def foreign(interrupts: Interrupts, told: list[str]) -> None:
-    with interrupts.swallowed():
+    with interrupts:
         with contextlib.suppress(KeyboardInterrupt):
             ctrl_c()
         told.append("it goes on")
@@ -35,7 +35,7 @@ def test_an_interrupt_of_foreign_code_is_raised_behind_it() -> None:
         with pytest.raises(KeyboardInterrupt):
             own(interrupts)
         assert signal.getsignal(signal.SIGINT) is not before
-        with interrupts.swallowed():
+        with interrupts:
             told.append("once only")
     assert told == ["it goes on", "once only"]
     assert signal.getsignal(signal.SIGINT) is before
