@@ -45,7 +45,7 @@ def test_an_interrupt_before_foreign_code_is_raised_once() -> None:
     interrupts = Interrupts()
     with pytest.raises(KeyboardInterrupt):
         own(interrupts)
-    with interrupts.swallowed():
+    with interrupts:
         pass
 
 
