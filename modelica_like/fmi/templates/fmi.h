@@ -47,14 +47,7 @@ static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what
     return n == wanted || fail(c, "There must be %zu %s, not %zu.", wanted, what, n);
 }
 
-/* A function whose work is one call of the run-time, if arguments are what it needs. */
-#define CALL(name, phases, needs, call, ...)        \
-    Status FMI(name)(void *instance, __VA_ARGS__) { \
-        ENTER(name, phases);                        \
-        if (!(needs)) return FMI(Error);            \
-        return status(call);                        \
-    }
-/* A function that does the same for everything that it is given. */
+/* A function that does the same for everything that it is given, if arguments are what it needs. */
 #define EACH(name, phases, n, needs, call, ...)     \
     Status FMI(name)(void *instance, __VA_ARGS__) { \
         ENTER(name, phases);                        \
@@ -63,20 +56,17 @@ static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what
             if (!(call)) return FMI(Error);         \
         return FMI(OK);                             \
     }
-/* A function without arguments. */
+/* A function whose work is one call of the run-time. */
+#define CALL(name, phases, needs, call, ...) EACH(name, phases, 1, needs, call, __VA_ARGS__)
+/* One without arguments. */
 #define DO(name, phases, call)         \
     Status FMI(name)(void *instance) { \
         ENTER(name, phases);           \
         return status(call);           \
     }
 /* A function that changes nothing but the phase. */
-#define CHANGE_PHASE(name, from, to, forbidden, why)                \
-    Status FMI(name)(void *instance) {                              \
-        ENTER(name, from);                                          \
-        if (forbidden) return status(fail(c, TEXT(FMI(name)) why)); \
-        c->state.phase = to;                                        \
-        return FMI(OK);                                             \
-    }
+#define CHANGE_PHASE(name, from, to, forbidden, why) \
+    DO(name, from, (forbidden) ? fail(c, TEXT(FMI(name)) why) : (c->state.phase = (to), RESULT_OK))
 
 static inline Status failed(Instance *c) {
     c->state.phase = PHASE_FAILED;
