@@ -140,9 +140,10 @@ typedef struct Instance {
     double SMOOTH_NUMBERS(FIELD);
     unsigned char STATE_MARKS(FIELD);
     Piece *piece;
-    double *past, *past_sizes; /* what delayed values were, see delay.c; their sizes */
-    double *end_look;          /* guards and their rates at the end of the last fixed step */
-    double *z;                 /* in x: together they are a point */
+    double *past, *past_sizes;     /* what delayed values were, see delay.c; their sizes */
+    double *end_look;              /* guards and their rates at the end of the last fixed step */
+    double *z;                     /* in x: together they are a point */
+    const double *values[N_KINDS]; /* of variables by kind; of inputs only at u_time */
 
     double WORK_NUMBERS(FIELD);
     int WORK_INDICES(FIELD);
@@ -271,7 +272,7 @@ Result finish(Instance *c);
 Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
 Result move_to(Instance *c, double t);
-Result take_changes(Instance *c, int *event);
+Result take_changes(Instance *c);
 int is_due(Instance *c);
 /* fixed.c */
 Arrival step_fixed(Instance *c, double target);
@@ -301,10 +302,6 @@ void tangent_of_implicit(Instance *c);
 void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c);
-/* native.c */
-Instance *instance_for(const Model *m, void *environment);
-Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol);
-Result instance_begin(Instance *c);
 /* gradient.c */
 void gradient_move(Instance *c, double t);
 int gradient_round(Instance *c, int round, unsigned char *wanting, int any);

@@ -101,11 +101,9 @@ static Result go_on(Instance *c, double limit, int *fired) {
 
 static Result one_step(Instance *c, double end) {
     State *s = &c->state;
-    int fired = 0, event;
+    int fired = 0;
     c->budget = BUDGET;
-    if (!take_changes(c, &event)) return RESULT_ERROR;
-    s->at_event |= event;
-    if (s->at_event && !fire_here(c, &fired)) return RESULT_ERROR;
+    if (!take_changes(c) || (s->at_event && !fire_here(c, &fired))) return RESULT_ERROR;
     while (s->t < end) {
         double moment = c->budget >= 2 ? next_moment(c) : INFINITY;
         if (!go_on(c, fmin(end, moment), &fired)) return RESULT_ERROR;

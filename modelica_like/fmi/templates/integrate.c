@@ -77,14 +77,13 @@ Result move_to(Instance *c, double t) {
 }
 
 /* Inputs, parameters or states moved from outside: go on from the present point. */
-Result take_changes(Instance *c, int *event) {
-    *event = 0;
+Result take_changes(Instance *c) {
     if (!c->state.inputs_changed) return RESULT_OK;
     if (!check_tables(c)) return RESULT_ERROR;
     leave_piece(c);
     c->state.inputs_changed = c->state.z_valid = c->variables_valid = 0;
     if (!renew(c) || !settle(c)) return RESULT_ERROR;
-    *event = find_wanting(c, nothing_wanting(c), 1) || pushed(c);
+    c->state.at_event |= find_wanting(c, nothing_wanting(c), 1) || pushed(c);
     return leave_instant(c, 1);
 }
 
@@ -157,7 +156,7 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     if (s->at_event && !handle_event(c)) return FAILED;
     for (;;) {
         held |= s->inputs_changed;
-        if (!take_changes(c, &s->at_event)) return FAILED;
+        if (!take_changes(c)) return FAILED;
         if (s->at_event && stop_at_events) return AT_EVENT;
         if (s->at_event && !handle_event(c)) return FAILED;
         if (!(s->t < target)) return REACHED;

@@ -2,7 +2,7 @@
  * stands in a file, nothing is read or written outside of the tables. */
 #include "model.h"
 
-#define FORMAT 5
+#define FORMAT 6
 #define UNKNOWN (-1)
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
 
@@ -118,7 +118,6 @@ static int lay_out_slots(Model *m, size_t size) {
 }
 
 static int find_sizes(Model *m, size_t size, char *message) {
-    int64_t resets = 0;
     if (m->n_settings != 1) return damaged(message, "settings");
     m->n_d = m->settings->n_d;
     m->n_y = m->settings->n_y;
@@ -128,14 +127,7 @@ static int find_sizes(Model *m, size_t size, char *message) {
     m->n_moments = m->tapes.moments.n_outputs;
     m->n_starts = m->tapes.start_values.n_outputs;
     m->n_start_values = m->tapes.start_system.n_outputs;
-    m->n_start_jacobian = m->tapes.start_jacobian.n_outputs;
     m->n_reset_values = m->tapes.resets.n_outputs;
-    for (int k = 0; k < m->n_transitions; k++) {
-        if (m->transitions[k].first_reset != resets || m->transitions[k].n_resets < 0)
-            return damaged(message, "transitions.first_reset");
-        resets += m->transitions[k].n_resets;
-    }
-    if (resets != m->n_resets) return damaged(message, "transitions.n_resets");
     for (int k = 0; k < m->n_circuits; k++)
         if (m->circuits[k].n_members > m->most_members) m->most_members = m->circuits[k].n_members;
     return lay_out_slots(m, size) || damaged(message, "its sizes");
@@ -174,20 +166,22 @@ typedef struct { /* integers of records, not below `low` and below `end` */
 
 /* Every index is one of the table that it points into. */
 static int check_indices(const Model *m, char *message) {
-    const Range ranges[] = {ARRAY(state_names, n_x, n_text), ARRAY(implicit_names, n_z, n_text),
-        ARRAY(singular_names, n_determinants, n_text), COLUMN(variables, kind, n_variables, 0, N_KINDS),
-        COLUMN(variables, type, n_variables, 0, N_TYPES), TEXT(variables, name),
-        COLUMN(variables, count, n_variables, 1, m->n_p + 2), INDEX(rising, below, n_p), INDEX(rising, above, n_p),
-        TEXT(rising, below_name), TEXT(rising, above_name), ARRAY(mode_names, n_mode_names, n_text),
-        INDEX(modes, first_name, n_mode_names + 1), INDEX(modes, n_names, n_mode_names + 1),
-        INDEX(transitions, mode, n_modes), TEXT(transitions, name), TEXT(transitions, notice),
-        ARRAY(guard_transition, n_guards, n_transitions), ARRAY(reset_nodes, n_reset_nodes, n_nodes),
-        COLUMN(resets, kind, n_resets, 0, N_RESET_KINDS), COLUMN(updates, kind, n_updates, 0, N_RESET_KINDS),
-        INDEX(resets, value, n_reset_values), INDEX(holds, mode, n_modes), INDEX(holds, motion, n_nodes),
-        COLUMN(holds, state, n_holds, -1, m->n_x), COLUMN(holds, reaction, n_holds, -1, m->n_nodes),
-        INDEX(holds, approach, n_d), TEXT(holds, name), ARRAY(members, n_members, n_holds), INDEX(ideals, row, n_z),
-        INDEX(ideals, mode, n_modes), INDEX(ideals, zero, n_nodes), INDEX(ideals, other, n_nodes), TEXT(ideals, name),
-        TEXT(delays, name), INDEX(delays, first, n_d - DELAY_TERMS - 1), INDEX(circuits, first_member, n_members + 1),
+    const Range ranges[] = {COLUMN(settings, terminal, n_settings, -1, m->n_modes), ARRAY(state_names, n_x, n_text),
+        ARRAY(implicit_names, n_z, n_text), ARRAY(singular_names, n_determinants, n_text),
+        COLUMN(variables, kind, n_variables, 0, N_KINDS), COLUMN(variables, type, n_variables, 0, N_TYPES),
+        TEXT(variables, name), COLUMN(variables, count, n_variables, 1, m->n_p + 2), INDEX(rising, below, n_p),
+        INDEX(rising, above, n_p), TEXT(rising, below_name), TEXT(rising, above_name),
+        ARRAY(mode_names, n_mode_names, n_text), INDEX(modes, first_name, n_mode_names + 1),
+        INDEX(modes, n_names, n_mode_names + 1), INDEX(transitions, mode, n_modes), TEXT(transitions, name),
+        TEXT(transitions, notice), ARRAY(guard_transition, n_guards, n_transitions),
+        ARRAY(reset_nodes, n_reset_nodes, n_nodes), COLUMN(resets, kind, n_resets, 0, N_RESET_KINDS),
+        COLUMN(updates, kind, n_updates, 0, N_RESET_KINDS), INDEX(resets, value, n_reset_values),
+        INDEX(resets, transition, n_transitions), INDEX(updates, value, n_updates), INDEX(holds, mode, n_modes),
+        INDEX(holds, motion, n_nodes), COLUMN(holds, state, n_holds, -1, m->n_x),
+        COLUMN(holds, reaction, n_holds, -1, m->n_nodes), INDEX(holds, approach, n_d), TEXT(holds, name),
+        ARRAY(members, n_members, n_holds), INDEX(ideals, row, n_z), INDEX(ideals, mode, n_modes),
+        INDEX(ideals, zero, n_nodes), INDEX(ideals, other, n_nodes), TEXT(ideals, name), TEXT(delays, name),
+        INDEX(delays, first, n_d - DELAY_TERMS - 1), INDEX(circuits, first_member, n_members + 1),
         INDEX(circuits, n_members, n_members + 1), INDEX(circuits, first, n_d + 1), INDEX(start_modes, mode, n_modes),
         INDEX(start_direct, position, n_x), INDEX(start_direct, start, n_starts), INDEX(start_default, position, n_x),
         INDEX(start_default, start, n_starts), INDEX(start_guess, position, n_unknowns),
@@ -205,24 +199,23 @@ static int check_indices(const Model *m, char *message) {
     return 1;
 }
 
-static int check_target(const Model *m, int kind, int index, int target) {
-    int place = kind == RESET_VALUE ? target : index;
-    return place >= 0 && place < (kind == RESET_VALUE ? m->n_reset_nodes : kind == RESET_STATE ? m->n_x : m->n_d);
+static int check_targets(const Model *m, const Reset *resets, int n) {
+    const int ends[N_RESET_KINDS] = {m->n_x, m->n_d, m->n_reset_nodes}; /* as ResetKind */
+    for (const Reset *one = resets; one < resets + n; one++) {
+        int place = one->kind == RESET_VALUE ? one->target : one->index;
+        if (place < 0 || place >= ends[one->kind]) return 0;
+    }
+    return 1;
 }
 
 static int check_events(const Model *m, char *message) {
-    if (m->settings->terminal < -1 || m->settings->terminal >= m->n_modes) return damaged(message, "settings.terminal");
     for (int k = 0; k < m->n_modes; k++)
         if (m->modes[k].n_names > m->n_mode_names - m->modes[k].first_name) return damaged(message, "modes.n_names");
     for (const Transition *one = m->transitions; one < m->transitions + m->n_transitions; one++)
         if (one->index < 0 || one->index >= (one->timed ? m->n_moments : m->n_guards))
             return damaged(message, "transitions.index");
-    for (int k = 0; k < m->n_resets; k++)
-        if (!check_target(m, m->resets[k].kind, m->resets[k].index, m->resets[k].target))
-            return damaged(message, "resets.index");
-    for (int k = 0; k < m->n_updates; k++)
-        if (!check_target(m, m->updates[k].kind, m->updates[k].index, m->updates[k].target))
-            return damaged(message, "updates.index");
+    if (!check_targets(m, m->resets, m->n_resets)) return damaged(message, "resets.index");
+    if (!check_targets(m, m->updates, m->n_updates)) return damaged(message, "updates.index");
     for (int k = 0; k < m->n_circuits; k++) {
         const Circuit *one = &m->circuits[k];
         int64_t n = one->n_members;

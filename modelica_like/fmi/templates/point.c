@@ -70,16 +70,14 @@ Result solve_implicit(Instance *c, double t, double *point, int quiet) {
         if (!lu_factor(m->n_z, matrix, order))
             return quiet ? RESULT_ERROR : singular(c, t, text_of(m, m->implicit_names[0]));
         lu_solve(m->n_z, matrix, order, step);
-        double moved = 0, largest = 0;
         change = 0;
         for (int k = 0; k < m->n_z; k++) {
             z[k] -= step[k];
             change = fmax(change, fabs(step[k]) / (1 + fabs(z[k])));
-            moved = fmax(moved, fabs(step[k]));
-            largest = fmax(largest, fabs(z[k]));
         }
         /* What the largest unknown leaves of a small one when it is rounded does not get smaller. */
-        if (change < (c->bounded ? 1e-4 : 1e-13) || moved <= 1e-14 * largest) return RESULT_OK;
+        if (change < (c->bounded ? 1e-4 : 1e-13) || largest_of(m->n_z, step) <= 1e-14 * largest_of(m->n_z, z))
+            return RESULT_OK;
     }
     if (change <= 1e-9 || c->bounded) return RESULT_OK;
     return quiet ? RESULT_ERROR

@@ -25,15 +25,11 @@ const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) 
     return NULL;
 }
 
-/* Values that a tape gives, each computed once per point; NULL if there are none. */
-static const double *seen(Instance *c, const Variable *v) {
-    const double *values = v->kind == KIND_DERIVED      ? c->seen_derived
-                           : v->kind == KIND_DERIVATIVE ? c->seen_rates
-                           : v->kind == KIND_GUARD      ? c->seen_indicators
-                                                        : c->variables;
+/* Values that a tape gives are computed once per point. */
+static Result compute(Instance *c, const Variable *v) {
     if (v->kind == KIND_VARIABLE) ask_for(c, v->index);
-    if (c->variables_valid & 1 << v->kind) return values;
-    if (v->kind != KIND_DERIVED && !settle(c)) return NULL;
+    if (c->variables_valid & 1 << v->kind) return RESULT_OK;
+    if (v->kind != KIND_DERIVED && !settle(c)) return RESULT_ERROR;
     switch (v->kind) {
         case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, c->seen_derived); break;
         case KIND_DERIVATIVE: evaluate_special(c, &c->model->tapes.rates, c->state.t, c->x, c->seen_rates); break;
@@ -41,7 +37,7 @@ static const double *seen(Instance *c, const Variable *v) {
         default: evaluate_special(c, &c->model->tapes.variables, c->state.t, c->x, c->variables);
     }
     c->variables_valid |= 1 << v->kind;
-    return values;
+    return RESULT_OK;
 }
 
 /* In initialization mode, whatever was set since the last time must have its effect before anything is read. */
@@ -52,18 +48,11 @@ static Result make_ready(Instance *c) {
 /* Of a variable that is known, or NULL: then its reference was wrong. */
 Result get_value(Instance *c, const Variable *v, double *value) {
     const int known = 1 << KIND_PARAMETER | 1 << KIND_INPUT | 1 << KIND_TIME | 1 << KIND_DERIVED;
-    const double *values = NULL;
+    const int computed = 1 << KIND_VARIABLE | 1 << KIND_DERIVATIVE | 1 << KIND_DERIVED | 1 << KIND_GUARD;
     if (v == NULL || (!(known & 1 << v->kind) && !make_ready(c))) return RESULT_ERROR;
-    switch (v->kind) {
-        case KIND_TIME: *value = c->state.t; return RESULT_OK;
-        case KIND_STATE: *value = c->x[v->index]; return RESULT_OK;
-        case KIND_PARAMETER: *value = c->p[v->index]; return RESULT_OK;
-        case KIND_INPUT: *value = input_at(c, v->index, c->state.t); return RESULT_OK;
-        case KIND_DISCRETE: *value = c->d[v->index]; return RESULT_OK;
-        default: values = seen(c, v);
-    }
-    if (values != NULL) *value = values[v->index];
-    return values != NULL;
+    if (computed & 1 << v->kind && !compute(c, v)) return RESULT_ERROR;
+    *value = v->kind == KIND_INPUT ? input_at(c, v->index, c->state.t) : c->values[v->kind][v->index];
+    return RESULT_OK;
 }
 
 /* Solves what getting a value from the present point needs. */
