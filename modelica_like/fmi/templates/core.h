@@ -224,7 +224,6 @@ void share(Instance *c);
 Result share_and_solve(Instance *c);
 void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
-/* ideal.c */
 void replace_dependent(Instance *c);
 int pushed(Instance *c);
 #define GIVEN_BACK 1e-3 /* of the largest current: none where modes return, as it ends within the time resolution */
@@ -253,8 +252,7 @@ void move_states(Instance *c, const int *nodes, const double *values, int count)
 void note_change(Instance *c, int name, int transition, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
 /* rosenbrock.c */
-int rosenbrock_step(
-    Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error);
+double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece);
 double *last_of(const Model *m, Piece *piece);
 int factor_step(Instance *c, double diagonal);
 size_t piece_size(const Model *m);
@@ -308,7 +306,6 @@ int gradient_round(Instance *c, int round, unsigned char *wanting, int any);
 Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start);
 void gradient_lose(Instance *c, const char *why, const Variable *by);
 void gradient_end(Instance *c);
-/* taylor.c */
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 /* instance.c */
 Instance *instance_new(Instance bare, const char *token);

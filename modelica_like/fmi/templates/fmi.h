@@ -23,7 +23,8 @@
 
 /* Are arguments what they must be: no null pointers where n > 0, the right sizes? If not, it is told. */
 #define GIVEN(n, ...) ((n) == 0 || all_given(c, (const void *const[]){__VA_ARGS__}, TEXT((__VA_ARGS__))))
-#define SIZED(n, wanted, what) is_size(c, n, (size_t)(wanted), what)
+#define SIZED(n, wanted, what) \
+    ((n) == (size_t)(wanted) || fail(c, "There must be %zu %s, not %zu.", (size_t)(wanted), what, n))
 #define NEED(n, ...) \
     if (!GIVEN(n, __VA_ARGS__)) return FMI(Error)
 
@@ -41,10 +42,6 @@ static inline int all_given(Instance *c, const void *const *given, const char *n
         names += length + strspn(names + length, ", ") - (names[length] == ',');
     }
     return 1;
-}
-
-static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what) {
-    return n == wanted || fail(c, "There must be %zu %s, not %zu.", wanted, what, n);
 }
 
 /* A function that does the same for everything that it is given, if arguments are what it needs. */

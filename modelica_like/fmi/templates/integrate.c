@@ -37,12 +37,13 @@ static Result take_step(Instance *c, double limit) {
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
     wished = fmin(wished, largest_step(c));
     for (int n = 0; n < MAX_REJECTIONS; n++) {
-        double error = 0, factor, h = wished;
+        double error, factor, h = wished;
         int cut = s->t + 1.0001 * h >= limit;
         if (cut) h = limit - s->t;
         clear_pending(c);
         if (h < least || !isfinite(h)) break;
-        if (!rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece, &error) || !isfinite(error)) error = 1e30;
+        error = rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece);
+        if (!(error >= 0 && isfinite(error))) error = 1e30;
         if (cut) c->piece->end = limit;
         factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
         if (error > 1 || !solve_implicit(c, c->piece->end, last_of(c->model, c->piece), 1) ||

@@ -18,12 +18,6 @@ enum { ON_WINDOWS = 0 };
 static FILE *open_file(const char *path) { return fopen(path, "rb"); }
 #endif
 
-static int digit(char c) {
-    if (c >= '0' && c <= '9') return c - '0';
-    c = (char)(c | 32);
-    return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
-}
-
 static int is_letter(char c) { return (c | 32) >= 'a' && (c | 32) <= 'z'; }
 
 static int starts(const char *text, const char *with) {
@@ -55,9 +49,9 @@ int resource_path(const char *location, int windows, char *path, size_t room) {
     for (; *from; from++) {
         char c = *from;
         if (encoded && c == '%') {
-            int high = digit(from[1]), low = high < 0 ? -1 : digit(from[2]);
-            if (low < 0 || (high == 0 && low == 0)) return 0;
-            c = (char)(16 * high + low);
+            const char code[] = {from[1], from[1] ? from[2] : 0, 0};
+            c = (char)strtol(code, NULL, 16);
+            if (c == 0 || strspn(code, "0123456789abcdefABCDEF") != 2) return 0;
             from += 2;
         } else if (encoded && (c == '?' || c == '#')) break;
         if (encoded && windows && c == '|' && n == 1) c = ':';
