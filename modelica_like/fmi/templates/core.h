@@ -76,7 +76,7 @@ typedef struct {
     double gain, forward, backward, restitution;
 } Terms; /* of a motion that modes hold */
 
-typedef struct { /* a tape for the present modes, see special.c */
+typedef struct { /* a tape for the present modes, see tape.c */
     Tape tape;
     Run *runs;
     Operands *operands;
@@ -193,7 +193,6 @@ double dot(int n, const double *p, const double *q);
 double make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
-/* special.c */
 void run_special(Instance *c, const Tape *tape, double *outputs);
 void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);

@@ -2,7 +2,6 @@
  * the implicit unknowns following. */
 #include "core.h"
 
-/* Slot of what derivatives are taken by. */
 static int known_slot(const Model *m, const Variable *v) {
     const int first[N_KINDS] = {[KIND_STATE] = m->slot_x, [KIND_PARAMETER] = m->slot_p, [KIND_INPUT] = m->slot_u};
     return v->kind == KIND_TIME ? 0 : first[v->kind] > 0 ? first[v->kind] + v->index : -1;
@@ -62,6 +61,7 @@ void tangent_of_implicit(Instance *c) {
 }
 
 static void seed_knowns(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
+    memset(c->dots, 0, c->model->slot_results * sizeof(double));
     for (size_t k = 0; k < n; k++) {
         const Variable *v = find_variable(c->model, knowns[k]);
         if (!is_start(c, v)) c->dots[known_slot(c->model, v)] += seed[k];
@@ -95,7 +95,6 @@ static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const
     if (m->settings->steady || anything_shared(c))
         return fail(
             c, "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
-    memset(dots, 0, m->slot_results * sizeof(double));
     seed_knowns(c, knowns, n, seed);
     tangent_now(c, &m->tapes.discrete_starts, c->guards);
     for (int k = 0; k < m->n_d; k++) dots[m->slot_d + k] = c->mode_given[k] ? 0 : c->guards[k];
@@ -136,10 +135,8 @@ void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *resu
 Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result) {
     if (!check_unknowns(c, unknowns, n_unknowns) || !check_knowns(c, knowns, n_knowns)) return RESULT_ERROR;
-    if (c->state.phase != PHASE_INITIALIZATION) {
-        memset(c->dots, 0, c->model->slot_results * sizeof(double));
-        seed_knowns(c, knowns, n_knowns, seed);
-    } else if (!start_tangent(c, knowns, n_knowns, seed)) return RESULT_ERROR;
+    if (c->state.phase != PHASE_INITIALIZATION) seed_knowns(c, knowns, n_knowns, seed);
+    else if (!start_tangent(c, knowns, n_knowns, seed)) return RESULT_ERROR;
     if (!factor_implicit(c)) return RESULT_ERROR;
     tangent_of_implicit(c);
     read_tangents(c, unknowns, n_unknowns, result, 1);

@@ -61,7 +61,6 @@ static inline int all_given(Instance *c, const void *const *given, const char *n
         ENTER(name, phases);           \
         return status(call);           \
     }
-/* A function that changes nothing but the phase. */
 #define CHANGE_PHASE(name, from, to, forbidden, why) \
     DO(name, from, (forbidden) ? fail(c, TEXT(FMI(name)) why) : (c->state.phase = (to), RESULT_OK))
 

@@ -116,7 +116,6 @@ static int dependences(Instance *c, const int *member, int n, double *silent) {
     return rows;
 }
 
-/* Whether a member has a part in what a circuit shares. */
 static int shares_in(const Instance *c, const Circuit *one, int place) {
     const double *shares = c->d + one->first + one->n_members;
     for (int row = 0; row < one->n_members; row++)

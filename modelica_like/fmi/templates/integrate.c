@@ -111,7 +111,6 @@ static Result pass_event(Instance *c) {
     return RESULT_OK;
 }
 
-/* Fires what was located at the present point, or what wants to fire. */
 Result handle_event(Instance *c) { return gradient_through(c, pass_event, 0); }
 
 /* The end of a run is an event where discrete equations ask for it. */

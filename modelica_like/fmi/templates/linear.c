@@ -3,7 +3,6 @@
 
 #define SAYS_NOTHING 1e-24 /* square of the relative size of an equation that is none */
 
-/* Applies a Householder reflection to a vector. */
 static inline void reflect(const QrPattern *a, const Instance *c, int column, double *x) {
     double dot = 0;
     for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) dot += c->qr_v[k] * x[a->v_row[k]];

@@ -1,5 +1,6 @@
 /* Reads a model from the bytes of its file (model_file.py), and checks everything that the run-time relies on: whatever
- * stands in a file, nothing is read or written outside of the tables. */
+ * stands in a file, nothing is read or written outside of the tables. Behind it, the file is found in the folder of
+ * resources, which importers name in many ways. */
 #include "model.h"
 
 #define FORMAT 6
@@ -133,6 +134,23 @@ static int find_sizes(Model *m, size_t size, char *message) {
     return lay_out_slots(m, size) || damaged(message, "its sizes");
 }
 
+/* Operations read what stands before them. */
+static int check_tape(const Tape *tape) {
+    int64_t total = 0;
+    for (const Run *run = tape->runs; run < tape->runs + tape->n_runs; run++) {
+        if (run->operation < 0 || run->operation >= N_OPERATION_CODES || run->count < 0) return 0;
+        total += run->count;
+    }
+    if (total != tape->n_operations) return 0;
+    for (int k = 0; k < tape->n_operations; k++) {
+        int left = tape->operands[k].left, right = tape->operands[k].right, end = tape->first_result + k;
+        if (left < 0 || right < 0 || left >= end || right >= end) return 0;
+    }
+    for (int k = 0; k < tape->n_outputs; k++)
+        if (tape->outputs[k] < 0 || tape->outputs[k] >= tape->first_result + tape->n_operations) return 0;
+    return 1;
+}
+
 /* Results of tapes are as many as the tables that they belong to have records. */
 #define RESULTS(tape, wanted) {#tape, m->tapes.tape.n_outputs, wanted}
 static int check_sizes(const Model *m, char *message) {
@@ -149,6 +167,8 @@ static int check_sizes(const Model *m, char *message) {
         {"guesses", m->n_guesses, m->n_unknowns}, {"units", m->n_units, m->n_holds + m->n_ideals > 0 ? m->n_nodes : 0}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++)
         if (sizes[k].found != sizes[k].wanted) return damaged(message, sizes[k].name);
+    for (int k = 0; k < N_TAPES; k++)
+        if (!check_tape(tapes_of(m) + k)) return damaged(message, "tapes");
     if (m->n_steady > m->n_unknowns) return damaged(message, "steady");
     return m->n_modes <= m->n_d || damaged(message, "modes");
 }
@@ -244,24 +264,6 @@ static int check_variables(const Model *m, char *message) {
     return 1;
 }
 
-/* Operations read what stands before them. */
-static int check_tape(const Tape *tape) {
-    int64_t total = 0;
-    for (int k = 0; k < tape->n_runs; k++) {
-        const Run *run = &tape->runs[k];
-        if (run->operation < 0 || run->operation >= N_OPERATION_CODES || run->count < 0) return 0;
-        total += run->count;
-    }
-    if (total != tape->n_operations) return 0;
-    for (int k = 0; k < tape->n_operations; k++) {
-        int left = tape->operands[k].left, right = tape->operands[k].right, end = tape->first_result + k;
-        if (left < 0 || right < 0 || left >= end || right >= end) return 0;
-    }
-    for (int k = 0; k < tape->n_outputs; k++)
-        if (tape->outputs[k] < 0 || tape->outputs[k] >= tape->first_result + tape->n_operations) return 0;
-    return 1;
-}
-
 /* Columns of a sparse matrix; `least` entries in each. */
 static int check_columns(int size, const int *colind, const int *row, int count, int least) {
     if (colind[0] != 0 || colind[size] != count) return 0;
@@ -287,14 +289,6 @@ static int check_pattern(const QrPattern *a) {
     return 1;
 }
 
-static int check_model(const Model *m, char *message) {
-    for (int k = 0; k < N_TAPES; k++)
-        if (!check_tape(tapes_of(m) + k)) return damaged(message, "tapes");
-    return check_indices(m, message) && check_variables(m, message) && check_events(m, message) &&
-           (check_pattern(&m->step) || damaged(message, "step")) &&
-           (check_pattern(&m->start) || damaged(message, "start"));
-}
-
 /* Reads a model from bytes that are aligned as numbers and outlive it. Returns NULL and a message for `message`, which
  * has MESSAGE_LENGTH characters, if they are no model. */
 Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message) {
@@ -304,7 +298,9 @@ Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Re
     memset(m, 0, sizeof *m);
     m->release = release;
     if (find_tables(m, bytes, size, message) && find_sizes(m, size, message) && check_sizes(m, message) &&
-        check_model(m, message))
+        check_indices(m, message) && check_variables(m, message) && check_events(m, message) &&
+        (check_pattern(&m->step) || damaged(message, "step")) &&
+        (check_pattern(&m->start) || damaged(message, "start")))
         return m;
     release(m);
     return NULL;
@@ -313,4 +309,92 @@ Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Re
 void model_free(Model *m) {
     if (m->own != NULL) m->release(m->own);
     m->release(m);
+}
+
+#define NAME "model.bin"
+#define LONGEST_PATH 4096
+#ifdef _WIN32
+#include <wchar.h>
+enum { ON_WINDOWS = 1, UTF8 = 65001 };
+/* Declared here: windows.h defines words such as `near`. */
+__declspec(dllimport) int __stdcall MultiByteToWideChar(unsigned, unsigned long, const char *, int, wchar_t *, int);
+FILE *_wfopen(const wchar_t *, const wchar_t *);
+static FILE *open_file(const char *path) {
+    wchar_t wide[LONGEST_PATH];
+    return MultiByteToWideChar(UTF8, 0, path, -1, wide, LONGEST_PATH) > 0 ? _wfopen(wide, L"rb") : NULL;
+}
+#else
+enum { ON_WINDOWS = 0 };
+static FILE *open_file(const char *path) { return fopen(path, "rb"); }
+#endif
+
+static int is_letter(char c) { return (c | 32) >= 'a' && (c | 32) <= 'z'; }
+
+static int starts(const char *text, const char *with) {
+    for (; *with; text++, with++)
+        if (*text == 0 || (is_letter(*text) ? *text | 32 : *text) != *with) return 0;
+    return 1;
+}
+
+/* The path behind "file:", or NULL: what has no host, or this machine, is local; another host is a share of Windows. */
+static const char *after_scheme(const char *uri, int windows) {
+    const char *rest = uri + strlen("file:");
+    if (rest[0] == '/' && rest[1] == '/') {
+        const char *host = rest + 2;
+        if (*host == '/') rest = host;
+        else if (starts(host, "localhost/")) rest = host + strlen("localhost");
+        else if (windows && is_letter(host[0]) && (host[1] == ':' || host[1] == '|')) rest = host;
+        else if (!windows) return NULL;
+    }
+    if (windows && rest[0] == '/' && is_letter(rest[1]) && (rest[2] == ':' || rest[2] == '|')) rest++;
+    return rest;
+}
+
+/* The folder of resources as a path: from a URI (FMI 2.0), or as it is (FMI 3.0). Returns 0 if it names none. */
+int resource_path(const char *location, int windows, char *path, size_t room) {
+    int encoded = starts(location, "file:");
+    const char *from = encoded ? after_scheme(location, windows) : location;
+    size_t n = 0;
+    if (from == NULL || *from == 0 || (!encoded && strstr(from, "://") != NULL)) return 0;
+    for (; *from; from++) {
+        char c = *from;
+        if (encoded && c == '%') {
+            const char code[] = {from[1], from[1] ? from[2] : 0, 0};
+            c = (char)strtol(code, NULL, 16);
+            if (c == 0 || strspn(code, "0123456789abcdefABCDEF") != 2) return 0;
+            from += 2;
+        } else if (encoded && (c == '?' || c == '#')) break;
+        if (encoded && windows && c == '|' && n == 1) c = ':';
+        if (n + sizeof NAME + 1 >= room) return 0;
+        path[n++] = c;
+    }
+    if (path[n - 1] != '/' && !(windows && path[n - 1] == '\\')) path[n++] = '/';
+    memcpy(path + n, NAME, sizeof NAME);
+    return 1;
+}
+
+static Model *read_all(FILE *file, Allocate allocate, Release release, char *message) {
+    long size = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
+    unsigned char *bytes = size > 0 && fseek(file, 0, SEEK_SET) == 0 ? allocate((size_t)size, 1) : NULL;
+    Model *m = NULL;
+    if (bytes == NULL) return REFUSE("The model file is empty, or there is not enough memory for it.");
+    if (fread(bytes, 1, (size_t)size, file) != (size_t)size) (void)REFUSE("The model file cannot be read completely.");
+    else m = model_read(bytes, (size_t)size, allocate, release, message);
+    if (m == NULL) release(bytes);
+    else m->own = bytes;
+    return m;
+}
+
+Model *model_open(const char *location, Allocate allocate, Release release, char *message) {
+    char path[LONGEST_PATH];
+    if (location == NULL || *location == 0)
+        return REFUSE("The importer does not say where the FMU's resources are, so its model cannot be read. Export it "
+                      "with the model compiled in (--embed).");
+    if (!resource_path(location, ON_WINDOWS, path, sizeof path))
+        return REFUSE("The location of the FMU's resources names no folder: '%.300s'.", location);
+    FILE *file = open_file(path);
+    if (file == NULL) return REFUSE("The model file cannot be opened: '%.400s'.", path);
+    Model *m = read_all(file, allocate, release, message);
+    fclose(file);
+    return m;
 }

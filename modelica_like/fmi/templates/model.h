@@ -166,8 +166,6 @@ Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Re
 void model_free(Model *m);
 uint32_t crc32_of(const unsigned char *bytes, size_t size);
 static inline const char *text_of(const Model *m, int place) { return m->text + place; }
-
-/* model_file.c */
 Model *model_open(const char *location, Allocate allocate, Release release, char *message);
 
 /* model_data.c: the bytes of the file where they are compiled in, of size 0 where they are read */
