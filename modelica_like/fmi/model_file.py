@@ -30,7 +30,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
 """Path of the file in an FMU."""
-FORMAT = 5
+FORMAT = 6
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
 _ENTRY = struct.Struct("<4i")
@@ -44,6 +44,7 @@ def _record(integers: str, doubles: str = "") -> list[tuple[str, str]]:
     return [*((name, _INTEGER) for name in integers.split()), *((name, _DOUBLE) for name in doubles.split())]
 
 
+_RESET = _record("kind index value target transition at_start", "factor")
 _START_OF = _record("position start", "factor")
 _START_ROW = _record("start node row")
 _QR = ("colind", "row", "v_colind", "v_row", "r_colind", "r_row", "row_place", "column_order")
@@ -66,12 +67,12 @@ SECTIONS: dict[str, Any] = {
     "rising": _record("below above below_name above_name"),
     "transitions": [
         *_record("mode target"), ("timed", "<i2"), ("fails", "<i2"),
-        *_record("index first_reset n_resets name notice"), ("sources", "<u8"),
+        *_record("index name notice"), ("sources", "<u8"),
     ],
     "guard_transition": _INTEGER,
-    "resets": _record("kind index value target", "factor"),
+    "resets": _RESET,
     "reset_nodes": _INTEGER,
-    "updates": _record("kind index target at_start", "factor"),
+    "updates": _RESET,
     "modes": _record("first_name n_names"),
     "mode_names": _INTEGER,
     "holds": _record("mode number loose motion state reaction approach moved name unused", "factor nominal"),
@@ -215,7 +216,9 @@ def _contents(
         "jacobian_to_step": tables.to_step,
         "step_diagonal": tables.diagonal,
     }
-    contents |= _events(model, text) | _holds(model, text) | _starts(start, len(model.states), len(model.implicit))
+    contents |= (
+        _events(model, text) | _holds(model, text) | _starts(start, len(model.states), len(model.implicit), sizes["y"])
+    )
     for name, pattern in (("step", tables.step), ("start", tables.start_pattern)):
         contents |= {f"{name}.{field}": pattern[field] for field in _QR}
     for tape in tables.tapes.values():
@@ -226,12 +229,12 @@ def _contents(
 def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
     transitions: list[tuple[int, ...]] = []
     resets: list[tuple[float, ...]] = []
-    for one in model.transitions:
+    for k, one in enumerate(model.transitions):
         path = model.flat_discretes[one.mode].path
-        changes = (len(resets), len(one.resets), text(path), text(_notice(path, one.notice)))
+        texts = (text(path), text(_notice(path, one.notice)))
         sources = sum(1 << source for source in one.sources)
-        transitions.append((one.mode, one.target, int(one.timed), int(one.fails), one.index, *changes, sources))
-        resets += [(_RESETS.index(r.kind), r.index, r.value, r.target, r.factor) for r in one.resets]
+        transitions.append((one.mode, one.target, int(one.timed), int(one.fails), one.index, *texts, sources))
+        resets += [(_RESETS.index(r.kind), r.index, r.value, r.target, k, 0, r.factor) for r in one.resets]
     guards = {one.index: k for k, one in enumerate(model.transitions) if not one.timed}
     names = [text(name) for one in model.flat_discretes for name in one.names]
     return {
@@ -240,8 +243,8 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
         "resets": resets,
         "reset_nodes": model.reset_nodes,
         "updates": [
-            (_RESETS.index(r.kind), r.index, r.target, int(one.at_start), r.factor)
-            for one, r in ((one, one.reset) for one in model.update_rows)
+            (_RESETS.index(r.kind), r.index, k, r.target, 0, int(one.at_start), r.factor)
+            for k, (one, r) in enumerate((one, one.reset) for one in model.update_rows)
         ],
         "modes": _counted(len(one.names) for one in model.flat_discretes),
         "mode_names": names,
@@ -294,7 +297,7 @@ def _notice(path: str, notice: str) -> str:
     return f"{path.rpartition('.')[0]} {told}".strip() if notice else ""
 
 
-def _starts(start: StartTables, n_x: int, n_z: int) -> dict[str, Any]:
+def _starts(start: StartTables, n_x: int, n_z: int, n_y: int) -> dict[str, Any]:
     return {
         "start_direct": start.direct,
         "start_default": start.defaults,
@@ -302,7 +305,7 @@ def _starts(start: StartTables, n_x: int, n_z: int) -> dict[str, Any]:
         "start_rows": start.rows,
         "start_dependent": start.dependent,
         "start_zero": start.zero,
-        "start_columns": start.columns,
+        "start_columns": [k if k < n_x else k - n_y if k >= n_x + n_y else k + n_z for k in start.columns],
         "steady": () if start.steady is None else (*start.steady, *range(n_x, n_x + n_z)),
     }
 

@@ -18,9 +18,9 @@ Face = Literal["2.0", "3.0", "native"]
 _TEMPLATES = Path(__file__).parent / "templates"
 
 RUNTIME = (
-    "model.c", "model_file.c", "tape.c", "linear.c", "special.c", "point.c", "start.c", "holds.c",
-    "ideal.c", "impacts.c", "events.c", "rosenbrock.c", "locate.c", "integrate.c", "fixed.c", "values.c",
-    "delay.c", "derivatives.c", "gradient.c", "taylor.c", "instance.c",
+    "model.c", "tape.c", "linear.c", "point.c", "start.c", "holds.c",
+    "impacts.c", "events.c", "rosenbrock.c", "locate.c", "integrate.c", "fixed.c", "values.c",
+    "delay.c", "derivatives.c", "gradient.c", "instance.c",
 )  # fmt: skip
 LOG_CATEGORIES = {
     "logStatusError": "errors: what went wrong, where, and what to do",

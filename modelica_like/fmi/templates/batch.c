@@ -3,6 +3,11 @@
  * event; what happens between them is read off the dense output of the steps. */
 #include "core.h"
 
+/* native.c */
+Instance *instance_for(const Model *m, void *environment);
+Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol);
+Result instance_begin(Instance *c);
+
 typedef enum {
     READ_END,
     READ_AT,

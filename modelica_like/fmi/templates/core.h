@@ -76,7 +76,7 @@ typedef struct {
     double gain, forward, backward, restitution;
 } Terms; /* of a motion that modes hold */
 
-typedef struct { /* a tape for the present modes, see special.c */
+typedef struct { /* a tape for the present modes, see tape.c */
     Tape tape;
     Run *runs;
     Operands *operands;
@@ -140,9 +140,10 @@ typedef struct Instance {
     double SMOOTH_NUMBERS(FIELD);
     unsigned char STATE_MARKS(FIELD);
     Piece *piece;
-    double *past, *past_sizes; /* what delayed values were, see delay.c; their sizes */
-    double *end_look;          /* guards and their rates at the end of the last fixed step */
-    double *z;                 /* in x: together they are a point */
+    double *past, *past_sizes;     /* what delayed values were, see delay.c; their sizes */
+    double *end_look;              /* guards and their rates at the end of the last fixed step */
+    double *z;                     /* in x: together they are a point */
+    const double *values[N_KINDS]; /* of variables by kind; of inputs only at u_time */
 
     double WORK_NUMBERS(FIELD);
     int WORK_INDICES(FIELD);
@@ -192,7 +193,6 @@ double dot(int n, const double *p, const double *q);
 double make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
-/* special.c */
 void run_special(Instance *c, const Tape *tape, double *outputs);
 void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
@@ -223,7 +223,6 @@ void share(Instance *c);
 Result share_and_solve(Instance *c);
 void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
-/* ideal.c */
 void replace_dependent(Instance *c);
 int pushed(Instance *c);
 #define GIVEN_BACK 1e-3 /* of the largest current: none where modes return, as it ends within the time resolution */
@@ -252,8 +251,7 @@ void move_states(Instance *c, const int *nodes, const double *values, int count)
 void note_change(Instance *c, int name, int transition, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
 /* rosenbrock.c */
-int rosenbrock_step(
-    Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error);
+double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece);
 double *last_of(const Model *m, Piece *piece);
 int factor_step(Instance *c, double diagonal);
 size_t piece_size(const Model *m);
@@ -271,7 +269,7 @@ Result finish(Instance *c);
 Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
 Result move_to(Instance *c, double t);
-Result take_changes(Instance *c, int *event);
+Result take_changes(Instance *c);
 int is_due(Instance *c);
 /* fixed.c */
 Arrival step_fixed(Instance *c, double target);
@@ -301,17 +299,12 @@ void tangent_of_implicit(Instance *c);
 void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c);
-/* native.c */
-Instance *instance_for(const Model *m, void *environment);
-Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol);
-Result instance_begin(Instance *c);
 /* gradient.c */
 void gradient_move(Instance *c, double t);
 int gradient_round(Instance *c, int round, unsigned char *wanting, int any);
 Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start);
 void gradient_lose(Instance *c, const char *why, const Variable *by);
 void gradient_end(Instance *c);
-/* taylor.c */
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 /* instance.c */
 Instance *instance_new(Instance bare, const char *token);

@@ -94,8 +94,21 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
             text_of(m, names[(int)before]), text_of(m, names[target]));
 }
 
+/* Gives a state or a discrete value its new value, or notes a variable for move_states; tells whether it changes. */
+static int take_value(Instance *c, const Reset *one, double value, double *d, int *count) {
+    if (one->kind != RESET_DISCRETE) c->stopped = 0;
+    if (one->kind == RESET_VALUE) {
+        c->targets[*count] = c->model->reset_nodes[one->target];
+        c->target_values[(*count)++] = value;
+        return 1;
+    }
+    double *place = one->kind == RESET_DISCRETE ? &d[one->index] : &c->x[one->index], before = *place;
+    *place = value;
+    return before != value;
+}
+
 /* Fire transitions together; of one mode only the one declared first. An error if one of them ends the run. */
-static Result fire(Instance *c, const unsigned char *wanting) {
+static Result fire(Instance *c, unsigned char *wanting) {
     const Model *m = c->model;
     double *values = c->reset_values, *d = c->d_fired;
     unsigned char *changed = memset(c->changed, 0, (size_t)m->n_modes);
@@ -104,7 +117,8 @@ static Result fire(Instance *c, const unsigned char *wanting) {
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     for (int k = 0; k < m->n_transitions; k++) {
         const Transition *one = &m->transitions[k];
-        if (!wanting[k] || changed[one->mode]) continue;
+        wanting[k] &= !changed[one->mode];
+        if (!wanting[k]) continue;
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
         if (one->fails)
@@ -112,18 +126,9 @@ static Result fire(Instance *c, const unsigned char *wanting) {
         if (*text_of(m, one->notice))
             report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, text_of(m, one->notice));
         d[one->mode] = one->target;
-        for (int r = one->first_reset; r < one->first_reset + one->n_resets; r++) {
-            const Reset *reset = &m->resets[r];
-            if (reset->kind == RESET_STATE) {
-                c->stopped = 0;
-                c->x[reset->index] = values[reset->value] / reset->factor;
-            } else if (reset->kind == RESET_DISCRETE) d[reset->index] = values[reset->value];
-            else {
-                c->targets[count] = m->reset_nodes[reset->target];
-                c->target_values[count++] = values[reset->value];
-            }
-        }
     }
+    for (const Reset *one = m->resets; one < m->resets + m->n_resets; one++)
+        if (wanting[one->transition]) take_value(c, one, values[one->value] / one->factor, d, &count);
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
     if (count > 0) move_states(c, c->targets, c->target_values, count);
     return RESULT_OK;
@@ -137,23 +142,12 @@ static Result update_once(Instance *c, int *changes) {
     *changes = 0;
     if (m->n_updates == 0) return RESULT_OK;
     evaluate_now(c, &m->tapes.updates, values);
-    for (int k = 0; k < m->n_updates; k++) {
-        const Update *one = &m->updates[k];
-        double *place =
-            one->kind == RESET_DISCRETE ? &c->d[one->index] : &c->x[one->kind == RESET_STATE ? one->index : 0];
-        double value = values[k] / one->factor;
-        if (one->kind != RESET_DISCRETE && isinf(value)) continue; /* nothing sets it now */
-        if (one->kind != RESET_DISCRETE) c->stopped = 0;
-        if (one->kind == RESET_VALUE) {
-            c->targets[count] = m->reset_nodes[one->target];
-            c->target_values[count++] = value;
-        } else if (*place != value) {
-            *place = value;
-            *changes = 1;
-        }
+    for (const Reset *one = m->updates; one < m->updates + m->n_updates; one++) {
+        double value = values[one->value] / one->factor;
+        if (one->kind == RESET_DISCRETE || !isinf(value)) /* else nothing sets it now */
+            *changes |= take_value(c, one, value, c->d, &count);
     }
-    if (count == 0 && !*changes) return RESULT_OK;
-    *changes = 1;
+    if (!*changes) return RESULT_OK;
     c->state.n_events++;
     if (count > 0) move_states(c, c->targets, c->target_values, count);
     return share_and_solve(c) && check_singular(c);
@@ -221,9 +215,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         memcpy(c->d_earlier, before, (size_t)m->n_d * sizeof(double));
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
         if (any && !fire(c, wanting)) return RESULT_ERROR;
-        if (any) share(c);
-        c->variables_valid = 0;
-        if (any && (!solve_now(c, 0) || !stop_motions(c, before) || !check_singular(c))) return RESULT_ERROR;
+        if (any && (!share_and_solve(c) || !stop_motions(c, before) || !check_singular(c))) return RESULT_ERROR;
         if (any && m->n_ideals > 0) {
             int same = round > 0; /* modes return */
             for (int k = 0; k < m->n_ideals; k++) same &= c->d[m->ideals[k].mode] == c->d_earlier[m->ideals[k].mode];

@@ -73,11 +73,11 @@ static Result fire_here(Instance *c, int *fired) {
 
 /* Goes from the present point to `limit`, or to an event before it while the budget allows for one. */
 static Result go_on(Instance *c, double limit, int *fired) {
-    double *first = c->first, begin = c->state.t, error, part = QUIET;
+    double *first = c->first, begin = c->state.t, part = QUIET;
     int behind_event = *fired;
     *fired = 0;
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
-    if (!rosenbrock_step(c, begin, first, limit - begin, 0, c->piece, &error))
+    if (rosenbrock_step(c, begin, first, limit - begin, 0, c->piece) < 0)
         return fail(c,
             "The step from t = %.12g s gives values that are not finite, or singular equations. Take smaller steps.",
             begin);
@@ -101,11 +101,9 @@ static Result go_on(Instance *c, double limit, int *fired) {
 
 static Result one_step(Instance *c, double end) {
     State *s = &c->state;
-    int fired = 0, event;
+    int fired = 0;
     c->budget = BUDGET;
-    if (!take_changes(c, &event)) return RESULT_ERROR;
-    s->at_event |= event;
-    if (s->at_event && !fire_here(c, &fired)) return RESULT_ERROR;
+    if (!take_changes(c) || (s->at_event && !fire_here(c, &fired))) return RESULT_ERROR;
     while (s->t < end) {
         double moment = c->budget >= 2 ? next_moment(c) : INFINITY;
         if (!go_on(c, fmin(end, moment), &fired)) return RESULT_ERROR;

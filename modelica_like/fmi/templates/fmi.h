@@ -23,7 +23,8 @@
 
 /* Are arguments what they must be: no null pointers where n > 0, the right sizes? If not, it is told. */
 #define GIVEN(n, ...) ((n) == 0 || all_given(c, (const void *const[]){__VA_ARGS__}, TEXT((__VA_ARGS__))))
-#define SIZED(n, wanted, what) is_size(c, n, (size_t)(wanted), what)
+#define SIZED(n, wanted, what) \
+    ((n) == (size_t)(wanted) || fail(c, "There must be %zu %s, not %zu.", (size_t)(wanted), what, n))
 #define NEED(n, ...) \
     if (!GIVEN(n, __VA_ARGS__)) return FMI(Error)
 
@@ -43,18 +44,7 @@ static inline int all_given(Instance *c, const void *const *given, const char *n
     return 1;
 }
 
-static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what) {
-    return n == wanted || fail(c, "There must be %zu %s, not %zu.", wanted, what, n);
-}
-
-/* A function whose work is one call of the run-time, if arguments are what it needs. */
-#define CALL(name, phases, needs, call, ...)        \
-    Status FMI(name)(void *instance, __VA_ARGS__) { \
-        ENTER(name, phases);                        \
-        if (!(needs)) return FMI(Error);            \
-        return status(call);                        \
-    }
-/* A function that does the same for everything that it is given. */
+/* A function that does the same for everything that it is given, if arguments are what it needs. */
 #define EACH(name, phases, n, needs, call, ...)     \
     Status FMI(name)(void *instance, __VA_ARGS__) { \
         ENTER(name, phases);                        \
@@ -63,20 +53,16 @@ static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what
             if (!(call)) return FMI(Error);         \
         return FMI(OK);                             \
     }
-/* A function without arguments. */
+/* A function whose work is one call of the run-time. */
+#define CALL(name, phases, needs, call, ...) EACH(name, phases, 1, needs, call, __VA_ARGS__)
+/* One without arguments. */
 #define DO(name, phases, call)         \
     Status FMI(name)(void *instance) { \
         ENTER(name, phases);           \
         return status(call);           \
     }
-/* A function that changes nothing but the phase. */
-#define CHANGE_PHASE(name, from, to, forbidden, why)                \
-    Status FMI(name)(void *instance) {                              \
-        ENTER(name, from);                                          \
-        if (forbidden) return status(fail(c, TEXT(FMI(name)) why)); \
-        c->state.phase = to;                                        \
-        return FMI(OK);                                             \
-    }
+#define CHANGE_PHASE(name, from, to, forbidden, why) \
+    DO(name, from, (forbidden) ? fail(c, TEXT(FMI(name)) why) : (c->state.phase = (to), RESULT_OK))
 
 static inline Status failed(Instance *c) {
     c->state.phase = PHASE_FAILED;

@@ -138,11 +138,11 @@ NO_CLOCK(GetIntervalFraction, fmi3UInt64 a[], fmi3UInt64 b[], fmi3IntervalQualif
 
 /* Dependencies stand in the description, which does not announce these (providesPerElementDependencies). */
 #define REFUSED(name, why, ...) CALL(name, ANY_PHASE, 1, fail(c, why), __VA_ARGS__)
-REFUSED(ActivateModelPartition, "This model has no scheduled execution.", fmi3ValueReference k, fmi3Float64 t)
+REFUSED(ActivateModelPartition, "This model has no scheduled execution.", fmi3ValueReference r, fmi3Float64 t)
 #define SEE_DESCRIPTION "The model description lists the dependencies of variables."
 REFUSED(GetNumberOfVariableDependencies, SEE_DESCRIPTION, fmi3ValueReference v, size_t *n)
 REFUSED(GetVariableDependencies, SEE_DESCRIPTION, fmi3ValueReference v, size_t a[], fmi3ValueReference r[], size_t b[],
-    fmi3DependencyKind k[], size_t n)
+    fmi3DependencyKind d[], size_t n)
 
 #define DERIVATIVES                                                                                           \
     const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns, \

@@ -1,4 +1,6 @@
-/* Motions that modes hold, as in initialize/holds.py: which they are, and how elements share what they hold. */
+/* Motions that modes hold, as in initialize/holds.py: which they are, and how elements share what they hold. Behind
+ * them ideal elements, as in initialize/ideal.py: equations that replace dependent ones, impulses, conditions on
+ * states. */
 #include "core.h"
 
 #define DEPENDENT 1e-9
@@ -114,7 +116,6 @@ static int dependences(Instance *c, const int *member, int n, double *silent) {
     return rows;
 }
 
-/* Whether a member has a part in what a circuit shares. */
 static int shares_in(const Instance *c, const Circuit *one, int place) {
     const double *shares = c->d + one->first + one->n_members;
     for (int row = 0; row < one->n_members; row++)

@@ -9,15 +9,14 @@ enum { N_CATEGORIES = sizeof categories / sizeof categories[0] };
 /* Errors are always told, the rest if its category is on. Returns `result`. */
 Result report(Instance *c, LogCategory category, Result result, const char *format, ...) {
     char message[MESSAGE_LENGTH];
-    const char *name = "";
+    int bit = 0;
     va_list arguments;
     if (c->log == NULL || c->passing || (category != LOG_ERROR && !(c->log_enabled & category))) return result;
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
-    for (int k = 0; k < N_CATEGORIES; k++)
-        if ((int)category == 1 << k) name = categories[k];
-    c->log(c, (int)result, name, message);
+    while ((int)category != 1 << bit) bit++;
+    c->log(c, (int)result, categories[bit], message);
     return result;
 }
 
@@ -58,7 +57,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
     uint64_t n = m->n_unknowns, n_x = m->n_x, n_z = m->n_z, n_d = m->n_d, holds = m->n_holds, guards = m->n_guards;
     uint64_t starts = m->n_starts, slots = m->n_slots, delays = m->n_delays, used = 0, left = 0;
     uint64_t members = m->most_members + 1, ideal = m->n_ideals > 0 ? n_z : 0, dense = n_z * n_z;
-    uint64_t jacobian = larger(m->n_jacobian, m->n_start_jacobian), system = larger(n, m->start.size);
+    uint64_t jacobian = larger(m->n_jacobian, m->start.n_nonzeros), system = larger(n, m->start.size);
     uint64_t steady = m->settings->steady ? m->n_steady : 0;
     uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), larger(m->n_updates, holds + m->n_ideals));
     uint64_t small = larger(larger(guards, m->n_moments), larger(larger(m->n_start_modes, n_d), m->n_derived));
@@ -129,6 +128,9 @@ Instance *instance_new(Instance bare, const char *token) {
     c->numbers = (double *)(void *)c + head;
     lay_out(c, c->numbers);
     c->z = c->x + m->n_x;
+    const double *values[N_KINDS] = {&c->state.t, c->x, c->seen_rates, c->variables, c->p, c->seen_derived, c->u, c->d,
+        c->seen_indicators}; /* as Kind */
+    memcpy(c->values, values, sizeof values);
     memcpy(c->slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
     return c;

@@ -37,12 +37,13 @@ static Result take_step(Instance *c, double limit) {
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
     wished = fmin(wished, largest_step(c));
     for (int n = 0; n < MAX_REJECTIONS; n++) {
-        double error = 0, factor, h = wished;
+        double error, factor, h = wished;
         int cut = s->t + 1.0001 * h >= limit;
         if (cut) h = limit - s->t;
         clear_pending(c);
         if (h < least || !isfinite(h)) break;
-        if (!rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece, &error) || !isfinite(error)) error = 1e30;
+        error = rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece);
+        if (!(error >= 0 && isfinite(error))) error = 1e30;
         if (cut) c->piece->end = limit;
         factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
         if (error > 1 || !solve_implicit(c, c->piece->end, last_of(c->model, c->piece), 1) ||
@@ -77,14 +78,13 @@ Result move_to(Instance *c, double t) {
 }
 
 /* Inputs, parameters or states moved from outside: go on from the present point. */
-Result take_changes(Instance *c, int *event) {
-    *event = 0;
+Result take_changes(Instance *c) {
     if (!c->state.inputs_changed) return RESULT_OK;
     if (!check_tables(c)) return RESULT_ERROR;
     leave_piece(c);
     c->state.inputs_changed = c->state.z_valid = c->variables_valid = 0;
     if (!renew(c) || !settle(c)) return RESULT_ERROR;
-    *event = find_wanting(c, nothing_wanting(c), 1) || pushed(c);
+    c->state.at_event |= find_wanting(c, nothing_wanting(c), 1) || pushed(c);
     return leave_instant(c, 1);
 }
 
@@ -111,7 +111,6 @@ static Result pass_event(Instance *c) {
     return RESULT_OK;
 }
 
-/* Fires what was located at the present point, or what wants to fire. */
 Result handle_event(Instance *c) { return gradient_through(c, pass_event, 0); }
 
 /* The end of a run is an event where discrete equations ask for it. */
@@ -157,7 +156,7 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     if (s->at_event && !handle_event(c)) return FAILED;
     for (;;) {
         held |= s->inputs_changed;
-        if (!take_changes(c, &s->at_event)) return FAILED;
+        if (!take_changes(c)) return FAILED;
         if (s->at_event && stop_at_events) return AT_EVENT;
         if (s->at_event && !handle_event(c)) return FAILED;
         if (!(s->t < target)) return REACHED;

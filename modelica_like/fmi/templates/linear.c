@@ -3,6 +3,13 @@
 
 #define SAYS_NOTHING 1e-24 /* square of the relative size of an equation that is none */
 
+static inline void reflect(const QrPattern *a, const Instance *c, int column, double *x) {
+    double dot = 0;
+    for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) dot += c->qr_v[k] * x[a->v_row[k]];
+    dot *= c->qr_beta[column];
+    for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) x[a->v_row[k]] -= dot * c->qr_v[k];
+}
+
 /* Left-looking Householder QR (T. Davis, Direct Methods for Sparse Linear Systems, ch. 5). Returns 0 if singular. */
 int qr_factor(const QrPattern *a, const double *values, Instance *c) {
     double *x = c->qr_work;
@@ -13,13 +20,9 @@ int qr_factor(const QrPattern *a, const double *values, Instance *c) {
         double *v = c->qr_v + first, tail = 0, norm;
         for (int k = a->colind[source]; k < a->colind[source + 1]; k++) x[a->row_place[a->row[k]]] = values[k];
         for (; a->r_row[r] < column; r++) {
-            int earlier = a->r_row[r];
-            double dot = 0;
-            for (int k = a->v_colind[earlier]; k < a->v_colind[earlier + 1]; k++) dot += c->qr_v[k] * x[a->v_row[k]];
-            dot *= c->qr_beta[earlier];
-            for (int k = a->v_colind[earlier]; k < a->v_colind[earlier + 1]; k++) x[a->v_row[k]] -= dot * c->qr_v[k];
-            c->qr_r[r] = x[earlier];
-            x[earlier] = 0;
+            reflect(a, c, a->r_row[r], x);
+            c->qr_r[r] = x[a->r_row[r]];
+            x[a->r_row[r]] = 0;
         }
         for (int k = first; k < end; k++) {
             c->qr_v[k] = x[a->v_row[k]];
@@ -44,12 +47,7 @@ int qr_factor(const QrPattern *a, const double *values, Instance *c) {
 void qr_solve(const QrPattern *a, const Instance *c, double *x) {
     double *y = c->qr_work;
     for (int k = 0; k < a->size; k++) y[a->row_place[k]] = x[k];
-    for (int column = 0; column < a->size; column++) {
-        double dot = 0;
-        for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) dot += c->qr_v[k] * y[a->v_row[k]];
-        dot *= c->qr_beta[column];
-        for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) y[a->v_row[k]] -= dot * c->qr_v[k];
-    }
+    for (int column = 0; column < a->size; column++) reflect(a, c, column, y);
     for (int column = a->size - 1; column >= 0; column--) {
         int last = a->r_colind[column + 1] - 1;
         y[column] /= c->qr_r[last];

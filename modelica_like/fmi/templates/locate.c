@@ -39,11 +39,10 @@ static int look_inside(Instance *c, double t, Look *look) {
 /* By a step again from the beginning of the whole one, which becomes the piece. */
 static int step_to(Instance *c, double t, Look *look) {
     const Piece *whole = c->whole;
-    double ignored;
     if (t <= whole->begin) {
         memcpy(c->piece, whole, piece_size(c->model));
         memcpy(last_of(c->model, c->piece), whole->points, (size_t)c->model->n_unknowns * sizeof(double));
-    } else if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, c->piece, &ignored)) return 0;
+    } else if (rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, c->piece) < 0) return 0;
     c->piece->end = t;
     return look_at(c, t, last_of(c->model, c->piece), look);
 }

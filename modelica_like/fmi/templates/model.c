@@ -1,8 +1,9 @@
 /* Reads a model from the bytes of its file (model_file.py), and checks everything that the run-time relies on: whatever
- * stands in a file, nothing is read or written outside of the tables. */
+ * stands in a file, nothing is read or written outside of the tables. Behind it, the file is found in the folder of
+ * resources, which importers name in many ways. */
 #include "model.h"
 
-#define FORMAT 5
+#define FORMAT 6
 #define UNKNOWN (-1)
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
 
@@ -118,7 +119,6 @@ static int lay_out_slots(Model *m, size_t size) {
 }
 
 static int find_sizes(Model *m, size_t size, char *message) {
-    int64_t resets = 0;
     if (m->n_settings != 1) return damaged(message, "settings");
     m->n_d = m->settings->n_d;
     m->n_y = m->settings->n_y;
@@ -128,17 +128,27 @@ static int find_sizes(Model *m, size_t size, char *message) {
     m->n_moments = m->tapes.moments.n_outputs;
     m->n_starts = m->tapes.start_values.n_outputs;
     m->n_start_values = m->tapes.start_system.n_outputs;
-    m->n_start_jacobian = m->tapes.start_jacobian.n_outputs;
     m->n_reset_values = m->tapes.resets.n_outputs;
-    for (int k = 0; k < m->n_transitions; k++) {
-        if (m->transitions[k].first_reset != resets || m->transitions[k].n_resets < 0)
-            return damaged(message, "transitions.first_reset");
-        resets += m->transitions[k].n_resets;
-    }
-    if (resets != m->n_resets) return damaged(message, "transitions.n_resets");
     for (int k = 0; k < m->n_circuits; k++)
         if (m->circuits[k].n_members > m->most_members) m->most_members = m->circuits[k].n_members;
     return lay_out_slots(m, size) || damaged(message, "its sizes");
+}
+
+/* Operations read what stands before them. */
+static int check_tape(const Tape *tape) {
+    int64_t total = 0;
+    for (const Run *run = tape->runs; run < tape->runs + tape->n_runs; run++) {
+        if (run->operation < 0 || run->operation >= N_OPERATION_CODES || run->count < 0) return 0;
+        total += run->count;
+    }
+    if (total != tape->n_operations) return 0;
+    for (int k = 0; k < tape->n_operations; k++) {
+        int left = tape->operands[k].left, right = tape->operands[k].right, end = tape->first_result + k;
+        if (left < 0 || right < 0 || left >= end || right >= end) return 0;
+    }
+    for (int k = 0; k < tape->n_outputs; k++)
+        if (tape->outputs[k] < 0 || tape->outputs[k] >= tape->first_result + tape->n_operations) return 0;
+    return 1;
 }
 
 /* Results of tapes are as many as the tables that they belong to have records. */
@@ -157,6 +167,8 @@ static int check_sizes(const Model *m, char *message) {
         {"guesses", m->n_guesses, m->n_unknowns}, {"units", m->n_units, m->n_holds + m->n_ideals > 0 ? m->n_nodes : 0}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++)
         if (sizes[k].found != sizes[k].wanted) return damaged(message, sizes[k].name);
+    for (int k = 0; k < N_TAPES; k++)
+        if (!check_tape(tapes_of(m) + k)) return damaged(message, "tapes");
     if (m->n_steady > m->n_unknowns) return damaged(message, "steady");
     return m->n_modes <= m->n_d || damaged(message, "modes");
 }
@@ -174,20 +186,22 @@ typedef struct { /* integers of records, not below `low` and below `end` */
 
 /* Every index is one of the table that it points into. */
 static int check_indices(const Model *m, char *message) {
-    const Range ranges[] = {ARRAY(state_names, n_x, n_text), ARRAY(implicit_names, n_z, n_text),
-        ARRAY(singular_names, n_determinants, n_text), COLUMN(variables, kind, n_variables, 0, N_KINDS),
-        COLUMN(variables, type, n_variables, 0, N_TYPES), TEXT(variables, name),
-        COLUMN(variables, count, n_variables, 1, m->n_p + 2), INDEX(rising, below, n_p), INDEX(rising, above, n_p),
-        TEXT(rising, below_name), TEXT(rising, above_name), ARRAY(mode_names, n_mode_names, n_text),
-        INDEX(modes, first_name, n_mode_names + 1), INDEX(modes, n_names, n_mode_names + 1),
-        INDEX(transitions, mode, n_modes), TEXT(transitions, name), TEXT(transitions, notice),
-        ARRAY(guard_transition, n_guards, n_transitions), ARRAY(reset_nodes, n_reset_nodes, n_nodes),
-        COLUMN(resets, kind, n_resets, 0, N_RESET_KINDS), COLUMN(updates, kind, n_updates, 0, N_RESET_KINDS),
-        INDEX(resets, value, n_reset_values), INDEX(holds, mode, n_modes), INDEX(holds, motion, n_nodes),
-        COLUMN(holds, state, n_holds, -1, m->n_x), COLUMN(holds, reaction, n_holds, -1, m->n_nodes),
-        INDEX(holds, approach, n_d), TEXT(holds, name), ARRAY(members, n_members, n_holds), INDEX(ideals, row, n_z),
-        INDEX(ideals, mode, n_modes), INDEX(ideals, zero, n_nodes), INDEX(ideals, other, n_nodes), TEXT(ideals, name),
-        TEXT(delays, name), INDEX(delays, first, n_d - DELAY_TERMS - 1), INDEX(circuits, first_member, n_members + 1),
+    const Range ranges[] = {COLUMN(settings, terminal, n_settings, -1, m->n_modes), ARRAY(state_names, n_x, n_text),
+        ARRAY(implicit_names, n_z, n_text), ARRAY(singular_names, n_determinants, n_text),
+        COLUMN(variables, kind, n_variables, 0, N_KINDS), COLUMN(variables, type, n_variables, 0, N_TYPES),
+        TEXT(variables, name), COLUMN(variables, count, n_variables, 1, m->n_p + 2), INDEX(rising, below, n_p),
+        INDEX(rising, above, n_p), TEXT(rising, below_name), TEXT(rising, above_name),
+        ARRAY(mode_names, n_mode_names, n_text), INDEX(modes, first_name, n_mode_names + 1),
+        INDEX(modes, n_names, n_mode_names + 1), INDEX(transitions, mode, n_modes), TEXT(transitions, name),
+        TEXT(transitions, notice), ARRAY(guard_transition, n_guards, n_transitions),
+        ARRAY(reset_nodes, n_reset_nodes, n_nodes), COLUMN(resets, kind, n_resets, 0, N_RESET_KINDS),
+        COLUMN(updates, kind, n_updates, 0, N_RESET_KINDS), INDEX(resets, value, n_reset_values),
+        INDEX(resets, transition, n_transitions), INDEX(updates, value, n_updates), INDEX(holds, mode, n_modes),
+        INDEX(holds, motion, n_nodes), COLUMN(holds, state, n_holds, -1, m->n_x),
+        COLUMN(holds, reaction, n_holds, -1, m->n_nodes), INDEX(holds, approach, n_d), TEXT(holds, name),
+        ARRAY(members, n_members, n_holds), INDEX(ideals, row, n_z), INDEX(ideals, mode, n_modes),
+        INDEX(ideals, zero, n_nodes), INDEX(ideals, other, n_nodes), TEXT(ideals, name), TEXT(delays, name),
+        INDEX(delays, first, n_d - DELAY_TERMS - 1), INDEX(circuits, first_member, n_members + 1),
         INDEX(circuits, n_members, n_members + 1), INDEX(circuits, first, n_d + 1), INDEX(start_modes, mode, n_modes),
         INDEX(start_direct, position, n_x), INDEX(start_direct, start, n_starts), INDEX(start_default, position, n_x),
         INDEX(start_default, start, n_starts), INDEX(start_guess, position, n_unknowns),
@@ -205,24 +219,23 @@ static int check_indices(const Model *m, char *message) {
     return 1;
 }
 
-static int check_target(const Model *m, int kind, int index, int target) {
-    int place = kind == RESET_VALUE ? target : index;
-    return place >= 0 && place < (kind == RESET_VALUE ? m->n_reset_nodes : kind == RESET_STATE ? m->n_x : m->n_d);
+static int check_targets(const Model *m, const Reset *resets, int n) {
+    const int ends[N_RESET_KINDS] = {m->n_x, m->n_d, m->n_reset_nodes}; /* as ResetKind */
+    for (const Reset *one = resets; one < resets + n; one++) {
+        int place = one->kind == RESET_VALUE ? one->target : one->index;
+        if (place < 0 || place >= ends[one->kind]) return 0;
+    }
+    return 1;
 }
 
 static int check_events(const Model *m, char *message) {
-    if (m->settings->terminal < -1 || m->settings->terminal >= m->n_modes) return damaged(message, "settings.terminal");
     for (int k = 0; k < m->n_modes; k++)
         if (m->modes[k].n_names > m->n_mode_names - m->modes[k].first_name) return damaged(message, "modes.n_names");
     for (const Transition *one = m->transitions; one < m->transitions + m->n_transitions; one++)
         if (one->index < 0 || one->index >= (one->timed ? m->n_moments : m->n_guards))
             return damaged(message, "transitions.index");
-    for (int k = 0; k < m->n_resets; k++)
-        if (!check_target(m, m->resets[k].kind, m->resets[k].index, m->resets[k].target))
-            return damaged(message, "resets.index");
-    for (int k = 0; k < m->n_updates; k++)
-        if (!check_target(m, m->updates[k].kind, m->updates[k].index, m->updates[k].target))
-            return damaged(message, "updates.index");
+    if (!check_targets(m, m->resets, m->n_resets)) return damaged(message, "resets.index");
+    if (!check_targets(m, m->updates, m->n_updates)) return damaged(message, "updates.index");
     for (int k = 0; k < m->n_circuits; k++) {
         const Circuit *one = &m->circuits[k];
         int64_t n = one->n_members;
@@ -251,24 +264,6 @@ static int check_variables(const Model *m, char *message) {
     return 1;
 }
 
-/* Operations read what stands before them. */
-static int check_tape(const Tape *tape) {
-    int64_t total = 0;
-    for (int k = 0; k < tape->n_runs; k++) {
-        const Run *run = &tape->runs[k];
-        if (run->operation < 0 || run->operation >= N_OPERATION_CODES || run->count < 0) return 0;
-        total += run->count;
-    }
-    if (total != tape->n_operations) return 0;
-    for (int k = 0; k < tape->n_operations; k++) {
-        int left = tape->operands[k].left, right = tape->operands[k].right, end = tape->first_result + k;
-        if (left < 0 || right < 0 || left >= end || right >= end) return 0;
-    }
-    for (int k = 0; k < tape->n_outputs; k++)
-        if (tape->outputs[k] < 0 || tape->outputs[k] >= tape->first_result + tape->n_operations) return 0;
-    return 1;
-}
-
 /* Columns of a sparse matrix; `least` entries in each. */
 static int check_columns(int size, const int *colind, const int *row, int count, int least) {
     if (colind[0] != 0 || colind[size] != count) return 0;
@@ -294,14 +289,6 @@ static int check_pattern(const QrPattern *a) {
     return 1;
 }
 
-static int check_model(const Model *m, char *message) {
-    for (int k = 0; k < N_TAPES; k++)
-        if (!check_tape(tapes_of(m) + k)) return damaged(message, "tapes");
-    return check_indices(m, message) && check_variables(m, message) && check_events(m, message) &&
-           (check_pattern(&m->step) || damaged(message, "step")) &&
-           (check_pattern(&m->start) || damaged(message, "start"));
-}
-
 /* Reads a model from bytes that are aligned as numbers and outlive it. Returns NULL and a message for `message`, which
  * has MESSAGE_LENGTH characters, if they are no model. */
 Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message) {
@@ -311,7 +298,9 @@ Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Re
     memset(m, 0, sizeof *m);
     m->release = release;
     if (find_tables(m, bytes, size, message) && find_sizes(m, size, message) && check_sizes(m, message) &&
-        check_model(m, message))
+        check_indices(m, message) && check_variables(m, message) && check_events(m, message) &&
+        (check_pattern(&m->step) || damaged(message, "step")) &&
+        (check_pattern(&m->start) || damaged(message, "start")))
         return m;
     release(m);
     return NULL;
@@ -320,4 +309,92 @@ Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Re
 void model_free(Model *m) {
     if (m->own != NULL) m->release(m->own);
     m->release(m);
+}
+
+#define NAME "model.bin"
+#define LONGEST_PATH 4096
+#ifdef _WIN32
+#include <wchar.h>
+enum { ON_WINDOWS = 1, UTF8 = 65001 };
+/* Declared here: windows.h defines words such as `near`. */
+__declspec(dllimport) int __stdcall MultiByteToWideChar(unsigned, unsigned long, const char *, int, wchar_t *, int);
+FILE *_wfopen(const wchar_t *, const wchar_t *);
+static FILE *open_file(const char *path) {
+    wchar_t wide[LONGEST_PATH];
+    return MultiByteToWideChar(UTF8, 0, path, -1, wide, LONGEST_PATH) > 0 ? _wfopen(wide, L"rb") : NULL;
+}
+#else
+enum { ON_WINDOWS = 0 };
+static FILE *open_file(const char *path) { return fopen(path, "rb"); }
+#endif
+
+static int is_letter(char c) { return (c | 32) >= 'a' && (c | 32) <= 'z'; }
+
+static int starts(const char *text, const char *with) {
+    for (; *with; text++, with++)
+        if (*text == 0 || (is_letter(*text) ? *text | 32 : *text) != *with) return 0;
+    return 1;
+}
+
+/* The path behind "file:", or NULL: what has no host, or this machine, is local; another host is a share of Windows. */
+static const char *after_scheme(const char *uri, int windows) {
+    const char *rest = uri + strlen("file:");
+    if (rest[0] == '/' && rest[1] == '/') {
+        const char *host = rest + 2;
+        if (*host == '/') rest = host;
+        else if (starts(host, "localhost/")) rest = host + strlen("localhost");
+        else if (windows && is_letter(host[0]) && (host[1] == ':' || host[1] == '|')) rest = host;
+        else if (!windows) return NULL;
+    }
+    if (windows && rest[0] == '/' && is_letter(rest[1]) && (rest[2] == ':' || rest[2] == '|')) rest++;
+    return rest;
+}
+
+/* The folder of resources as a path: from a URI (FMI 2.0), or as it is (FMI 3.0). Returns 0 if it names none. */
+int resource_path(const char *location, int windows, char *path, size_t room) {
+    int encoded = starts(location, "file:");
+    const char *from = encoded ? after_scheme(location, windows) : location;
+    size_t n = 0;
+    if (from == NULL || *from == 0 || (!encoded && strstr(from, "://") != NULL)) return 0;
+    for (; *from; from++) {
+        char c = *from;
+        if (encoded && c == '%') {
+            const char code[] = {from[1], from[1] ? from[2] : 0, 0};
+            c = (char)strtol(code, NULL, 16);
+            if (c == 0 || strspn(code, "0123456789abcdefABCDEF") != 2) return 0;
+            from += 2;
+        } else if (encoded && (c == '?' || c == '#')) break;
+        if (encoded && windows && c == '|' && n == 1) c = ':';
+        if (n + sizeof NAME + 1 >= room) return 0;
+        path[n++] = c;
+    }
+    if (path[n - 1] != '/' && !(windows && path[n - 1] == '\\')) path[n++] = '/';
+    memcpy(path + n, NAME, sizeof NAME);
+    return 1;
+}
+
+static Model *read_all(FILE *file, Allocate allocate, Release release, char *message) {
+    long size = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
+    unsigned char *bytes = size > 0 && fseek(file, 0, SEEK_SET) == 0 ? allocate((size_t)size, 1) : NULL;
+    Model *m = NULL;
+    if (bytes == NULL) return REFUSE("The model file is empty, or there is not enough memory for it.");
+    if (fread(bytes, 1, (size_t)size, file) != (size_t)size) (void)REFUSE("The model file cannot be read completely.");
+    else m = model_read(bytes, (size_t)size, allocate, release, message);
+    if (m == NULL) release(bytes);
+    else m->own = bytes;
+    return m;
+}
+
+Model *model_open(const char *location, Allocate allocate, Release release, char *message) {
+    char path[LONGEST_PATH];
+    if (location == NULL || *location == 0)
+        return REFUSE("The importer does not say where the FMU's resources are, so its model cannot be read. Export it "
+                      "with the model compiled in (--embed).");
+    if (!resource_path(location, ON_WINDOWS, path, sizeof path))
+        return REFUSE("The location of the FMU's resources names no folder: '%.300s'.", location);
+    FILE *file = open_file(path);
+    if (file == NULL) return REFUSE("The model file cannot be opened: '%.400s'.", path);
+    Model *m = read_all(file, allocate, release, message);
+    fclose(file);
+    return m;
 }

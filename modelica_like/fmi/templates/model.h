@@ -65,18 +65,14 @@ typedef struct {
 } Rising; /* parameters of which the second must exceed the first */
 
 typedef enum { RESET_STATE, RESET_DISCRETE, RESET_VALUE, N_RESET_KINDS } ResetKind;
-typedef struct {
-    int kind, index, value, target;
+typedef struct { /* of a transition, or an update: at events, and perhaps when start values are found */
+    int kind, index, value, target, transition, at_start;
     double factor;
 } Reset;
 typedef struct {
-    int kind, index, target, at_start;
-    double factor;
-} Update; /* what gets a new value at events, and whether it does when start values are found */
-typedef struct {
     int mode, target;
     short timed, fails;
-    int index, first_reset, n_resets, name, notice;
+    int index, name, notice;
     uint64_t sources;
 } Transition;
 typedef struct {
@@ -128,9 +124,8 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     const Variable *variables;
     const Rising *rising;
     const Transition *transitions; /* in the order in which they are declared */
-    const Reset *resets;
-    const Update *updates; /* results of the tape `updates` */
-    const Mode *modes;     /* by position in d */
+    const Reset *resets, *updates; /* results of their tapes */
+    const Mode *modes;             /* by position in d */
     const Held *holds;
     const Circuit *circuits; /* those that depend on each other; in d from `first`: switches, then shares */
     const Ideal *ideals;
@@ -153,7 +148,7 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
 
     /* What follows from the sizes of the tables. */
     int n_unknowns, n_d, n_y, n_nodes, n_derived, n_moments, n_determinants, n_starts, n_start_values;
-    int n_start_jacobian, n_reset_values, most_members;
+    int n_reset_values, most_members;
     int slot_x, slot_z, slot_p, slot_u, slot_d, slot_y, slot_constants, slot_results, n_slots;
     unsigned char *own; /* bytes that belong to the model, or NULL */
     void (*release)(void *memory);
@@ -171,8 +166,6 @@ Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Re
 void model_free(Model *m);
 uint32_t crc32_of(const unsigned char *bytes, size_t size);
 static inline const char *text_of(const Model *m, int place) { return m->text + place; }
-
-/* model_file.c */
 Model *model_open(const char *location, Allocate allocate, Release release, char *message);
 
 /* model_data.c: the bytes of the file where they are compiled in, of size 0 where they are read */

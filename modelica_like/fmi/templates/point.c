@@ -42,11 +42,12 @@ int any_of(const unsigned char *marks, int n) {
     return any;
 }
 
-static Result singular(Instance *c, double t, const char *names) {
-    return fail(c,
-        "The Jacobian is singular at t = %.9g s in the equations for %s. Where two frictions stick on the "
-        "same motion, make one compliant, or let one start open.",
-        t, names);
+static Result singular(Instance *c, double t, int quiet, const char *names) {
+    return !quiet &&
+           fail(c,
+               "The Jacobian is singular at t = %.9g s in the equations for %s. Where two frictions stick on the "
+               "same motion, make one compliant, or let one start open.",
+               t, names);
 }
 
 double largest_of(int n, const double *values) {
@@ -66,24 +67,21 @@ Result solve_implicit(Instance *c, double t, double *point, int quiet) {
         residual = largest_of(m->n_z, step);
         run_special(c, &m->tapes.alg_jacobian, matrix);
         for (int k = 0; k < m->n_z; k++)
-            if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t, text_of(m, m->implicit_names[k]));
-        if (!lu_factor(m->n_z, matrix, order))
-            return quiet ? RESULT_ERROR : singular(c, t, text_of(m, m->implicit_names[0]));
+            if (!isfinite(step[k])) return singular(c, t, quiet, text_of(m, m->implicit_names[k]));
+        if (!lu_factor(m->n_z, matrix, order)) return singular(c, t, quiet, text_of(m, m->implicit_names[0]));
         lu_solve(m->n_z, matrix, order, step);
-        double moved = 0, largest = 0;
         change = 0;
         for (int k = 0; k < m->n_z; k++) {
             z[k] -= step[k];
             change = fmax(change, fabs(step[k]) / (1 + fabs(z[k])));
-            moved = fmax(moved, fabs(step[k]));
-            largest = fmax(largest, fabs(z[k]));
         }
         /* What the largest unknown leaves of a small one when it is rounded does not get smaller. */
-        if (change < (c->bounded ? 1e-4 : 1e-13) || moved <= 1e-14 * largest) return RESULT_OK;
+        if (change < (c->bounded ? 1e-4 : 1e-13) || largest_of(m->n_z, step) <= 1e-14 * largest_of(m->n_z, z))
+            return RESULT_OK;
     }
     if (change <= 1e-9 || c->bounded) return RESULT_OK;
-    return quiet ? RESULT_ERROR
-                 : fail(c, "The equations for %s were not solved at t = %.9g s.", text_of(m, m->implicit_names[0]), t);
+    return !quiet &&
+           fail(c, "The equations for %s were not solved at t = %.9g s.", text_of(m, m->implicit_names[0]), t);
 }
 
 Result solve_now(Instance *c, int quiet) { return solve_implicit(c, c->state.t, c->x, quiet); }
@@ -93,7 +91,7 @@ Result check_singular(Instance *c) {
     double t = c->state.t, *values = c->rhs;
     evaluate_now(c, &m->tapes.determinants, values);
     for (int k = 0; k < m->n_determinants; k++)
-        if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, t, text_of(m, m->singular_names[k]));
+        if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, t, 0, text_of(m, m->singular_names[k]));
     if (c->bounded) return RESULT_OK; /* the next step tells */
     tape_run(&m->tapes.rates, c->slots, values);
     for (int k = 0; k < m->n_x; k++)

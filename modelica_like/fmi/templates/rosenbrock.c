@@ -78,9 +78,8 @@ static double error_norm(const Instance *c, const double *first, const double *l
 }
 
 /* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
- * Returns 0 if the equations gave values that are not finite, or a singular matrix. */
-int rosenbrock_step(
-    Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error) {
+ * Returns the error in tolerances, or -1 if the equations gave values that are not finite, or a singular matrix. */
+double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece) {
     int n = c->model->n_unknowns;
     size_t size = (size_t)n * sizeof(double);
     double *last = last_of(c->model, piece), *slope = c->stages + (size_t)STAGES * (size_t)n, *y = c->point;
@@ -88,7 +87,7 @@ int rosenbrock_step(
     piece->end = t + h;
     memcpy(piece->points, first, size);
     if (!keep_jacobian) linearize(c, t, first, slope);
-    if (!factor_step(c, 1 / (h * GAMMA))) return 0;
+    if (!factor_step(c, 1 / (h * GAMMA))) return -1;
     c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
         double *stage = c->stages + (size_t)i * n;
@@ -101,21 +100,20 @@ int rosenbrock_step(
             for (int k = 0; k < c->model->n_x; k++) stage[k] += C[i][j] / h * c->stages[j * n + k];
         for (int k = 0; k < n; k++) {
             stage[k] += h * D_TIME[i] * slope[k];
-            if (!isfinite(stage[k])) return 0;
+            if (!isfinite(stage[k])) return -1;
         }
         qr_solve(&c->model->step, c, stage);
     }
     for (int k = 0; k < n; k++) {
         last[k] = y[k] + c->stages[(STAGES - 1) * n + k];
-        if (!isfinite(last[k])) return 0;
+        if (!isfinite(last[k])) return -1;
         for (int row = 0; row < 3; row++) {
             double sum = 0;
             for (int i = 0; i < STAGES; i++) sum += DENSE[row][i] * c->stages[i * n + k];
             last[(row + 1) * n + k] = sum;
         }
     }
-    *error = error_norm(c, first, last, c->stages + (STAGES - 1) * n);
-    return 1;
+    return error_norm(c, first, last, c->stages + (STAGES - 1) * n);
 }
 
 double *last_of(const Model *m, Piece *piece) { return piece->points + m->n_unknowns; }

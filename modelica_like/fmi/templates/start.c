@@ -58,10 +58,9 @@ static Result solve_start_system(Instance *c) {
         }
         qr_solve(&m->start, c, step);
         for (int k = 0; k < m->n_start_unknowns; k++) {
-            int column = m->start_columns[k]; /* among states, variables, implicit unknowns */
-            double *y = &c->slots[m->slot_y], *unknown = column < m->n_x            ? &c->x[column]
-                                                         : column < m->n_x + m->n_y ? &y[column - m->n_x]
-                                                                                    : &c->x[column - m->n_y];
+            int column = m->start_columns[k]; /* among states, implicit unknowns, variables */
+            double *y = &c->slots[m->slot_y] - m->n_unknowns, *unknown = column < m->n_unknowns ? c->x : y;
+            unknown += column;
             *unknown -= step[k];
             change = fmax(change, fabs(step[k]) / (1 + fabs(*unknown)));
         }

@@ -1,6 +1,8 @@
 /* Runs tapes: values, derivatives in one direction (tangent), derivatives of one combination of results (adjoint). */
 #include "core.h"
 
+#define WORTH_IT 6 /* runs of a tape in the same modes from which on it is worth it */
+
 static double sign(double a) { return a < 0 ? -1 : a > 0 ? 1 : a; }
 
 /* a ? b : 0 without a branch: which one is taken cannot be foreseen where a tape has not run for some time. */
@@ -84,4 +86,127 @@ void tape_adjoint(const Tape *tape, const double *slots, double *bars, const dou
             bars[one->left] += product(by_a, bar);
             bars[one->right] += product(by_b, bar);
         }
+}
+
+/* Tapes for the present modes and parameters: what these decide is worked out once, and what nothing asks for is left
+ * out. A model is one set of equations for all modes, of which few matter at a time, so little is left of a tape. The
+ * operations that are left are the same, in the same order, so values are the same; only x + 0 and x * 1 are x. */
+static Special *special_of(Instance *c, const Tape *tape) { return &c->special[tape - tapes_of(c->model)]; }
+
+/* Is the output asked for? Of guards, those of the present modes. */
+static int is_wanted(const Instance *c, const Tape *tape, int output) {
+    if (tape == &c->model->tapes.variables) return c->asked[output];
+    return tape != &c->model->tapes.guards || guard_active(c, output % c->model->n_guards);
+}
+
+/* The operand that the result of an operation is, -1 where it is known to be `*value`, or -2: it must be computed. */
+static int result_of(int operation, Operands one, const double *slots, const unsigned char *known, double *value) {
+    int a = known[one.left], b = known[one.right];
+    double left = slots[one.left], right = slots[one.right];
+    if (a && b) return -1;
+    switch (operation) {
+        case OPERATION_IF_ELSE_ZERO:
+            if (a && left == 0) *value = 0;
+            return !a ? -2 : left == 0 ? -1 : one.right;
+        case OPERATION_AND: *value = 0; return (a && left == 0) || (b && right == 0) ? -1 : -2;
+        case OPERATION_OR: *value = 1; return (a && left != 0) || (b && right != 0) ? -1 : -2;
+        case OPERATION_ADD: return a && left == 0 ? one.right : b && right == 0 ? one.left : -2;
+        case OPERATION_SUB: return b && right == 0 ? one.left : -2;
+        case OPERATION_MUL: return a && left == 1 ? one.right : b && right == 1 ? one.left : -2;
+        case OPERATION_DIV: return b && right == 1 ? one.left : -2;
+        default: return -2;
+    }
+}
+
+/* Finds for every slot which other one has its value (`same`), and whether it is known. The tape has just been run. */
+static void work_out(Instance *c, const Tape *tape) {
+    const Model *m = c->model;
+    double *slots = c->slots;
+    unsigned char *known = c->known_slots;
+    const Operands *operand = tape->operands;
+    int slot = tape->first_result;
+    memset(known, 0, (size_t)m->n_slots);
+    for (int k = 0; k < m->n_p; k++) known[m->slot_p + k] = !c->tuned[k];
+    memset(known + m->slot_d, 1, (size_t)m->n_d);
+    memset(known + m->slot_constants, 1, (size_t)m->n_constants);
+    for (int k = 0; k < slot; k++) c->same[k] = k;
+    for (int r = 0; r < tape->n_runs; r++)
+        for (int k = 0; k < tape->runs[r].count; k++, operand++, slot++) {
+            Operands one = {c->same[operand->left], c->same[operand->right]};
+            double value = slots[slot];
+            int found = result_of(tape->runs[r].operation, one, slots, known, &value);
+            c->same[slot] = found >= 0 ? found : slot;
+            known[slot] = found == -1;
+            if (found == -1) slots[slot] = value;
+        }
+}
+
+static void mark_needed(Instance *c, const Tape *tape) {
+    const int *same = c->same;
+    unsigned char *needed = memset(c->needed_slots, 0, (size_t)c->model->n_slots);
+    for (int k = 0; k < tape->n_outputs; k++)
+        if (is_wanted(c, tape, k)) needed[same[tape->outputs[k]]] = 1;
+    for (int k = tape->n_operations - 1; k >= 0; k--) {
+        int slot = tape->first_result + k;
+        if (!needed[slot] || c->known_slots[slot]) continue;
+        needed[same[tape->operands[k].left]] = 1;
+        needed[same[tape->operands[k].right]] = 1;
+    }
+}
+
+/* Writes the operations that are left; known results that they need get slots behind all others. */
+static void write_special(Instance *c, Special *s, const Tape *tape) {
+    const unsigned char *needed = c->needed_slots;
+    int *place = c->places_of_slots, written = 0, values = s->first_known, k = 0;
+    for (int slot = 0; slot < tape->first_result; slot++) place[slot] = slot;
+    s->tape.n_runs = 0;
+    for (int r = 0; r < tape->n_runs; r++)
+        for (int end = k + tape->runs[r].count; k < end; k++) {
+            int slot = tape->first_result + k, same = c->same[slot], operation = tape->runs[r].operation;
+            if (same != slot) place[slot] = place[same];
+            if (same != slot || !needed[slot]) continue;
+            if (c->known_slots[slot]) {
+                c->slots[values] = c->slots[slot];
+                place[slot] = values++;
+                continue;
+            }
+            s->operands[written].left = place[c->same[tape->operands[k].left]];
+            s->operands[written].right = place[c->same[tape->operands[k].right]];
+            if (s->tape.n_runs == 0 || s->runs[s->tape.n_runs - 1].operation != operation) {
+                s->runs[s->tape.n_runs].operation = operation;
+                s->runs[s->tape.n_runs++].count = 0;
+            }
+            s->runs[s->tape.n_runs - 1].count++;
+            place[slot] = tape->first_result + written++;
+        }
+    s->tape.n_operations = written;
+    for (int n = 0; n < tape->n_outputs; n++) {
+        int slot = c->same[tape->outputs[n]];
+        s->outputs[n] = needed[slot] && is_wanted(c, tape, n) ? place[slot] : c->model->slot_constants;
+    }
+}
+
+/* Runs a tape with the slots as they are loaded. Of outputs that are not wanted, any value may come. */
+void run_special(Instance *c, const Tape *tape, double *outputs) {
+    Special *s = special_of(c, tape);
+    if (s->belongs_to != c->decided_by) s->uses = 0;
+    s->belongs_to = c->decided_by;
+    int special = s->uses > WORTH_IT && !c->bounded; /* where the work is bounded: working out costs more than a step */
+    tape_run(special ? &s->tape : tape, c->slots, outputs);
+    if (special || c->bounded || ++s->uses <= WORTH_IT) return;
+    work_out(c, tape);
+    mark_needed(c, tape);
+    write_special(c, s, tape);
+}
+
+void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
+    load(c, t, point);
+    run_special(c, tape, outputs);
+}
+
+void ask_for(Instance *c, int node) {
+    if (c->asked[node]) return;
+    c->asked[node] = 1;
+    special_of(c, &c->model->tapes.variables)->uses = 0;
+    c->variables_valid = 0;
 }

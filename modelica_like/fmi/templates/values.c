@@ -25,15 +25,11 @@ const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) 
     return NULL;
 }
 
-/* Values that a tape gives, each computed once per point; NULL if there are none. */
-static const double *seen(Instance *c, const Variable *v) {
-    const double *values = v->kind == KIND_DERIVED      ? c->seen_derived
-                           : v->kind == KIND_DERIVATIVE ? c->seen_rates
-                           : v->kind == KIND_GUARD      ? c->seen_indicators
-                                                        : c->variables;
+/* Values that a tape gives are computed once per point. */
+static Result compute(Instance *c, const Variable *v) {
     if (v->kind == KIND_VARIABLE) ask_for(c, v->index);
-    if (c->variables_valid & 1 << v->kind) return values;
-    if (v->kind != KIND_DERIVED && !settle(c)) return NULL;
+    if (c->variables_valid & 1 << v->kind) return RESULT_OK;
+    if (v->kind != KIND_DERIVED && !settle(c)) return RESULT_ERROR;
     switch (v->kind) {
         case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, c->seen_derived); break;
         case KIND_DERIVATIVE: evaluate_special(c, &c->model->tapes.rates, c->state.t, c->x, c->seen_rates); break;
@@ -41,7 +37,7 @@ static const double *seen(Instance *c, const Variable *v) {
         default: evaluate_special(c, &c->model->tapes.variables, c->state.t, c->x, c->variables);
     }
     c->variables_valid |= 1 << v->kind;
-    return values;
+    return RESULT_OK;
 }
 
 /* In initialization mode, whatever was set since the last time must have its effect before anything is read. */
@@ -52,18 +48,11 @@ static Result make_ready(Instance *c) {
 /* Of a variable that is known, or NULL: then its reference was wrong. */
 Result get_value(Instance *c, const Variable *v, double *value) {
     const int known = 1 << KIND_PARAMETER | 1 << KIND_INPUT | 1 << KIND_TIME | 1 << KIND_DERIVED;
-    const double *values = NULL;
+    const int computed = 1 << KIND_VARIABLE | 1 << KIND_DERIVATIVE | 1 << KIND_DERIVED | 1 << KIND_GUARD;
     if (v == NULL || (!(known & 1 << v->kind) && !make_ready(c))) return RESULT_ERROR;
-    switch (v->kind) {
-        case KIND_TIME: *value = c->state.t; return RESULT_OK;
-        case KIND_STATE: *value = c->x[v->index]; return RESULT_OK;
-        case KIND_PARAMETER: *value = c->p[v->index]; return RESULT_OK;
-        case KIND_INPUT: *value = input_at(c, v->index, c->state.t); return RESULT_OK;
-        case KIND_DISCRETE: *value = c->d[v->index]; return RESULT_OK;
-        default: values = seen(c, v);
-    }
-    if (values != NULL) *value = values[v->index];
-    return values != NULL;
+    if (computed & 1 << v->kind && !compute(c, v)) return RESULT_ERROR;
+    *value = v->kind == KIND_INPUT ? input_at(c, v->index, c->state.t) : c->values[v->kind][v->index];
+    return RESULT_OK;
 }
 
 /* Solves what getting a value from the present point needs. */
@@ -89,8 +78,8 @@ void get_indicators(Instance *c, double *indicators) {
     }
 }
 
-static Result refuse_value(Instance *c, const Variable *v, const char *why) {
-    return fail(c, "%s cannot be set: %s", text_of(c->model, v->name), why);
+static Result refuse_value(Instance *c, int name, const char *why) {
+    return fail(c, "%s cannot be set: %s", text_of(c->model, name), why);
 }
 
 static void touch(Instance *c) {
@@ -120,9 +109,9 @@ void mark_tuned(Instance *c, int parameter) {
 static Result set_parameter(Instance *c, const Variable *v, double value) {
     double low = c->model->parameter_min[v->index], high = c->model->parameter_max[v->index];
     if (!v->tunable && !before_start(&c->state))
-        return refuse_value(c, v, "it is a fixed parameter. Set it before the end of the initialization.");
+        return refuse_value(c, v->name, "it is a fixed parameter. Set it before the end of the initialization.");
     if (v->tunable && c->state.phase == PHASE_CONTINUOUS)
-        return refuse_value(c, v, "tunable parameters change in event mode only.");
+        return refuse_value(c, v->name, "tunable parameters change in event mode only.");
     if (value < low || value > high)
         return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(c->model, v->name), value,
             value < low ? "least" : "most", value < low ? low : high);
@@ -146,14 +135,14 @@ Result check_tables(Instance *c) {
 
 static Result set_start(Instance *c, const Variable *v, double value) {
     if (!before_start(&c->state))
-        return refuse_value(c, v, "start values are settable before the end of the initialization only.");
+        return refuse_value(c, v->name, "start values are settable before the end of the initialization only.");
     if (v->kind == KIND_DISCRETE) {
         c->d[v->index] = value;
         c->mode_given[v->index] = 1;
     } else if (v->start >= 0 && v->start < c->model->n_starts) {
         c->start_value[v->start] = value;
         c->start_given[v->start] = 1;
-    } else return refuse_value(c, v, "it follows from other variables.");
+    } else return refuse_value(c, v->name, "it follows from other variables.");
     touch(c);
     return RESULT_OK;
 }
@@ -162,7 +151,7 @@ static Result set_start(Instance *c, const Variable *v, double value) {
 Result set_value(Instance *c, const Variable *v, double value) {
     const Model *m = c->model;
     if (v == NULL) return RESULT_ERROR;
-    if (!isfinite(value)) return refuse_value(c, v, "the value is not a finite number.");
+    if (!isfinite(value)) return refuse_value(c, v->name, "the value is not a finite number.");
     if (v->type == TYPE_ENUMERATION && (value < 0 || value >= m->modes[v->index].n_names))
         return fail(
             c, "%s has no mode %.0f: they are 0 to %d.", text_of(m, v->name), value, m->modes[v->index].n_names - 1);
@@ -179,8 +168,8 @@ Result set_input_rate(Instance *c, uint32_t reference, int order, double rate) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     if (order != 1) return fail(c, "Inputs have derivatives of order 1 only.");
     if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is not an input, so it has no input derivative.");
-    if (!isfinite(rate)) return refuse_value(c, v, "the derivative is not a finite number.");
+    if (v->kind != KIND_INPUT) return refuse_value(c, v->name, "it is not an input, so it has no input derivative.");
+    if (!isfinite(rate)) return refuse_value(c, v->name, "the derivative is not a finite number.");
     if (c->u_rate[v->index] == rate) return RESULT_OK;
     touch_inputs(c);
     c->u_rate[v->index] = rate;
@@ -197,8 +186,7 @@ Result set_time(Instance *c, double time) {
 Result set_states(Instance *c, const double *x) {
     const Model *m = c->model;
     for (int k = 0; k < m->n_x; k++)
-        if (!isfinite(x[k]))
-            return fail(c, "%s cannot be set: the value is not a finite number.", text_of(m, m->state_names[k]));
+        if (!isfinite(x[k])) return refuse_value(c, m->state_names[k], "the value is not a finite number.");
     memcpy(c->x, x, m->n_x * sizeof(double));
     c->state.z_valid = c->variables_valid = 0;
     return RESULT_OK;
