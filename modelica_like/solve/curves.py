@@ -232,8 +232,8 @@ class _Grid:
         """Take the common times, or those of the first if there are few."""
         time, other = first.time, second.time
         once = np.flatnonzero(_single(time) & (time >= other[0]) & (time <= other[-1]))
-        near = np.clip(np.searchsorted(other, time[once] - _SAME_TIME), 0, len(other) - 1)
-        common = (np.abs(other[near] - time[once]) <= _SAME_TIME) & _single(other)[near]
+        near = np.searchsorted(other, time[once] - _SAME_TIME)
+        common = (other[near] <= time[once] + _SAME_TIME) & _single(other)[near]
         interpolated = bool(2 * np.count_nonzero(common) < min(len(once), np.count_nonzero(_single(other))))
         if not interpolated:
             once, near = once[common], near[common]

@@ -2,6 +2,7 @@
 
 import csv
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from modelica_like.netlist.write import save
 from modelica_like.report.files import write_solution
 from modelica_like.report.run import run_report
 from modelica_like.solve.display import Display
+from modelica_like.solve.recorded import RecordedModel, RecordedVariable
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLIST = """
@@ -149,3 +151,30 @@ def test_a_wrong_unit_in_the_netlist_is_told_with_its_line(tmp_path: Path) -> No
     with pytest.raises(UnitError, match="Unknown unit 'mmm'") as caught:
         load(netlist)
     assert caught.value.where[0].line == NETLIST.splitlines().index('"feed.y" = "mm"') + 1
+
+
+def test_units_of_recorded_columns() -> None:
+    """A name in brackets is no pattern, a number has no unit, and other tools have units of their own."""
+    units = {"belt[2].w": "rad/s", "oil.T": "K", "n": "1", "odd.w": "turns", "w": "rad/s"}
+    model = RecordedModel("drive", tuple(map(RecordedVariable, units, units.values())), (), {})
+    shown = Display(model, {"belt[2].w": "rpm", "temperature": "degC", "*.w": "deg/s", "n*": "rpm"})
+    assert {path: shown.of(path) for path in units} == {
+        "belt[2].w": "rpm", "oil.T": "degC", "n": "1", "odd.w": "turns", "w": "rad/s"
+    }  # fmt: skip
+    assert shown.values("oil.T", np.array([300.0])) == pytest.approx(26.85)
+    assert shown.values("belt[2].w", np.array([np.pi])) == pytest.approx(30.0)
+    assert shown.converted(20.0, "degC", "degF") == pytest.approx(68.0)
+    assert shown.converted(68.0, "degF", "degC") == pytest.approx(20.0)
+    assert ("n" in shown, "m" in shown, shown.quantity("w"), shown.quantity("n")) == (True, False, "speed", "value")
+    for path, unit in (("n", "%"), ("odd.w", "rpm")):
+        with pytest.raises(UnitError, match=f"^{path} is in "):
+            Display(model, {path: unit})
+    with pytest.raises(UnknownName, match=r"^drive has no variable or quantity 'zzzzz' to show in rpm\.$"):
+        Display(model, {"zzzzz": "rpm"})
+
+
+def test_a_difference_of_temperatures_may_have_another_unit() -> None:
+    rise = SimpleNamespace(path="rise", unit="K", difference=True)
+    model = SimpleNamespace(name="drive", flat_variables=[rise], flat_discretes=[])
+    for unit, shown in (("degC", "K"), ("mK", "mK")):
+        assert Display(model, {"rise": unit}).of("rise") == shown

@@ -11,7 +11,7 @@ COLUMNS = {
     "w": [0.0, 10.0, 20.0, 5.0, 9.0],
     "motor.source_power": [10.0, 10.0, 10.0, 4.0, 4.0],
     "brake.loss_power": [0.0, 2.0, 4.0, 6.0, 6.0],
-    "wheel.stored_energy": [1.0, 5.0, 8.0, 3.0, 5.0],
+    "wheel.stored_energy": [1.0, 6.0, 8.0, 3.0, 5.0],
 }
 MODES = RecordedVariable("brake.mode", names={0: "free", 1: "stuck"})
 GEAR = RecordedVariable("gear", kind="discrete")
@@ -21,7 +21,7 @@ DISCRETES = np.array([[0.0, 0.0, 0.0, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0, 2.5]])
 def recorded(*names: str) -> RecordedSolution:
     variables = tuple(RecordedVariable(name) for name in names)
     model = RecordedModel("drive", variables, (MODES, GEAR), {"wheel.J": 0.5})
-    return RecordedSolution(model, TIME, np.array([COLUMNS[name] for name in names]), DISCRETES, 0.0)
+    return RecordedSolution(model, TIME, np.array([COLUMNS.get(name, TIME) for name in names]), DISCRETES, 0.0)
 
 
 def test_values_by_name() -> None:
@@ -54,6 +54,27 @@ def test_the_end_and_the_events() -> None:
     assert told == [(2.0, "brake.mode", "free", "stuck"), (4.0, "gear", "1", "2.5")]
 
 
+def test_parts_and_variables_are_attributes() -> None:
+    run = recorded(*COLUMNS, "belt[2].w")
+    assert (run.statistics.steps, run.statistics.evaluations, run.statistics.integrations) == (5, 0, 0)
+    np.testing.assert_array_equal(run.w, COLUMNS["w"])
+    np.testing.assert_array_equal(run.brake.loss_power, COLUMNS["brake.loss_power"])
+    assert dir(run.brake) == ["loss_power", "mode"]
+    assert repr(run.brake) == "<brake: loss_power, mode>"
+    assert dir(run).count("motor") == 1
+    assert "belt[2]" not in dir(run)
+    with pytest.raises(
+        AttributeError, match=r"^The run of drive has no 'brake\.lost_power'; did you mean 'loss_power'\?"
+    ):
+        run.brake.lost_power  # noqa: B018
+    with pytest.raises(AttributeError, match=r"^The run of drive has no 'brakes'; did you mean 'brake'\?"):
+        run.brakes  # noqa: B018
+    with pytest.raises(AttributeError, match=r"^The run of drive has no 'xyz'\.$"):
+        run.xyz  # noqa: B018
+    with pytest.raises(AttributeError, match="has no attribute '_w'"):
+        run._w  # noqa: B018
+
+
 def test_energies_are_integrals_of_columns() -> None:
     """Motor 20 + 8 J, brake 4 + 12 J, wheel 4 J more; what they keep or take has come through connectors."""
     balance = recorded(*COLUMNS).energy()
@@ -61,6 +82,12 @@ def test_energies_are_integrals_of_columns() -> None:
     assert {row.component: row.inflow for row in balance} == {"motor": -28.0, "brake": 16.0, "wheel": 4.0}
     assert balance.throughput == 48.0
     assert balance.closure == pytest.approx(8 / 48)
+    assert {(row.at_events, row.residual, row.drift, row.impact) for row in balance} == {(0.0, 0.0, 0.0, 0.0)}
     assert recorded("wheel.stored_energy").energy().throughput == 4.0
+    # Work that is taken away, and a loss of the wrong sign, are exchanged, too.
+    run = recorded("motor.source_power", "brake.loss_power")
+    for lost, source in ((-7.0, -2.0), (-2.0, -7.0)):
+        run._values_table[:] = np.array([[source], [lost]])
+        assert run.energy().throughput == 36.0
     with pytest.raises(MissingValue):
         recorded("w").energy()
