@@ -55,10 +55,10 @@ class Between:
 
     def ask(self, looks: Looks, times: Vector, last: int) -> Piece:
         """Return arrays for results at times between looks, for `fill` to fill in."""
+        if not len(times):
+            return Piece(looks, times, last, looks.x[:, :0], looks.z[:, :0])
         x, z = (np.empty((len(part), len(times))) for part in (looks.x, looks.z))
-        piece = Piece(looks, times, last, x, z)
-        if len(times):
-            self._pieces.append(piece)
+        self._pieces.append(piece := Piece(looks, times, last, x, z))
         return piece
 
     def now(self, looks: Looks, times: Vector, last: int) -> Piece:

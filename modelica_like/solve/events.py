@@ -93,7 +93,7 @@ class EventLoop:
         while self.now.t < self.end:
             known = self._known()
             self._advance(min(self.ticks.stop(self.now), known, self.end))
-            if self.between.many:
+            if self.between.many or self.record.many:
                 self._write()
             if self.progress is not None:
                 self.progress(self.now.t)
@@ -197,7 +197,8 @@ class EventLoop:
         x, z = self.integrator.run(start, span, looks, patient=patient, polish=False)
         times = start.t + span * np.arange(x.shape[1] + 1) / looks
         # Row by row, in the order of IDAS.
-        x, z = np.concatenate([start.x[None], x.T]).T, np.concatenate([start.z[None], z.T]).T
+        x = np.concatenate([start.x[None], x.T]).T
+        z = np.concatenate([start.z[None], z.T]).T if len(z) else np.empty((0, len(times)))
         return Looks(self.integrator, self.guards, times, x, z, start.d)
 
     def _panel(self, stop: float) -> Looks:

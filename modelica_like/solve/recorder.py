@@ -70,6 +70,7 @@ class Segment:
 
 
 Points = tuple[Vector, Vector, Vector]
+_TOGETHER = 64
 _NOTHING = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
 
 
@@ -93,6 +94,11 @@ class Recorder:
         """Append at least one point; shapes (n,), (nx, n), (nz, n). The arrays may be filled in until `build`."""
         # At once: an interrupt comes before or after it.
         self._open.append((times, x, z))
+
+    @property
+    def many(self) -> bool:
+        """Whether to build segments before finishing more: many small arrays are slow."""
+        return len(self._closed) >= _TOGETHER
 
     @property
     def last(self) -> float:
