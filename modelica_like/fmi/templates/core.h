@@ -103,7 +103,7 @@ typedef struct {
  * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
  * steady state began; `impact_x` are states before the first impact at an instant. */
 #define WORK_NUMBERS(A)                                                                                              \
-    A(slots, slots + left), A(dots, 3 * slots), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),                \
+    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),         \
         A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),  \
         A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),         \
         A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),         \
@@ -193,8 +193,8 @@ double dot(int n, const double *p, const double *q);
 double make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
-void run_special(Instance *c, const Tape *tape, double *outputs);
-void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
+const Tape *run_special(Instance *c, const Tape *tape, double *outputs);
+const Tape *evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
 /* point.c */
 void load(Instance *c, double t, const double *point);

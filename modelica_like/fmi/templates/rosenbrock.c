@@ -5,17 +5,16 @@
 #include "core.h"
 
 #define STAGES 8
+#define LAST_POINTS 6 /* from here on a stage's point is the point of the stage before, moved by that stage */
 #define GAMMA 0.21193756319429014
 
-static const double A[STAGES][STAGES - 1] = {
+static const double A[LAST_POINTS][LAST_POINTS - 1] = {
     {0},
     {3.0},
     {2.849394379747939, 0.45842242204463923},
     {-6.954028509809101, 2.489845061869568, -10.358996098473584},
     {2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641},
     {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946},
-    {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946, 1},
-    {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946, 1, 1},
 };
 static const double C[STAGES][STAGES - 1] = {
     {0},
@@ -49,13 +48,13 @@ static void linearize(Instance *c, double t, const double *y, double *slope) {
     for (int k = 0; k < m->n_u; k++) moving |= c->u_rate[k] != 0;
     memset(slope, 0, (size_t)m->n_unknowns * sizeof(double));
     if (moving) {
-        evaluate(c, &m->tapes.rates, t, y, c->first_rates);
+        const Tape *ran = evaluate_special(c, &m->tapes.rates, t, y, c->first_rates);
         memset(c->dots, 0, m->slot_results * sizeof(double));
         c->dots[0] = 1;
         for (int k = 0; k < m->n_u; k++) c->dots[m->slot_u + k] = c->u_rate[k];
-        tape_tangent(&m->tapes.rates, c->slots, c->dots, slope);
-    } else evaluate_special(c, &c->model->tapes.rates, t, y, c->first_rates);
-    run_special(c, &c->model->tapes.jacobian, c->jacobian);
+        tape_tangent(ran, c->slots, c->dots, slope);
+    } else evaluate_special(c, &m->tapes.rates, t, y, c->first_rates);
+    run_special(c, &m->tapes.jacobian, c->jacobian);
 }
 
 /* M * diagonal - J, factorised. */
@@ -82,7 +81,8 @@ static double error_norm(const Instance *c, const double *first, const double *l
 double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece) {
     int n = c->model->n_unknowns;
     size_t size = (size_t)n * sizeof(double);
-    double *last = last_of(c->model, piece), *slope = c->stages + (size_t)STAGES * (size_t)n, *y = c->point;
+    double *last = last_of(c->model, piece), *slope = c->stages + (size_t)STAGES * (size_t)n, *y = c->point,
+           factors[STAGES];
     piece->begin = t;
     piece->end = t + h;
     memcpy(piece->points, first, size);
@@ -91,15 +91,18 @@ double rosenbrock_step(Instance *c, double t, const double *first, double h, int
     c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
         double *stage = c->stages + (size_t)i * n;
-        memcpy(y, first, size);
-        for (int j = 0; j < i; j++)
-            for (int k = 0; k < n; k++) y[k] += A[i][j] * c->stages[j * n + k];
+        for (int k = 0; k < n; k++) {
+            double moved = i < LAST_POINTS ? first[k] : y[k] + stage[k - n];
+            for (int j = 0; j < i && i < LAST_POINTS; j++) moved += A[i][j] * c->stages[j * n + k];
+            y[k] = moved;
+        }
         if (i == 0) memcpy(stage, c->first_rates, size);
         else evaluate_special(c, &c->model->tapes.rates, t + C_TIME[i] * h, y, stage);
-        for (int j = 0; j < i; j++)
-            for (int k = 0; k < c->model->n_x; k++) stage[k] += C[i][j] / h * c->stages[j * n + k];
+        for (int j = 0; j < i; j++) factors[j] = C[i][j] / h;
         for (int k = 0; k < n; k++) {
-            stage[k] += h * D_TIME[i] * slope[k];
+            double right = stage[k];
+            for (int j = 0; j < i && k < c->model->n_x; j++) right += factors[j] * c->stages[j * n + k];
+            stage[k] = right + h * D_TIME[i] * slope[k];
             if (!isfinite(stage[k])) return -1;
         }
         qr_solve(&c->model->step, c, stage);

@@ -186,22 +186,25 @@ static void write_special(Instance *c, Special *s, const Tape *tape) {
     }
 }
 
-/* Runs a tape with the slots as they are loaded. Of outputs that are not wanted, any value may come. */
-void run_special(Instance *c, const Tape *tape, double *outputs) {
+/* Runs a tape with the slots as they are loaded. Of outputs that are not wanted, any value may come. Returns
+ * the tape that has run. */
+const Tape *run_special(Instance *c, const Tape *tape, double *outputs) {
     Special *s = special_of(c, tape);
     if (s->belongs_to != c->decided_by) s->uses = 0;
     s->belongs_to = c->decided_by;
     int special = s->uses > WORTH_IT && !c->bounded; /* where the work is bounded: working out costs more than a step */
     tape_run(special ? &s->tape : tape, c->slots, outputs);
-    if (special || c->bounded || ++s->uses <= WORTH_IT) return;
+    if (special) return &s->tape;
+    if (c->bounded || ++s->uses <= WORTH_IT) return tape;
     work_out(c, tape);
     mark_needed(c, tape);
     write_special(c, s, tape);
+    return tape;
 }
 
-void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
+const Tape *evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
     load(c, t, point);
-    run_special(c, tape, outputs);
+    return run_special(c, tape, outputs);
 }
 
 void ask_for(Instance *c, int node) {
