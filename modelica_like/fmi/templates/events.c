@@ -119,14 +119,13 @@ static Result fire(Instance *c, unsigned char *wanting) {
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     for (int k = 0; k < m->n_transitions; k++) {
         const Transition *one = &m->transitions[k];
+        const char *notice = text_of(m, one->notice);
         wanting[k] &= !changed[one->mode];
         if (!wanting[k]) continue;
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
-        if (one->fails)
-            return report(c, LOG_ERROR, RESULT_ERROR, "t = %.9g s: %s", c->state.t, text_of(m, one->notice));
-        if (*text_of(m, one->notice))
-            report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, text_of(m, one->notice));
+        if (one->fails) return fail(c, "t = %.9g s: %s", c->state.t, notice);
+        if (*notice) report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, notice);
         d[one->mode] = one->target;
     }
     for (const Reset *one = m->resets; one < m->resets + m->n_resets; one++)
