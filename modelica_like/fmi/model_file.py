@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.compile.compiled import TERMINAL, CompiledDae
+from modelica_like.compile.compiled import TERMINAL, CompiledDae, Reset
 from modelica_like.errors import ExportError
 from modelica_like.fmi.interface import FmuVariable, Interface
 from modelica_like.fmi.sources import Version, runtime_sources
@@ -44,7 +44,7 @@ def _record(integers: str, doubles: str = "") -> list[tuple[str, str]]:
     return [*((name, _INTEGER) for name in integers.split()), *((name, _DOUBLE) for name in doubles.split())]
 
 
-_RESET = _record("kind index value target transition at_start", "factor")
+_RESET = _record("place value transition at_start", "factor")
 _START_OF = _record("position start", "factor")
 _START_ROW = _record("start node row")
 _QR = ("colind", "row", "v_colind", "v_row", "r_colind", "r_row", "row_place", "column_order")
@@ -99,7 +99,6 @@ SECTIONS: dict[str, Any] = {
 _KINDS = ("time", "state", "der", "variable", "parameter", "derived", "input", "discrete", "guard")
 _TYPES = {"Float64": 0, "Enumeration": 1, "Int64": 1}
 _ARRAY = 2
-_RESETS = ("state", "discrete", "value")
 _CODES = {name: code for code, name in enumerate(OPERATIONS)}
 
 
@@ -234,7 +233,7 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
         texts = (text(path), text(_notice(path, one.notice)))
         sources = sum(1 << source for source in one.sources)
         transitions.append((one.mode, one.target, int(one.timed), int(one.fails), one.index, *texts, sources))
-        resets += [(_RESETS.index(r.kind), r.index, r.value, r.target, k, 0, r.factor) for r in one.resets]
+        resets += [(_place(model, r), r.value, k, -1, r.factor) for r in one.resets]
     guards = {one.index: k for k, one in enumerate(model.transitions) if not one.timed}
     names = [text(name) for one in model.flat_discretes for name in one.names]
     return {
@@ -243,13 +242,21 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
         "resets": resets,
         "reset_nodes": model.reset_nodes,
         "updates": [
-            (_RESETS.index(r.kind), r.index, k, r.target, 0, int(one.at_start), r.factor)
+            (_place(model, r), k, 0, r.index if one.at_start else -1, r.factor)
             for k, (one, r) in enumerate((one, one.reset) for one in model.update_rows)
         ],
         "modes": _counted(len(one.names) for one in model.flat_discretes),
         "mode_names": names,
         "start_modes": [(mode, target) for mode, target, _ in model.start_modes],
     }
+
+
+def _place(model: CompiledDae, reset: Reset) -> int:
+    """Place of what is reset among states, entries of d, and nodes that are reset."""
+    n_x = len(model.states)
+    return {"state": reset.index, "discrete": n_x + reset.index, "value": n_x + model.discrete_size + reset.target}[
+        reset.kind
+    ]
 
 
 def _counted(counts: Iterable[int]) -> list[tuple[int, int]]:

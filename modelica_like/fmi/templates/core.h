@@ -16,17 +16,13 @@
 
 /* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
    Versions can only be told to a linker that is given libm. */
-#if defined(OLD_GLIBC) && defined(__GLIBC__) && defined(__x86_64__)
-#define OLD(f) __asm__(".symver " #f "," #f "@GLIBC_2.2.5")
-#elif defined(OLD_GLIBC) && defined(__GLIBC__) && defined(__aarch64__)
-#define OLD(f) __asm__(".symver " #f "," #f "@GLIBC_2.17")
+#if defined(OLD_GLIBC) && defined(__GLIBC__) && (defined(__x86_64__) || defined(__aarch64__))
+#ifdef __x86_64__
+#define OLD(f) ".symver " #f "," #f "@GLIBC_2.2.5\n"
+#else
+#define OLD(f) ".symver " #f "," #f "@GLIBC_2.17\n"
 #endif
-#ifdef OLD
-OLD(exp);
-OLD(log);
-OLD(pow);
-OLD(hypot);
-OLD(fmod);
+__asm__(OLD(exp) OLD(log) OLD(pow) OLD(hypot) OLD(fmod));
 #endif
 
 #define TIME_RESOLUTION 1e-10 /* as in guards_soon */
@@ -103,7 +99,7 @@ typedef struct {
  * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
  * steady state began; `impact_x` are states before the first impact at an instant. */
 #define WORK_NUMBERS(A)                                                                                              \
-    A(slots, slots + left), A(dots, 3 * slots), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),                \
+    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),         \
         A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),  \
         A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),         \
         A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),         \
@@ -193,10 +189,9 @@ double dot(int n, const double *p, const double *q);
 double make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
-void run_special(Instance *c, const Tape *tape, double *outputs);
-void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
+const Tape *run_special(Instance *c, const Tape *tape, double *outputs);
+const Tape *evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
-/* point.c */
 void load(Instance *c, double t, const double *point);
 void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void evaluate_now(Instance *c, const Tape *tape, double *outputs); /* at the present point */
@@ -250,18 +245,12 @@ double number_or_false(double guard);
 void move_states(Instance *c, const int *nodes, const double *values, int count);
 void note_change(Instance *c, int name, int transition, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
-/* rosenbrock.c */
+/* integrate.c */
 double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece);
 double *last_of(const Model *m, Piece *piece);
 int factor_step(Instance *c, double diagonal);
 size_t piece_size(const Model *m);
 void piece_at(const Model *m, const Piece *piece, double t, double *point);
-double first_step(Instance *c);
-/* locate.c */
-#define MOST_LOOKS 9 /* at guards, that there is room for */
-double cubic_guess(double g0, double r0, double g1, double r1);
-int search_events(Instance *c);
-/* integrate.c */
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 Result handle_event(Instance *c);
@@ -271,6 +260,10 @@ Result check_step(Instance *c, double point, double size, double *target);
 Result move_to(Instance *c, double t);
 Result take_changes(Instance *c);
 int is_due(Instance *c);
+/* locate.c */
+#define MOST_LOOKS 9 /* at guards, that there is room for */
+double cubic_guess(double g0, double r0, double g1, double r1);
+int search_events(Instance *c);
 /* fixed.c */
 Arrival step_fixed(Instance *c, double target);
 /* values.c */

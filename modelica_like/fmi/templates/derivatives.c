@@ -376,5 +376,6 @@ Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
     if (v->kind == KIND_VARIABLE) run_series(c, &m->tapes.variables, order, c->outputs);
     else memcpy(c->outputs, terms + (order - 1) * m->n_slots + m->slot_x, m->n_x * sizeof(double));
     *value = factorial * c->outputs[v->index];
+    memset(terms + m->n_slots, 0, 2 * (size_t)m->n_slots * sizeof(double)); /* what special tapes know does not move */
     return RESULT_OK;
 }

@@ -96,13 +96,15 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
 
 /* Gives a state or a discrete value its new value, or notes a variable for move_states; tells whether it changes. */
 static int take_value(Instance *c, const Reset *one, double value, double *d, int *count) {
-    if (one->kind != RESET_DISCRETE) c->stopped = 0;
-    if (one->kind == RESET_VALUE) {
-        c->targets[*count] = c->model->reset_nodes[one->target];
+    int entry = one->place - c->model->n_x, node = entry - c->model->n_d, discrete = entry >= 0 && node < 0;
+    if (!discrete && isinf(value) && d == c->d) return 0; /* an update that sets nothing now */
+    if (!discrete) c->stopped = 0;
+    if (node >= 0) {
+        c->targets[*count] = c->model->reset_nodes[node];
         c->target_values[(*count)++] = value;
         return 1;
     }
-    double *place = one->kind == RESET_DISCRETE ? &d[one->index] : &c->x[one->index], before = *place;
+    double *place = discrete ? &d[entry] : &c->x[one->place], before = *place;
     *place = value;
     return before != value;
 }
@@ -117,14 +119,13 @@ static Result fire(Instance *c, unsigned char *wanting) {
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     for (int k = 0; k < m->n_transitions; k++) {
         const Transition *one = &m->transitions[k];
+        const char *notice = text_of(m, one->notice);
         wanting[k] &= !changed[one->mode];
         if (!wanting[k]) continue;
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
-        if (one->fails)
-            return report(c, LOG_ERROR, RESULT_ERROR, "t = %.9g s: %s", c->state.t, text_of(m, one->notice));
-        if (*text_of(m, one->notice))
-            report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, text_of(m, one->notice));
+        if (one->fails) return fail(c, "t = %.9g s: %s", c->state.t, notice);
+        if (*notice) report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, notice);
         d[one->mode] = one->target;
     }
     for (const Reset *one = m->resets; one < m->resets + m->n_resets; one++)
@@ -142,11 +143,8 @@ static Result update_once(Instance *c, int *changes) {
     *changes = 0;
     if (m->n_updates == 0) return RESULT_OK;
     evaluate_now(c, &m->tapes.updates, values);
-    for (const Reset *one = m->updates; one < m->updates + m->n_updates; one++) {
-        double value = values[one->value] / one->factor;
-        if (one->kind == RESET_DISCRETE || !isinf(value)) /* else nothing sets it now */
-            *changes |= take_value(c, one, value, c->d, &count);
-    }
+    for (const Reset *one = m->updates; one < m->updates + m->n_updates; one++)
+        *changes |= take_value(c, one, values[one->value] / one->factor, c->d, &count);
     if (!*changes) return RESULT_OK;
     c->state.n_events++;
     if (count > 0) move_states(c, c->targets, c->target_values, count);

@@ -1,10 +1,10 @@
 /* Co-Simulation in fixed steps with a bound on the work of every step, for hardware in the loop. The method is that of
- * rosenbrock.c: eight stages, one factorisation, order five; a step from one point to the next is a piece. Every
+ * integrate.c: eight stages, one factorisation, order five; a step from one point to the next is a piece. Every
  * further piece of a step, every round of events, every impact and every try at a zero that misses it takes one from
  * BUDGET; when one is left, no more is begun, and what is still to do comes at the beginning of the next step. So modes
  * change at no more than two places inside of a step, and a step costs at most that of BUDGET + 2 pieces or rounds.
  * Where `bounded` is set, iterations that would ask for accuracy end early: the implicit equations are solved by one
- * Newton iteration where they are linear, by three else (point.c), and what holds the same motion shares it by
+ * Newton iteration where they are linear, by three else (tape.c), and what holds the same motion shares it by
  * capacities, without a second trial (holds.c). Nothing is allocated, and nothing outside of the run-time is called but
  * arithmetic and copies, unless logging is on or the step fails. */
 #include "core.h"

@@ -8,6 +8,153 @@
 #define SAME_PART 1e-6  /* of a fixed step */
 #define LEAST_STEPS 50  /* per run, where time itself is in the equations: a pulse could hide between longer ones */
 
+/* One step of RODAS5P: a stiffly accurate, L-stable Rosenbrock method of order 5(4) for index-1 systems with dense
+ * output of order 4 (G. Steinebach, BIT Numerical Mathematics 63:27, 2023). Notation as in Hairer & Wanner II, ch.
+ * IV.7, with the transformation that avoids products with the Jacobian, M = diag(1 for x, 0 for z): (M/(h gamma) - J)
+ * k_i = f(t + c_i h, y + sum a_ij k_j) + sum (C_ij/h) M k_j + h d_i df/dt. */
+#define STAGES 8
+#define LAST_POINTS 6 /* from here on a stage's point is the point of the stage before, moved by that stage */
+#define GAMMA 0.21193756319429014
+
+static const double A[LAST_POINTS][LAST_POINTS - 1] = {
+    {0},
+    {3.0},
+    {2.849394379747939, 0.45842242204463923},
+    {-6.954028509809101, 2.489845061869568, -10.358996098473584},
+    {2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641},
+    {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946},
+};
+static const double C[STAGES][STAGES - 1] = {
+    {0},
+    {-14.155112264123755},
+    {-17.97296035885952, -2.859693295451294},
+    {147.12150275711716, -1.41221402718213, 71.68940251302358},
+    {165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306},
+    {24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471},
+    {30.91273214028599, -3.1208243349937974, 77.79954646070892, 34.28646028294783, -19.097331116725623,
+        -28.087943162872662},
+    {37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047, -40.06618937091002,
+        -54.66780262877968, -9.48861652309627},
+};
+static const double C_TIME[STAGES] = {
+    0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1, 1, 1};
+static const double D_TIME[STAGES] = {
+    0.21193756319429014, -0.42387512638858027, -0.3384627126235924, 1.8046452872882734, 2.325825639765069, 0, 0, 0};
+static const double DENSE[3][STAGES] = {
+    {25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
+        1.1241088310450404, 0.4272876194431874, -0.17202221070155493},
+    {-9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796, 20.176138334709044,
+        15.98066361424651, -6.789040303419874, -6.710236069923372},
+    {11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643, -52.072871366152654,
+        -59.78993625266729, -0.15582684282751913, 4.883087185713722},
+};
+
+/* The right hand side, its partial derivatives by time, with inputs on their straight lines, and its Jacobian. */
+static void linearize(Instance *c, double t, const double *y, double *slope) {
+    const Model *m = c->model;
+    int moving = m->settings->rates_depend_on_time;
+    for (int k = 0; k < m->n_u; k++) moving |= c->u_rate[k] != 0;
+    memset(slope, 0, (size_t)m->n_unknowns * sizeof(double));
+    if (moving) {
+        const Tape *ran = evaluate_special(c, &m->tapes.rates, t, y, c->first_rates);
+        memset(c->dots, 0, m->slot_results * sizeof(double));
+        c->dots[0] = 1;
+        for (int k = 0; k < m->n_u; k++) c->dots[m->slot_u + k] = c->u_rate[k];
+        tape_tangent(ran, c->slots, c->dots, slope);
+    } else evaluate_special(c, &m->tapes.rates, t, y, c->first_rates);
+    run_special(c, &m->tapes.jacobian, c->jacobian);
+}
+
+/* M * diagonal - J, factorised. */
+int factor_step(Instance *c, double diagonal) {
+    const Model *m = c->model;
+    memset(c->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
+    for (int k = 0; k < m->n_jacobian; k++) c->matrix[m->jacobian_to_step[k]] = -c->jacobian[k];
+    for (int k = 0; k < m->n_x; k++) c->matrix[m->step_diagonal[k]] += diagonal;
+    return qr_factor(&m->step, c->matrix, c);
+}
+
+static double error_norm(const Instance *c, const double *first, const double *last, const double *error) {
+    double sum = 0, rtol = c->state.tolerance, atol = c->state.absolute;
+    if (c->model->n_x == 0) return 0;
+    for (int k = 0; k < c->model->n_x; k++) {
+        double weight = rtol * fmax(fabs(first[k]), fabs(last[k])) + atol * c->model->nominals[k];
+        sum += (error[k] / weight) * (error[k] / weight);
+    }
+    return sqrt(sum / c->model->n_x);
+}
+
+/* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
+ * Returns the error in tolerances, or -1 if the equations gave values that are not finite, or a singular matrix. */
+double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece) {
+    int n = c->model->n_unknowns;
+    size_t size = (size_t)n * sizeof(double);
+    double *last = last_of(c->model, piece), *slope = c->stages + (size_t)STAGES * (size_t)n, *y = c->point,
+           factors[STAGES];
+    piece->begin = t;
+    piece->end = t + h;
+    memcpy(piece->points, first, size);
+    if (!keep_jacobian) linearize(c, t, first, slope);
+    if (!factor_step(c, 1 / (h * GAMMA))) return -1;
+    c->state.n_evaluations += STAGES - keep_jacobian;
+    for (int i = 0; i < STAGES; i++) {
+        double *stage = c->stages + (size_t)i * n;
+        for (int k = 0; k < n; k++) {
+            double moved = i < LAST_POINTS ? first[k] : y[k] + stage[k - n];
+            for (int j = 0; j < i && i < LAST_POINTS; j++) moved += A[i][j] * c->stages[j * n + k];
+            y[k] = moved;
+        }
+        if (i == 0) memcpy(stage, c->first_rates, size);
+        else evaluate_special(c, &c->model->tapes.rates, t + C_TIME[i] * h, y, stage);
+        for (int j = 0; j < i; j++) factors[j] = C[i][j] / h;
+        for (int k = 0; k < n; k++) {
+            double right = stage[k];
+            for (int j = 0; j < i && k < c->model->n_x; j++) right += factors[j] * c->stages[j * n + k];
+            stage[k] = right + h * D_TIME[i] * slope[k];
+            if (!isfinite(stage[k])) return -1;
+        }
+        qr_solve(&c->model->step, c, stage);
+    }
+    for (int k = 0; k < n; k++) {
+        last[k] = y[k] + c->stages[(STAGES - 1) * n + k];
+        if (!isfinite(last[k])) return -1;
+        for (int row = 0; row < 3; row++) {
+            double sum = 0;
+            for (int i = 0; i < STAGES; i++) sum += DENSE[row][i] * c->stages[i * n + k];
+            last[(row + 1) * n + k] = sum;
+        }
+    }
+    return error_norm(c, first, last, c->stages + (STAGES - 1) * n);
+}
+
+double *last_of(const Model *m, Piece *piece) { return piece->points + m->n_unknowns; }
+
+size_t piece_size(const Model *m) { return sizeof(Piece) + 5 * (size_t)m->n_unknowns * sizeof(double); }
+
+/* Dense output. */
+void piece_at(const Model *m, const Piece *piece, double t, double *point) {
+    double s = (t - piece->begin) / (piece->end - piece->begin), r = 1 - s;
+    int n = m->n_unknowns;
+    const double *first = piece->points, *last = first + n, *a = last + n, *b = a + n, *c = b + n;
+    if (t >= piece->end) {
+        memcpy(point, last, (size_t)n * sizeof(double));
+        return;
+    }
+    for (int k = 0; k < n; k++) point[k] = r * first[k] + s * (last[k] + r * (a[k] + s * (b[k] + s * c[k])));
+}
+
+/* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4); states that are nothing but
+ * rounding tell nothing about it. */
+double first_step(Instance *c) {
+    double size, speed, *rates = c->rhs;
+    evaluate_now(c, &c->model->tapes.rates, rates);
+    size = error_norm(c, c->x, c->x, c->x);
+    speed = error_norm(c, c->x, c->x, rates);
+    if (!isfinite(speed) || c->model->n_x == 0) return 1e-3;
+    if (size < 1e-5 || speed < 1e-5) return 1e-6;
+    return fmax(0.01 * size / speed, TIME_RESOLUTION * fmax(1, fabs(c->state.t)));
+}
+
 static void clear_pending(Instance *c) {
     c->state.event_pending = 0;
     memset(c->wanting, 0, (size_t)c->model->n_transitions);
@@ -157,8 +304,7 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     for (;;) {
         held |= s->inputs_changed;
         if (!take_changes(c)) return FAILED;
-        if (s->at_event && stop_at_events) return AT_EVENT;
-        if (s->at_event && !handle_event(c)) return FAILED;
+        if (s->at_event && (stop_at_events || !handle_event(c))) return stop_at_events ? AT_EVENT : FAILED;
         if (!(s->t < target)) return REACHED;
         if (!s->piece_valid && target - s->t < least_step(s)) {
             /* An event was located a rounding error before the target. */
@@ -176,8 +322,7 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
         if (!move_to(c, c->piece->end)) return FAILED;
         s->piece_valid = 0;
         s->at_event = s->event_pending || is_due(c);
-        if (s->at_event && stop_at_events) return AT_EVENT;
-        if (s->at_event && !handle_event(c)) return FAILED;
+        if (s->at_event && (stop_at_events || !handle_event(c))) return stop_at_events ? AT_EVENT : FAILED;
         if (c->step_finished != NULL) target = fmin(target, fmax(c->step_finished(c), s->t));
     }
 }

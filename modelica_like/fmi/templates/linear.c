@@ -5,6 +5,7 @@
 
 static inline void reflect(const QrPattern *a, const Instance *c, int column, double *x) {
     double dot = 0;
+    if (c->qr_beta[column] == 0) return;
     for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) dot += c->qr_v[k] * x[a->v_row[k]];
     dot *= c->qr_beta[column];
     for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) x[a->v_row[k]] -= dot * c->qr_v[k];

@@ -194,14 +194,14 @@ static int check_indices(const Model *m, char *message) {
         ARRAY(mode_names, n_mode_names, n_text), INDEX(modes, first_name, n_mode_names + 1),
         INDEX(modes, n_names, n_mode_names + 1), INDEX(transitions, mode, n_modes), TEXT(transitions, name),
         TEXT(transitions, notice), ARRAY(guard_transition, n_guards, n_transitions),
-        ARRAY(reset_nodes, n_reset_nodes, n_nodes), COLUMN(resets, kind, n_resets, 0, N_RESET_KINDS),
-        COLUMN(updates, kind, n_updates, 0, N_RESET_KINDS), INDEX(resets, value, n_reset_values),
-        INDEX(resets, transition, n_transitions), INDEX(updates, value, n_updates), INDEX(holds, mode, n_modes),
-        INDEX(holds, motion, n_nodes), COLUMN(holds, state, n_holds, -1, m->n_x),
-        COLUMN(holds, reaction, n_holds, -1, m->n_nodes), INDEX(holds, approach, n_d), TEXT(holds, name),
-        ARRAY(members, n_members, n_holds), INDEX(ideals, row, n_z), INDEX(ideals, mode, n_modes),
-        INDEX(ideals, zero, n_nodes), INDEX(ideals, other, n_nodes), TEXT(ideals, name), TEXT(delays, name),
-        INDEX(delays, first, n_d - DELAY_TERMS - 1), INDEX(circuits, first_member, n_members + 1),
+        ARRAY(reset_nodes, n_reset_nodes, n_nodes), INDEX(resets, place, n_x + m->n_d + m->n_reset_nodes),
+        INDEX(updates, place, n_x + m->n_d + m->n_reset_nodes), COLUMN(updates, at_start, n_updates, -1, m->n_d),
+        INDEX(resets, value, n_reset_values), INDEX(resets, transition, n_transitions),
+        INDEX(updates, value, n_updates), INDEX(holds, mode, n_modes), INDEX(holds, motion, n_nodes),
+        COLUMN(holds, state, n_holds, -1, m->n_x), COLUMN(holds, reaction, n_holds, -1, m->n_nodes),
+        INDEX(holds, approach, n_d), TEXT(holds, name), ARRAY(members, n_members, n_holds), INDEX(ideals, row, n_z),
+        INDEX(ideals, mode, n_modes), INDEX(ideals, zero, n_nodes), INDEX(ideals, other, n_nodes), TEXT(ideals, name),
+        TEXT(delays, name), INDEX(delays, first, n_d - DELAY_TERMS - 1), INDEX(circuits, first_member, n_members + 1),
         INDEX(circuits, n_members, n_members + 1), INDEX(circuits, first, n_d + 1), INDEX(start_modes, mode, n_modes),
         INDEX(start_direct, position, n_x), INDEX(start_direct, start, n_starts), INDEX(start_default, position, n_x),
         INDEX(start_default, start, n_starts), INDEX(start_guess, position, n_unknowns),
@@ -219,23 +219,12 @@ static int check_indices(const Model *m, char *message) {
     return 1;
 }
 
-static int check_targets(const Model *m, const Reset *resets, int n) {
-    const int ends[N_RESET_KINDS] = {m->n_x, m->n_d, m->n_reset_nodes}; /* as ResetKind */
-    for (const Reset *one = resets; one < resets + n; one++) {
-        int place = one->kind == RESET_VALUE ? one->target : one->index;
-        if (place < 0 || place >= ends[one->kind]) return 0;
-    }
-    return 1;
-}
-
 static int check_events(const Model *m, char *message) {
     for (int k = 0; k < m->n_modes; k++)
         if (m->modes[k].n_names > m->n_mode_names - m->modes[k].first_name) return damaged(message, "modes.n_names");
     for (const Transition *one = m->transitions; one < m->transitions + m->n_transitions; one++)
         if (one->index < 0 || one->index >= (one->timed ? m->n_moments : m->n_guards))
             return damaged(message, "transitions.index");
-    if (!check_targets(m, m->resets, m->n_resets)) return damaged(message, "resets.index");
-    if (!check_targets(m, m->updates, m->n_updates)) return damaged(message, "updates.index");
     for (int k = 0; k < m->n_circuits; k++) {
         const Circuit *one = &m->circuits[k];
         int64_t n = one->n_members;

@@ -64,9 +64,9 @@ typedef struct {
     int below, above, below_name, above_name;
 } Rising; /* parameters of which the second must exceed the first */
 
-typedef enum { RESET_STATE, RESET_DISCRETE, RESET_VALUE, N_RESET_KINDS } ResetKind;
-typedef struct { /* of a transition, or an update: at events, and perhaps when start values are found */
-    int kind, index, value, target, transition, at_start;
+typedef struct { /* of a transition, or an update: at events, and where at_start is an entry of d, also at the start */
+    int place;   /* among states, entries of d, and nodes that are reset */
+    int value, transition, at_start;
     double factor;
 } Reset;
 typedef struct {

@@ -122,10 +122,10 @@ static void start_equations(Instance *c) {
     if (m->n_updates == 0) return;
     evaluate_now(c, &m->tapes.discrete_starts, starts);
     for (int k = 0; k < m->n_updates; k++)
-        if (m->updates[k].at_start) c->d[m->updates[k].index] = starts[m->updates[k].index];
+        if (m->updates[k].at_start >= 0) c->d[m->updates[k].at_start] = starts[m->updates[k].at_start];
     evaluate_now(c, &m->tapes.updates, values);
     for (int k = 0; k < m->n_updates; k++)
-        if (m->updates[k].at_start) c->d[m->updates[k].index] = values[k];
+        if (m->updates[k].at_start >= 0) c->d[m->updates[k].at_start] = values[k];
 }
 
 /* Choose modes that are not decided by their start conditions: the first that holds wins. */
