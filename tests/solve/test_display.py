@@ -155,11 +155,11 @@ def test_a_wrong_unit_in_the_netlist_is_told_with_its_line(tmp_path: Path) -> No
 
 def test_units_of_recorded_columns() -> None:
     """A name in brackets is no pattern, a number has no unit, and other tools have units of their own."""
-    units = {"belt[2].w": "rad/s", "oil.T": "K", "n": "1", "odd.w": "turns", "w": "rad/s"}
+    units = {"belt[2].w": "rad/s", "oil.T": "K", "n": "1", "odd.w": "Umdr", "w": "rad/s"}
     model = RecordedModel("drive", tuple(map(RecordedVariable, units, units.values())), (), {})
     shown = Display(model, {"belt[2].w": "rpm", "temperature": "degC", "*.w": "deg/s", "n*": "rpm"})
     assert {path: shown.of(path) for path in units} == {
-        "belt[2].w": "rpm", "oil.T": "degC", "n": "1", "odd.w": "turns", "w": "rad/s"
+        "belt[2].w": "rpm", "oil.T": "degC", "n": "1", "odd.w": "Umdr", "w": "rad/s"
     }  # fmt: skip
     assert shown.values("oil.T", np.array([300.0])) == pytest.approx(26.85)
     assert shown.values("belt[2].w", np.array([np.pi])) == pytest.approx(30.0)

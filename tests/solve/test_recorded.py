@@ -85,9 +85,10 @@ def test_energies_are_integrals_of_columns() -> None:
     assert {(row.at_events, row.residual, row.drift, row.impact) for row in balance} == {(0.0, 0.0, 0.0, 0.0)}
     assert recorded("wheel.stored_energy").energy().throughput == 4.0
     # Work that is taken away, and a loss of the wrong sign, are exchanged, too.
-    run = recorded("motor.source_power", "brake.loss_power")
-    for lost, source in ((-7.0, -2.0), (-2.0, -7.0)):
-        run._values_table[:] = np.array([[source], [lost]])
-        assert run.energy().throughput == 36.0
+    variables = (RecordedVariable("motor.source_power"), RecordedVariable("motor.loss_power"))
+    for source, lost in ((-5.0, -3.0), (-3.0, -5.0)):
+        values = np.broadcast_to([[source], [lost]], (2, 5))
+        run = RecordedSolution(RecordedModel("drive", variables, (), {}), TIME, values, np.empty((0, 5)), 0.0)
+        assert run.energy().throughput == 20.0
     with pytest.raises(MissingValue):
         recorded("w").energy()
