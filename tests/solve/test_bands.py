@@ -1,6 +1,9 @@
 """Bands of modes under curves."""
 
-from modelica_like import simulate
+import pytest
+
+from components import BearingFriction, Inertia
+from modelica_like import Assembly, simulate
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var
 from modelica_like.solve.bands import bands_of
 
@@ -21,6 +24,22 @@ class Blink(Component):
         yield self.mode.go("low", "high", when=self.time > self.first)
         yield self.mode.go("high", "again", when=self.time > self.first + self.long)
         yield self.mode.go("again", "last", when=self.time > self.second)
+
+
+@pytest.mark.parametrize(("others", "shown"), [(7, 8), (8, 1)])
+def test_of_many_modes_those_that_hold_a_motion_have_bands(others: int, shown: int) -> None:
+    """Up to eight modes all have; the brake stops 1 kg m² with 2 N m from 1 rad/s at 0.5 s."""
+    parts = {
+        "brake": BearingFriction(tau_pos=[[0, 2]]), "wheel": Inertia(J=1.0, phi=0.0, w=1.0),
+        **{f"lamp{k}": Blink(long=0.05) for k in range(others)},
+    }  # fmt: skip
+    run = simulate(Assembly("d", parts=parts, series={"s": ["brake", "wheel"]}), 1.0)
+    found, left = bands_of(run)
+    assert len(found) == shown
+    assert found[0].mode == "brake.mode"
+    assert found[0].held == {"stuck"}
+    assert found[0].spans == ((0.0, pytest.approx(0.5), "forward"), (pytest.approx(0.5), 1.0, "stuck"))
+    assert not left
 
 
 def test_a_mode_that_lasts_too_short_to_be_seen_has_no_band() -> None:
