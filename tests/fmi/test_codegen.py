@@ -209,8 +209,9 @@ def test_the_integrator_has_order_five_and_dense_output_of_order_four(inside):
     assert code.model.implicit == ("z",)
     c = ctypes.c_void_p(library.made(code.read))
     library.rosenbrock_step.argtypes = [
-        ctypes.c_void_p, ctypes.c_double, DOUBLES, ctypes.c_double, ctypes.c_int, ctypes.c_void_p, DOUBLES
+        ctypes.c_void_p, ctypes.c_double, DOUBLES, ctypes.c_double, ctypes.c_int, ctypes.c_void_p
     ]  # fmt: skip
+    library.rosenbrock_step.restype = ctypes.c_double
     library.piece_at.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, DOUBLES]
 
     def exact(t: float) -> np.ndarray:
@@ -219,11 +220,11 @@ def test_the_integrator_has_order_five_and_dense_output_of_order_four(inside):
 
     errors, between = [], []
     for steps in (64, 128):
-        point, piece, error = exact(0.0), Piece(), np.zeros(1)
+        point, piece = exact(0.0), Piece()
         inner = 0.0
         for k in range(steps):
             t, h = k / steps, 1 / steps
-            assert library.rosenbrock_step(c, t, pointer(point), h, 0, ctypes.byref(piece), pointer(error)) == 1
+            assert library.rosenbrock_step(c, t, pointer(point), h, 0, ctypes.byref(piece)) >= 0
             middle = np.zeros(3)
             library.piece_at(code.read, ctypes.byref(piece), t + 0.4 * h, pointer(middle))
             inner = max(inner, np.max(np.abs(middle - exact(t + 0.4 * h))))
