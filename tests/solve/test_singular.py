@@ -17,7 +17,7 @@ from modelica_like.initialize.slopes import Sizes, implicit_slopes, variable_slo
 from modelica_like.language import Component, Equations, Parameter, Variable, der, param, sin, sqrt, var
 
 SQUARE = np.array([[2.0, 1.0], [1.0, 2.0]])
-POINT = SimpleNamespace(t=0.0, x=np.zeros(1), z=np.zeros(1), d=np.array([1.0, 1.0, 0.0]))
+POINT: Any = SimpleNamespace(t=0.0, x=np.zeros(1), z=np.zeros(1), d=np.array([1.0, 1.0, 0.0]))
 A, B, C = (Origin(path, "Part", Source("")) for path in "abc")
 HOLDS = [SimpleNamespace(component=one, mode=k, number=1) for k, one in enumerate("abc")]
 
