@@ -26,3 +26,14 @@ def test_what_is_far_from_singular(size: int) -> None:
     assert regular(loop + 1e-2 * np.outer(last, last))
     assert not regular(chain * (1 - np.outer(last, np.ones(size))))  # an equation without unknowns
     assert not regular(np.where(np.eye(size) > 0, np.inf, chain))
+
+
+def test_a_row_of_stored_zeros_has_no_unknowns() -> None:
+    stored = ca.DM(ca.Sparsity.dense(4, 4), np.diag([1.0, 1.0, 1.0, 0.0]).ravel())
+    assert not _regular(stored, np.array(stored.nonzeros()))
+
+
+def test_few_equations_are_judged_by_their_condition() -> None:
+    """Ones on the diagonal of the factor, and yet 2^n of the last unknown make no difference to the equations."""
+    assert not regular(np.eye(60) - np.triu(np.ones((60, 60)), 1))
+    assert regular(np.eye(8) - np.triu(np.ones((8, 8)), 1))
