@@ -3,7 +3,7 @@
 Run with `python benchmarks/segments.py [name …]`. The floor restarts IDAS at every event, too, with as many results as
 the run has there, but looks at no guard and searches for nothing. Both in one process, CPU time, best of several.
 All calls of compiled functions in a run are then repeated with the same arguments and nothing between: what is left
-of the run is Python.
+of the run is Python. The compiled run-time (`solver="native"`) has the same floor: it searches, too.
 """
 
 from __future__ import annotations
@@ -88,11 +88,13 @@ def measure(name: str) -> str:
     floor()
     repeat, count = compiled_calls(model)
     with_events, alone, compiled = best(lambda: simulate(model)), best(floor), best(repeat)
+    native = best(lambda: simulate(model, solver="native"))
     return (
         f"{name:16s} {with_events * 1e3:8.2f} ms with {len(run.events):4d} mode changes, "
         f"{run.statistics.integrations:4d} IDAS calls, {run.statistics.steps:6d} steps; "
         f"{len(run.segments):4d} segments alone {alone * 1e3:8.2f} ms; ratio {with_events / alone:5.2f}; "
-        f"{count:4d} compiled calls {compiled * 1e3:8.2f} ms"
+        f"{count:4d} compiled calls {compiled * 1e3:8.2f} ms; native {native * 1e3:8.2f} ms, "
+        f"ratio {native / alone:5.2f}"
     )
 
 
