@@ -6,8 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from modelica_like import Solution, simulate
+from modelica_like import Options, Solution, simulate
 from modelica_like.errors import Chattering, Source
+from modelica_like.initialize import Impact
 from modelica_like.language import (
     Component,
     Discrete,
@@ -21,8 +22,8 @@ from modelica_like.language import (
     param,
     var,
 )
-from modelica_like.solve.instants import chattering
-from modelica_like.solve.recorder import Event
+from modelica_like.solve.instants import chattering, note_rest
+from modelica_like.solve.recorder import Event, Recorder
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 
@@ -189,3 +190,31 @@ def test_what_switches_most_is_told_with_three_of_its_places():
     told = chattering([*often, Event(0.5, "clutch.mode", "free", "stuck", Source("other.py", 1))], "it does", "stop")
     assert told.what == "relay.mode switched 4 times in t = 0…0.3 s (on ⇄ off)."
     assert told.where == tuple(places[:3])
+
+
+SPAN = 1e6
+"""Of a run in s: its 25 events within less than 1 s follow each other ever faster."""
+
+
+@pytest.mark.parametrize(
+    ("groups", "told"),
+    [
+        ([(3.0, 60, 0.01)], [3.24]),  # once, however many more there are
+        ([(3.0, 24, 0.01)], []),
+        ([(0.0, 25, 1 / 24)], []),  # as long as the window
+        ([(3.0, 25, 0.01), (50.0, 25, 0.02)], [3.24, 50.48]),
+        ([(2.0, 25, 1 / 32), (3.75, 25, 1 / 32)], [2.75]),  # not later than a window
+        ([(2.0, 25, 1 / 32), (3.765625, 25, 1 / 32)], [2.75, 4.515625]),
+    ],
+)
+def test_every_rest_is_told_once(groups: list[tuple[float, int, float]], told: list[float]) -> None:
+    times = [first + step * k for first, count, step in groups for k in range(count)]
+    record = Recorder(impacts=[Impact(time, part, 1.0) for time in times for part in ("stop", "gap")])
+    place = Source("ball.py", 1)
+    # Two parts hit at every instant.
+    record.events = [Event(time, "floor", "air", "contact", place) for time in times for _ in range(2)]
+    note_rest(record, Options(on_chattering="rest"), SPAN)
+    ends = "s on, stop, gap rests in contact: impacts followed each other ever faster."
+    assert record.notices == [f"From {time:.9g} {ends}" for time in told]
+    note_rest(other := Recorder(events=record.events), Options(), SPAN)
+    assert other.notices == []
