@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from modelica_like import Options, Solution, simulate
+from components import BearingFriction, Inertia
+from modelica_like import Assembly, Options, Solution, simulate
 from modelica_like.errors import Chattering, Source
 from modelica_like.initialize import Impact
 from modelica_like.language import (
@@ -17,9 +18,11 @@ from modelica_like.language import (
     Mode,
     Parameter,
     Variable,
+    all_of,
     der,
     discrete,
     param,
+    pre,
     var,
 )
 from modelica_like.solve.instants import chattering, note_rest
@@ -55,9 +58,42 @@ def test_a_thousand_events(width):
     assert run.final["teeth"] == 1000
 
 
-def test_a_limit_of_events_is_kept():
-    from modelica_like import Options
+class ShortSaw(Saw):
+    """It has so many teeth, and a discrete variable that is there from the start."""
 
+    most: Parameter = param("1", "number of teeth", default=24.0)
+    half: Discrete = discrete("1", "half the count")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 1
+        yield self.half == pre(self.teeth) / 2
+
+    def events(self) -> Events:
+        more = all_of(self.x > self.width, self.teeth < self.most)
+        yield self.tooth.go("one", "one", when=more, reset={self.x: 0, self.teeth: self.teeth + 1})
+
+
+def test_25_instants_in_a_millionth_of_the_run_are_too_many():
+    assert len(simulate(ShortSaw(x=0.0, width=1e-8), 1.0).events) == 24
+    with pytest.raises(Chattering, match="Events follow each other ever faster"):
+        simulate(ShortSaw(x=0.0, width=1e-8, most=25), 1.0)
+    # Somewhat wider, the last instant lies a whole window behind the first.
+    assert len(simulate(ShortSaw(x=0.0, width=1.001e-6 / 24, most=40), 1.0).events) == 40
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_rounds_at_one_instant_are_limited_by_what_may_hold(count: int) -> None:
+    """A relay between two values without hysteresis beside brakes, each of which may hold a motion."""
+    wheels = {f"wheel{k}": Inertia(J=1.0, phi=0.0, w=1.0) for k in range(count)}
+    brakes = {f"brake{k}": BearingFriction(tau_pos=[[0, 2]]) for k in range(count)}
+    series = {f"s{k}": [f"brake{k}", f"wheel{k}"] for k in range(count)}
+    drive = Assembly("d", parts={"relay": Relay(x=0.0), **wheels, **brakes}, series=series)
+    with pytest.raises(Chattering) as caught:
+        simulate(drive, 1.0)
+    assert f"Modes still switch after {20 + 6 * count} rounds at one instant." in str(caught.value)
+
+
+def test_a_limit_of_events_is_kept():
     assert len(simulate(Saw(x=0.0, width=0.1), 1.05, options=Options(max_events=10)).events) == 10
     with pytest.raises(Chattering, match="more than 10 events"):
         simulate(Saw(x=0.0, width=0.1), 1.15, options=Options(max_events=10))
