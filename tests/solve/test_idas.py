@@ -7,7 +7,8 @@ from modelica_like import Options, build
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point, initialize
 from modelica_like.language import Component, Equations, Parameter, Variable, cos, der, param, var
-from modelica_like.solve.idas import Integrator
+from modelica_like.solve import idas
+from modelica_like.solve.idas import Integrator, linear_solver
 
 TIGHT = Options(rtol=1e-10, atol=1e-12)
 
@@ -99,3 +100,25 @@ def test_what_is_not_finite_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
     x, z = integrator.run(start, 1.0, 3, patient=False)
     np.testing.assert_array_equal(x, states[:, :2])
     assert z.shape == (1, 2)
+
+
+@pytest.mark.parametrize(("whole", "large", "made"), [(True, 2, 2), (True, 3, 1), (False, 2, 1)])
+def test_whole_runs_of_large_models_have_their_own_instances(
+    whole: bool, large: int, made: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """For each length one, which needs no factor of time; all others share one."""
+    monkeypatch.setattr(idas, "_SPARSE_FROM", large)
+    compiled = build(Decay())
+    integrator, start = Integrator(compiled, TIGHT, whole=whole), initialize(compiled, 0.0, "given")
+    lengths: list[int] = []
+    make = integrator._make
+    monkeypatch.setattr(integrator, "_make", lambda *asked: lengths.append(1) or make(*asked))
+    for span in (0.5, 2.0, 0.5):
+        x, _ = integrator.run(start, span, 2)
+        np.testing.assert_allclose(x[0], 5.0 * np.exp(-np.array([0.25, 0.5]) * span), rtol=1e-8)
+    assert len(lengths) == made
+
+
+@pytest.mark.parametrize(("unknowns", "solver"), [(1, "qr"), (49, "qr"), (50, "csparse")])
+def test_which_linear_solver(unknowns: int, solver: str) -> None:
+    assert linear_solver(unknowns) == solver
