@@ -129,7 +129,7 @@ class Integrator:
         self.tolerances = self.options.rtol * factor, self.options.atol * factor * self.model.nominals
 
     def _instance(self, outputs: int, steps: int, gentle: bool, first: float) -> BufferedFunction:
-        key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first, None if gentle else self._seconds
+        key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first, self._seconds
         return self.model.fast(key, lambda: self._make(outputs, steps, gentle, first), results=(0, 1))
 
     def _first_step(self, start: Point, span: float) -> float:
@@ -145,7 +145,7 @@ class Integrator:
         return step
 
     def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
-        length = 1.0 if gentle or self._seconds is None else self._seconds
+        length = self._seconds or 1.0
         problem, _ = scaled_problem(self.model, gentle=gentle, scaled=self._seconds is None)
         grid = np.arange(1, outputs + 1) / outputs
         grid = (np.sqrt(grid) if gentle else grid * length).tolist()
@@ -193,7 +193,6 @@ class Integrator:
         p = np.concatenate([[start.t, span], self._tail, start.d])
         steps = self.options.max_steps if patient else min(self.options.max_steps, _PANEL_STEPS)
         gentle = span >= self._gentle_from
-        self._seconds = span if self._whole else None
         x, z, why = self._call(start, p, outputs, steps, gentle)
         if why and not gentle and _at_the_start(why):
             # IDAS searches for consistent slopes at the start, and may not find them; with `gentle` they are known.
@@ -218,6 +217,7 @@ class Integrator:
         Raises:
             KeyboardInterrupt: the run was interrupted; IDAS treats this as an error in the equations.
         """
+        self._seconds = float(p[1]) if self._whole and not gentle else None
         first = self._first_step(start, p[1]) if gentle else _FIRST_STEP
         instance, scaled = self._instance(outputs, steps, gentle, first), self._seconds is None
         known = self.model.fast(
