@@ -75,8 +75,8 @@ class Delays:
         if len(self._places):
             self._past.append(_Past(begin, looks, last, d))
 
-    def renewed(self, now: Point, stop: float) -> tuple[Point, bool]:
-        """Return the present point with series for the time ahead, and whether a jump or kink comes again now."""
+    def renewed(self, now: Point, stop: float) -> Point:
+        """Return the present point with series for the time ahead."""
         if now.t <= self._start:
             self._before = call(self._model, self._model.delays, now)[::2].copy()
         half = 0.5 * (self._next_break(min(stop, now.t + self._times.min()), now.t) - now.t)
@@ -88,7 +88,8 @@ class Delays:
         after.d[self._places[:, TERMS]] = now.t
         after.d[self._places[:, TERMS + 1]] = 1 / half
         solve_implicit(self._model, after)
-        return after, self._again(now, after)
+        self._pass_on(now, after)
+        return after
 
     def broken(self, t: float, before: int = -1) -> None:
         """Note a jump or kink, which comes again later; `before` says how often it has been integrated."""
@@ -98,8 +99,8 @@ class Delays:
     def _next_break(self, stop: float, t: float) -> float:
         return min([stop, *(b for one, _ in self._breaks for b in one + self._times if just_after(t) < b)])
 
-    def _again(self, now: Point, after: Point) -> bool:
-        """Pass on the jumps and kinks that come again now; return whether there are any."""
+    def _pass_on(self, now: Point, after: Point) -> None:
+        """Note the jumps and kinks that come again now."""
         near = just_after(now.t) - now.t
         here = [order for one, order in self._breaks if (np.abs(one + self._times - now.t) <= near).any()]
         self._breaks = [one for one in self._breaks if one[0] + self._times.max() > just_after(now.t)]
@@ -107,7 +108,6 @@ class Delays:
             values = [call(self._model, self._model.delays, one)[::2] for one in (now, after)]
             jumps = np.abs(values[1] - values[0]) > self._allowed()
             self.broken(now.t, -1 if jumps.any() else min(here))
-        return bool(here)
 
     def _series(self, t: float, half: float) -> Vector:
         """Return the series of all delayed values from a time on; shape (delays, TERMS)."""

@@ -117,10 +117,8 @@ class EventLoop:
         """Return the time up to which delayed values are known, renewed where they end."""
         if just_after(self.now.t) >= self.delays.until:
             self._close()
-            self.now, again = self.delays.renewed(self.now, self.end)
+            self.now = self.delays.renewed(self.now, self.end)
             self.record.begin(self.now)
-            if again and (wanting := self.guards.wanting(self.now)):
-                self._event(wanting)
         return self.delays.until
 
     # -- smooth pieces -----------------------------------------------------------------------------------------------
@@ -221,15 +219,12 @@ class EventLoop:
                 if not self._go_on(self.now.t + span):
                     raise self.integrator.gave_up
                 return looks.every(1)
-            if not self.pace.on_grid:
-                stride = self.pace.stride(self.integrator.steps - before, count, looks.width)
-                if not stride:
-                    self.pace.shorter(self._in_sight(looks.every(1)))
-                    continue
-                looks = looks.every(stride)
-            else:
-                looks = looks.every(1)
-                self.pace.snap(looks.times[1:])
+            steps = self.integrator.steps - before
+            stride = 1 if self.pace.on_grid else self.pace.stride(steps, count, looks.width)
+            if not stride:
+                self.pace.shorter(self._in_sight(looks.every(1)))
+                continue
+            looks = looks.every(stride)
             if just_after(self.now.t + span) >= stop:
                 looks.times[-1] = stop
             return looks

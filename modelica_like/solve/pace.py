@@ -73,14 +73,6 @@ class Pace:
             return span, self._even
         return stop - t, max(math.ceil(float(stop - t) / self.step - _ON_GRID), 1)
 
-    def snap(self, times: Vector) -> None:
-        """Put times exactly on the regular grid, so that they do not collect rounding errors."""
-        grid = self.begin + (self.end - self.begin) * (np.rint((times - self.begin) / self.step) / self.points)
-        # Equal times, but no others on the grid.
-        same = np.minimum(_ON_GRID * self.step, SAME_TIME * np.maximum(1.0, np.abs(grid)))
-        on_grid = np.abs(times - grid) <= same
-        times[on_grid] = grid[on_grid]
-
     def results(self, first: float, last: float) -> Vector:
         """Return the times of results after `first` up to `last`, with a tolerance."""
         same = min(_ON_GRID * self.step, SAME_TIME * max(1.0, abs(first), abs(last)))

@@ -2,13 +2,14 @@
 
 import math
 from itertools import pairwise
+from typing import NoReturn
 
 import numpy as np
 import pytest
 
 from components import BearingFriction, Inertia
 from modelica_like import Assembly, Options, Solution, simulate
-from modelica_like.errors import Chattering, Source
+from modelica_like.errors import Chattering, Source, StepFailed
 from modelica_like.initialize import Impact
 from modelica_like.language import (
     Component,
@@ -25,7 +26,9 @@ from modelica_like.language import (
     pre,
     var,
 )
+from modelica_like.solve.events import EventLoop
 from modelica_like.solve.instants import chattering, note_rest
+from modelica_like.solve.looks import Looks
 from modelica_like.solve.recorder import Event, Recorder
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
@@ -216,6 +219,38 @@ def test_a_panel_that_runs_past_an_event_into_nonsense_is_shortened():
     # sqrt(level + d) = sqrt(1 + d) - t / 2, zero level at sqrt(d).
     np.testing.assert_allclose(times(run), [2 * (math.sqrt(1.0001) - 0.01)], rtol=0, atol=1e-9)
     assert run.final["level"] == 0.0
+
+
+def test_a_run_that_failed_keeps_what_is_known_up_to_then(monkeypatch) -> None:
+    """1/(1 - t) ends at 1 s; looks that are too far apart for a polynomial get no closer ones there."""
+
+    class BlowUp(Component):
+        x: Variable = var("1", "grows without bound", default=1.0)
+        T: Parameter = param("s", "time", default=1.0)
+        mode = Mode("fine", "late")
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == self.x**2
+
+        def events(self) -> Events:
+            yield self.mode.go("fine", "late", when=self.x < 0)
+
+    asked: list[int] = []
+
+    def fails(_: object, looks: Looks, k: int) -> NoReturn:
+        asked.append(k)
+        raise StepFailed("IDAS gives up between two looks, too.")
+
+    monkeypatch.setattr(EventLoop, "_closer", fails)
+    with pytest.raises(StepFailed, match=r"IDAS gave up at about t = 0\.99999") as caught:
+        simulate(BlowUp(), 2.0, solver="idas", points=2000)
+    assert asked
+    run = caught.value.run
+    assert run is not None
+    known = np.concatenate([segment.times for segment in run.segments])
+    assert 0.99 < known[-1] < 1.0
+    x = np.concatenate([segment.x[0] for segment in run.segments])
+    np.testing.assert_allclose(1 / x, 1 - known, rtol=0, atol=1e-5)
 
 
 def test_what_switches_most_is_told_with_three_of_its_places():
