@@ -6,6 +6,7 @@ Evaluate functions there, solve the implicit equations, check that the blocks ar
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import casadi as ca
@@ -68,7 +69,7 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
         new, condition = fast(point.t, point.x, point.z, model.p, model.u, point.d)
         sizes = np.abs(new - point.z)
         largest = sizes.max()
-        if not (condition[0] < _WELL_CONDITIONED and largest < np.inf):
+        if not (condition[0] < _WELL_CONDITIONED and isfinite(largest)):
             _check_regular(model, point)
         change = float((sizes / (1.0 + np.abs(new))).max())
         point.z = new
