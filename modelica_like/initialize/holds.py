@@ -13,7 +13,7 @@ from modelica_like.compile.functions import ROUNDING
 from modelica_like.compile.soon import time_resolution
 from modelica_like.flatten.holds import TERMS
 from modelica_like.initialize.ideal import replace_dependent
-from modelica_like.initialize.point import Point, call, solve_implicit
+from modelica_like.initialize.point import Point, call, largest, solve_implicit
 from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.language.holding import UNLIMITED
 
@@ -64,19 +64,13 @@ def capacities(model: CompiledDae, point: Point) -> Any:
 def rest(model: CompiledDae, point: Point) -> None:
     """Set held motions within rounding of zero to zero, if they are states."""
     held = [model.holds[k] for k in holding(model, point)]
-    states = [one for one in held if one.state is not None]
+    states = [(one.state[0], one.motion) for one in held if one.state is not None]
     if not states:
         return
     variables = np.abs(call(model, model.variables, point))
-    for one in states:
-        if one.state is not None and variables[one.motion] <= ROUNDING * _largest(model, variables, one.motion):
-            point.x[one.state[0]] = 0.0
-
-
-def _largest(model: CompiledDae, sizes: Vector, motion: int) -> float:
-    """Return the largest size of the variables in the unit of a motion, at least its nominal value."""
-    own = model.flat_variables[motion]
-    return max(own.nominal, *(float(sizes[k]) for k, one in enumerate(model.flat_variables) if one.unit == own.unit))
+    for state, motion in states:
+        if variables[motion] <= ROUNDING * largest(model, variables, motion):
+            point.x[state] = 0.0
 
 
 def holding(model: CompiledDae, point: Point) -> list[int]:
@@ -294,7 +288,7 @@ class Strike:
     def _stops(self, before: Vector, moving: list[int]) -> bool:
         """Whether the stopped motion exceeds rounding and the error of event location."""
         model, sizes = self.model, np.abs(call(self.model, self.model.variables, self.point))
-        return any(abs(before[k]) > ROUNDING * _largest(model, sizes, model.holds[k].motion) for k in moving)
+        return any(abs(before[k]) > ROUNDING * largest(model, sizes, model.holds[k].motion) for k in moving)
 
     def _book(self, before: Vector, impulses: dict[int, float], approaches: dict[int, float]) -> None:
         """Record losses and changed motions."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import NoValidModes
-from modelica_like.initialize.point import Point, call, solve_implicit
+from modelica_like.initialize.point import Point, call, largest, solve_implicit
 from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.structure.ideal import HEAD, IdealElement, IdealNetwork
 
@@ -45,7 +45,7 @@ def replace_dependent(model: CompiledDae, point: Point) -> None:
     for k in moved:
         node = _zero(network.elements[k], point.d)
         missed = float(rows[k, HEAD:] @ left)
-        if sizes[node] > _MET * _largest(model, sizes, node):
+        if sizes[node] > _MET * largest(model, sizes, node):
             rows[k, 1] = _IMPULSE * missed
     point.d[network.entries] = rows.ravel()
 
@@ -56,7 +56,7 @@ def _write(model: CompiledDae, point: Point, network: IdealNetwork, rows: Vector
     size = len(model.implicit)
     others = [row for row in range(size) if row not in own]
     matrix = _jacobian(model, point)
-    sizes = np.abs(matrix).max(axis=1, initial=0.0)
+    sizes = np.abs(matrix).max(axis=1)
     found = dict(_dependences(matrix, [*others, *own], sizes))
     if not found or not own.keys() >= found.keys():
         return False
@@ -94,7 +94,7 @@ def _dependences(matrix: Any, order: Sequence[int], sizes: Vector) -> list[tuple
     """
     sizes = np.where(sizes > 0.0, sizes, 1.0)
     work = matrix / sizes[:, None]
-    columns = np.abs(work).max(axis=0, initial=0.0)
+    columns = np.abs(work).max(axis=0)
     work /= np.where(columns > 0.0, columns, 1.0)
     turns, pivots, found = np.eye(len(work)), list[tuple[int, int]](), list[tuple[int, Vector]]()
     for row in order:
@@ -117,12 +117,6 @@ def _moved(rows: Vector) -> list[int]:
 
 def _zero(element: IdealElement, d: Vector) -> int:
     return element.zeros[int(d[element.mode])]
-
-
-def _largest(model: CompiledDae, sizes: Vector, node: int) -> float:
-    """Return the largest size of the variables in the unit of one, at least its nominal value."""
-    own = model.flat_variables[node]
-    return max(own.nominal, *(float(sizes[k]) for k, one in enumerate(model.flat_variables) if one.unit == own.unit))
 
 
 def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool:
@@ -151,7 +145,7 @@ def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool
     limit = _LOST if keep is None else keep
     for k in moved:
         node = _zero(network.elements[k], point.d)
-        if not rows[k, 1] or abs(values[node]) <= limit * _largest(model, np.abs(values), node):
+        if not rows[k, 1] or abs(values[node]) <= limit * largest(model, np.abs(values), node):
             rows[k, 1] = 0.0
             nodes.append(node)
         elif keep is None:

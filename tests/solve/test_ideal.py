@@ -26,6 +26,9 @@ from components import (
 )
 from modelica_like import Assembly, Component, Solution, build, sensitivities, simulate
 from modelica_like.errors import NoValidModes
+from modelica_like.initialize import Point, call, initialize, solve_implicit
+from modelica_like.initialize.ideal import _dependences, replace_dependent
+from modelica_like.structure.ideal import HEAD
 
 Solver = Literal["idas", "native"]
 TIGHT: dict[str, Any] = {"rtol": 1e-10, "atol": 1e-12}
@@ -246,3 +249,85 @@ def test_random_networks_are_complementary(seed: int, solver: Solver) -> None:
     for name in [name for name in run.model.components if name.startswith("D")]:
         v, i = run[f"{name}.v"], run[f"{name}.i"]
         assert max(v.max(), -i.min(), np.abs(v * i).max()) < 1e-5
+
+
+def test_dependences_are_found_in_the_order_of_rows_whatever_their_units() -> None:
+    """A row depends on earlier ones if it does not raise their rank; its combination with them vanishes."""
+    r = np.random.default_rng(1)
+    for _ in range(100):
+        size = int(r.integers(1, 8))
+        rank = int(r.integers(0, size + 1))
+        plain = r.integers(-3, 4, (size, rank)) @ r.integers(-3, 4, (rank, size))
+        plain[r.random(size) < 0.1] = 0
+        rows, columns = 10.0 ** r.integers(-12, 13, size), 10.0 ** r.integers(-1, 2, size)
+        order = r.permutation(size).tolist()
+        wanted = [row for k, row in enumerate(order)
+                  if np.linalg.matrix_rank(plain[order[: k + 1]]) == (k and np.linalg.matrix_rank(plain[order[:k]]))]  # fmt: skip
+        matrix = rows[:, None] * plain * columns
+        found = _dependences(matrix, order, np.abs(matrix).max(axis=1))
+        assert [row for row, _ in found] == wanted
+        for row, weights in found:
+            assert weights[row] == pytest.approx(1.0)
+            assert set(np.flatnonzero(weights)) <= set(order[: order.index(row) + 1])
+            weighted = weights * rows / rows[row]
+            np.testing.assert_allclose(weighted @ plain, 0, atol=1e-9 * np.abs(weighted).max())
+
+
+def test_what_is_small_beside_the_size_of_a_row_is_rounding() -> None:
+    matrix = np.array([[1.0, 0.0], [1.0, 1e-11]])
+    assert not _dependences(matrix, [0, 1], np.array([1.0, 1.0]))
+    assert not _dependences(matrix, [0, 1], np.array([1.0, 1e3]))  # columns, too, have units of their own
+    matrix = np.array([[1.0, 1.0], [1.0, 1.001]])
+    assert not _dependences(matrix, [0, 1], np.array([1.0, 0.9e6]))
+    ((row, weights),) = _dependences(matrix, [0, 1], np.array([1.0, 1.1e6]))
+    assert (row, weights.tolist()) == (1, pytest.approx([-1.0, 1.0]))
+    ((_, weights),) = _dependences(np.array([[1.0, 0.0], [1e-10, 0.0]]), [0, 1], np.array([1.0, 1.0]))
+    assert weights.tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize("seed", [3, 48, 100, 248, 7, 11])
+def test_dependent_equations_are_replaced_by_as_many_others(seed: int) -> None:
+    """In random modes and states of a random network."""
+    r, model = np.random.default_rng(seed), build(network(seed))
+    ideal, start = model.ideal, initialize(model)
+    assert ideal is not None
+    for _ in range(20):
+        point = start.copy()
+        point.t = float(r.uniform(0, 0.05))
+        point.x[:] = r.normal(size=len(point.x)) * 10.0 ** r.integers(-3, 3)
+        modes = [one.mode for one in ideal.elements]
+        point.d[modes] = r.integers(0, 2, len(modes))
+        replace_dependent(model, point)
+        rows = point.d[ideal.entries].reshape(-1, ideal.width).copy()
+        replaced, derivative = rows[:, 0] == 1, (rows[:, 0] == 1) & (rows[:, HEAD - 1] == 0)
+        assert set(rows[:, [0, HEAD - 1]].ravel()) <= {0.0, 1.0}
+
+        def matrix(chosen: Any, rows: np.ndarray = rows, point: Point = point) -> np.ndarray:
+            point.d[ideal.entries] = np.where(chosen[:, None], rows * (np.arange(ideal.width) != 1), 0.0).ravel()
+            return model.alg_jacobian(point.t, point.x, point.z, model.p, model.u, point.d).full()
+
+        def rank(full: np.ndarray) -> int:
+            for axis in (1, 0):
+                sizes = np.abs(full).max(axis=axis, keepdims=True)
+                full = full / np.where(sizes > 0, sizes, 1)
+            return int(np.linalg.matrix_rank(full, 1e-10))
+
+        own = matrix(np.zeros(len(rows), bool))
+        assert replaced.sum() == len(own) - rank(own)
+        left = call(model, model.alg, Point(point.t, point.x, np.zeros(len(point.z)), point.d))
+        assert (replaced & ~derivative).sum() == len(own) - rank(matrix(derivative))
+        assert rank(matrix(replaced)) == len(own)
+        for k in np.flatnonzero(replaced):
+            weights, one = rows[k, HEAD:], ideal.elements[k]
+            np.testing.assert_allclose(weights @ own, 0, atol=1e-9 * (np.abs(weights) @ np.abs(own)).max())
+            if derivative[k]:
+                assert weights[one.row] == pytest.approx(1.0)
+        solve_implicit(model, point)
+        values = np.abs(call(model, model.variables, point))
+        largest = {unit: max(values[k] for k, one in enumerate(model.flat_variables) if one.unit == unit)
+                   for unit in {one.unit for one in model.flat_variables}}  # fmt: skip
+        for k, one in enumerate(ideal.elements):
+            node = one.zeros[int(point.d[one.mode])]
+            scale = max(model.flat_variables[node].nominal, largest[model.flat_variables[node].unit])
+            missed = derivative[k] and values[node] > 1e-9 * scale
+            assert rows[k, 1] == (pytest.approx(1e12 * rows[k, HEAD:] @ left, rel=1e-6) if missed else 0.0)

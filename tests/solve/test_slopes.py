@@ -100,7 +100,7 @@ def test_slopes_of_implicit_unknowns(curved: Any, by: tuple[str, ...]) -> None:
 
 
 def test_functions_of_the_caller_and_their_constants(curved: Any) -> None:
-    """As expressions (SX) of the model's symbols, or as calls (MX) with constants, by which nothing is differentiated."""
+    """Expressions (SX) of the model's symbols, or calls (MX) with constants, by which nothing is differentiated."""
     model, point, wanted = curved
     nodes = nodes_of(model, ["f", "g"])
     symbols = [ca.MX.sym(name, model.ode.size1_in(k)) for k, name in enumerate(NAMES)]
@@ -141,7 +141,7 @@ def test_names_of_variables_parameters_and_inputs(curved: Any) -> None:
     assert columns_of(model, ["u", "k"]) == [len(model.p), model.parameter_position["k"]]
     with pytest.raises(UnknownName, match=r"^Curved has no variable 'k'\."):
         nodes_of(model, ["f", "k"])
-    with pytest.raises(UnknownName, match="^Curved has no input or parameter 'kk'; did you mean 'k'"):
+    with pytest.raises(UnknownName, match=r"^Curved has no input or parameter 'kk'; did you mean 'k'"):
         columns_of(model, ["u", "kk"])
 
 
