@@ -33,8 +33,7 @@ def replace_dependent(model: CompiledDae, point: Point) -> None:
         return
     rows = np.zeros((len(network.elements), network.width))
     point.d[network.entries] = rows.ravel()
-    if not _write(model, point, network, rows):
-        return
+    _write(model, point, network, rows)
     moved = _moved(rows)
     if not moved:
         return
@@ -50,16 +49,16 @@ def replace_dependent(model: CompiledDae, point: Point) -> None:
     point.d[network.entries] = rows.ravel()
 
 
-def _write(model: CompiledDae, point: Point, network: IdealNetwork, rows: Vector) -> bool:
-    """Write the rows of the elements whose equations are dependent; tell whether there are any."""
+def _write(model: CompiledDae, point: Point, network: IdealNetwork, rows: Vector) -> None:
+    """Write the rows of the elements whose equations are dependent."""
     own = {one.row: k for k, one in enumerate(network.elements)}
     size = len(model.implicit)
     others = [row for row in range(size) if row not in own]
     matrix = _jacobian(model, point)
     sizes = np.abs(matrix).max(axis=1)
     found = dict(_dependences(matrix, [*others, *own], sizes))
-    if not found or not own.keys() >= found.keys():
-        return False
+    if not (found and own.keys() >= found.keys()):
+        return
     least = sizes.copy()
     for row, weights in found.items():
         rows[own[row], 0], rows[own[row], HEAD:] = 1.0, weights
@@ -73,7 +72,6 @@ def _write(model: CompiledDae, point: Point, network: IdealNetwork, rows: Vector
             rows[own[row], HEAD - 1] = 1.0
             rows[own[row], HEAD:] = weights[list(found)] @ np.array(list(found.values()))
     point.d[network.entries] = rows.ravel()
-    return True
 
 
 def _jacobian(model: CompiledDae, point: Point) -> Any:
@@ -92,10 +90,10 @@ def _dependences(matrix: Any, order: Sequence[int], sizes: Vector) -> list[tuple
     Returns:
         For every such row, the combination of all rows that vanishes; its own part is one.
     """
-    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    sizes = np.where(sizes, sizes, 1.0)
     work = matrix / sizes[:, None]
     columns = np.abs(work).max(axis=0)
-    work /= np.where(columns > 0.0, columns, 1.0)
+    work /= np.where(columns, columns, 1.0)
     turns, pivots, found = np.eye(len(work)), list[tuple[int, int]](), list[tuple[int, Vector]]()
     for row in order:
         for earlier, column in pivots:
@@ -137,7 +135,7 @@ def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool
     network = model.ideal
     if network is None:
         return False
-    rows = point.d[network.entries].reshape(-1, network.width).copy()
+    rows = point.d[network.entries].reshape(len(network.elements), network.width).copy()
     moved = _moved(rows)
     if not moved:
         return False

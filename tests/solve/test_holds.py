@@ -1,4 +1,4 @@
-"""Held motions: which element takes how much of a reaction, and impacts, against least squares and bookkeeping by hand."""
+"""Held motions: how elements share reactions, and impacts; against least squares and bookkeeping by hand."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -6,12 +6,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.linalg import null_space
 
 from modelica_like.compile.compiled import Circuit
 from modelica_like.compile.functions import ROUNDING
 from modelica_like.initialize import holds as module
 from modelica_like.initialize.holds import (
     INSTANT,
+    Impact,
     Strike,
     _may_contradict,
     _share_circuits,
@@ -102,6 +104,9 @@ def test_shared_reactions_are_the_least_ones(monkeypatch: pytest.MonkeyPatch) ->
         rows, own = shares[switches == 1][:, :count], slopes[np.array(members[:count]) - 2]
         assert np.abs(rows).max(axis=1) == pytest.approx(1.0)
         assert (shares.diagonal()[switches == 1] > 0).all()
+        if rank == count - 1:  # the motion that depends most on the others gives its equation away
+            least_sure = np.abs(null_space(own.T)[:, 0])
+            assert least_sure[np.argmax(switches)] == pytest.approx(least_sure.max())
         others = own[switches[:count] == 0]
         assert rank == (np.linalg.matrix_rank(others) if len(others) else 0)
         soft = own / weights[members[:count], None]
@@ -109,16 +114,24 @@ def test_shared_reactions_are_the_least_ones(monkeypatch: pytest.MonkeyPatch) ->
         np.testing.assert_allclose(rows @ least, 0, atol=1e-9 * max(np.abs(least)))
 
 
-def test_a_motion_that_nothing_moves_has_no_reaction(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("prescribed", [False, True])
+def test_a_motion_that_nothing_moves_has_no_reaction(monkeypatch: pytest.MonkeyPatch, prescribed: bool) -> None:
     model: Any = SimpleNamespace(holds=[held(k) for k in range(3)], circuits=(Circuit((0, 1, 2), 0),))
     monkeypatch.setattr(module, "variable_slopes", lambda *_: np.array([[2.0, 0.0], [0.0, 0.0], [2.0, 0.0]]))
-    monkeypatch.setattr(module, "_may_contradict", lambda *_: False)
-    point = at(*[9.0] * 12)
+    point, yields = at(*[9.0] * 12), list[Any]()
+    monkeypatch.setattr(module, "_may_contradict", lambda *given: prescribed and given == (model, [0, 1, 2]))
+    monkeypatch.setattr(module, "_yield_to_contradiction", lambda *given: yields.append(given))
     assert _share_circuits(model, point, {0, 1, 2}, np.array([1.0, 7.0, 4.0]))
     shares = point.d[3:].reshape(3, 3)
     assert shares[1].tolist() == [0.0, 1.0, 0.0]
     (row,) = (shares[k] for k in (0, 2) if shares[k].any())
     assert row / row[0] == pytest.approx([1.0, 0.0, -4.0])
+    if prescribed:
+        (given,) = yields
+        assert given[:3] == (model, point, model.circuits[0])
+        assert np.concatenate([given[3], given[4].ravel()]).tolist() == point.d.tolist()
+    else:
+        assert not yields
 
 
 class Split:
@@ -207,7 +220,7 @@ def test_use_of_capacities(monkeypatch: pytest.MonkeyPatch) -> None:
     point.d[circuits[1].first + 3 + np.arange(3)] = 0.5
 
     def variables(trial: Point) -> list[float]:
-        assert (trial.x == 7).all()
+        assert trial.x.tolist() == [7.0]
         return [np.nan] * 20 + reactions
 
     fake = Fake(monkeypatch, variables=variables)
@@ -285,7 +298,7 @@ def strike(model: Any, point: Any, entering: Any = (), loose: Any = (), kind: ty
 
 
 def variables_in_units(motions: list[float], nominal: float = 1.0) -> Any:
-    """Variables 10 … are the motions; variable 0 is 1e3 times the nominal value in their unit, variable 1 in another."""
+    """Variables 10 … are the motions; variable 0, in their unit, is 1e3 times the nominal value; 1 has another unit."""
     units = ["rad/s", "N.m"] + ["s"] * 8 + ["rad/s"] * len(motions)
     table = [SimpleNamespace(unit=one, nominal=nominal) for one in units]
     return table, [-1e3 * nominal, 1e9 * nominal, *[0.0] * 8, *motions]
@@ -316,7 +329,7 @@ def test_hard_is_what_unlimited_reactions_stop_beyond_rounding(
     rows = [[1.0, *one, 0.5] for one in [*limits, (UNLIMITED, UNLIMITED)]]
     fake = Fake(monkeypatch, variables=lambda _: values, hold_terms=lambda _: np.ravel(rows))
     fake.model.holds, fake.model.flat_variables = [held(k) for k in range(3)], table
-    found = Strike(fake.model, at(), [0, 1], resting=resting)
+    found = Strike(fake.model, at(), [0, 1], **({"resting": True} if resting else {}))
     assert (found.hard, found._rebound) == (hard, 1.0 if hard and not resting else 0.0)
     assert (found.entering, found.loose, found.knocked, found.impacts) == ({0, 1}, [], [], [])
 
@@ -355,6 +368,7 @@ class Rounds(Strike):
 def run(monkeypatch: pytest.MonkeyPatch, verdicts: Any, **given: Any) -> Rounds:
     rows = [[1.0, 2.0, 3.0, one] for one in (0.5, 0.2, 0.0, 0.4)]
     fake = Fake(monkeypatch, hold_terms=lambda _: np.ravel(rows))
+    fake.model.holds = [held(k) for k in range(4)]
     found = strike(fake.model, at(x=(100.0,)), [2, 0, 1], kind=Rounds)
     Rounds.__init__(found, verdicts)
     found.__dict__.update(given)
@@ -410,14 +424,14 @@ def test_response_to_an_impact_is_what_differs_from_finite_forces(monkeypatch: p
 
     monkeypatch.setattr(module, "share", sharing)
     monkeypatch.setattr(module, "solve_implicit", solve)
-    monkeypatch.setattr(module, "holding", lambda *given: [0, 1, 2, 3])
+    monkeypatch.setattr(module, "holding", lambda model, trial: [0, 1, 2, 3] if trial.d[3] == 2 else [])
     found = strike(fake.model, point, [0, 2], [3])
-    jump, impulses, reactions = found._response({0: 2e9, 2: -1e9})
+    jump, impulses, reactions = found._response({0: 2.0, 2: -1.0})
     assert told == [[1.0, 1.0, 1.0, 2.0]]
-    assert jump == pytest.approx([19.0, 1.0])
-    assert impulses == pytest.approx({0: 6.0, 1: -2.0})
+    assert jump == pytest.approx(INSTANT * np.array([19.0, 1.0]), abs=0)
+    assert impulses == pytest.approx({0: 6.0 * INSTANT, 1: -2.0 * INSTANT}, abs=0)
     assert reactions == pytest.approx({0: 5.0, 1: 3.999})
-    assert [one.d[[30, 32]].tolist() for one in found.trials] == [[0.0, 0.0], [2e9, -1e9]]
+    assert [one.d[[30, 32]].tolist() for one in found.trials] == [[0.0, 0.0], [2.0, -1.0]]
     assert point.d[:4].tolist() == [1.0] * 4
     assert point.x.tolist() == [3.0, 4.0]
 
@@ -443,6 +457,22 @@ def test_losses_of_an_impact_and_what_moves_on(monkeypatch: pytest.MonkeyPatch, 
     assert [one.trials for one in found.impacts] == [found.trials, None, None]
     # c0 rests, c1 bounces, c2 rests but no mode holds it, c3 moves as before, c4 and c7 feel nothing.
     assert found.loose == [5, 7, 1, 3, 2, 6]
+    assert found.impacts[0] == Impact(2.0, "c0", 3.0 * speed)  # trials are no part of what is told
+    assert "trials" not in repr(found.impacts[0])
+
+
+def test_where_an_impact_changes_nothing_all_stays_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = strike(SimpleNamespace(holds=[held(0), held(1)]), at(), loose=[1])
+    found._motions = lambda: np.array([0.0, 3.0])
+    monkeypatch.setattr(module, "holding", lambda *_: [])
+    found._book(np.array([0.0, 3.0]), {}, {})
+    assert (found.loose, found.impacts) == ([1], [])
+
+
+def test_what_cannot_be_knocked_loose_does_not_keep_the_others() -> None:
+    found = strike(SimpleNamespace(holds=[held(0), held(1, loose=-1), held(2)]), at())
+    finite = np.full((3, 2), 5.0)
+    assert found._unbearable(finite, {1: 3.0, 2: -3.0, 0: 3.0}, dict.fromkeys(range(3), 0.0)) == [2, 0]
 
 
 @pytest.mark.parametrize(

@@ -48,11 +48,14 @@ def test_an_impulse_is_unbearable_beyond_what_can_be_borne_for_an_instant(
     assert not unbearable(1e-15, 0.0, 0.0, larger=-1.0)  # nothing but rounding
 
 
-@pytest.mark.parametrize(("slip", "left"), [(0.9e-7, 0.0), (-0.9e-7, 0.0), (1.1e-7, 1.1e-7)])
-def test_what_is_held_rests_exactly_where_it_moves_by_rounding_of_the_largest_speed(slip: float, left: float) -> None:
+@pytest.mark.parametrize("speed", [1000.0, -1000.0])
+@pytest.mark.parametrize(("slip", "left"), [(0.9e-7, 0.0), (-0.9e-7, 0.0), (1.1e-7, 1.1e-7), (-1.1e-7, -1.1e-7)])
+def test_what_is_held_rests_exactly_where_it_moves_by_rounding_of_the_largest_speed(
+    slip: float, left: float, speed: float
+) -> None:
     """1e-10 of 1000 rad/s."""
     parts = {
-        "a": Inertia(J=1.0, phi=0.0, w=1000.0),
+        "a": Inertia(J=1.0, phi=0.0, w=speed),
         "c": Clutch(capacity=5.0, phi_rel=0.0, w_rel=0.0),
         "b": Inertia(J=1.0),
     }
