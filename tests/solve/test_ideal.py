@@ -107,7 +107,7 @@ def buck_by_hand(periods: int, R: float) -> list[float]:
         x, rest = expm(flows * 4e-5) @ x, 6e-5
         empties = lambda t, x=x: (expm(free * t) @ x)[0]  # noqa: E731
         if empties(rest) < 0:
-            ends = brentq(empties, 0, rest, xtol=1e-18)
+            ends: Any = brentq(empties, 0, rest, xtol=1e-18)
             x, rest = (expm(free * ends) @ x) * [0, 1, 1], rest - ends
             x = x * [1, exp(-rest / (R * C)), 1]
         else:
@@ -376,10 +376,50 @@ def test_rows_are_looked_at_twice(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_equations_of_other_elements_are_not_replaced(monkeypatch: pytest.MonkeyPatch, found: Any) -> None:
     model, ideal = elements(4, 1, 3)
     point = Point(0.0, np.zeros(0), np.zeros(5), np.zeros(3 + 3 * ideal.width))
-    monkeypatch.setattr(module, "_jacobian", lambda *_: np.eye(5))
+    asked: list[int] = []
+    monkeypatch.setattr(module, "_jacobian", lambda *_: asked.append(1) or np.eye(5))
     monkeypatch.setattr(module, "_dependences", lambda *_: found)
     replace_dependent(model, point)
     assert not point.d.any()
+    assert len(asked) == 1
+
+
+@pytest.mark.parametrize("missed", [True, False])
+def test_impulses_are_those_of_the_solution(monkeypatch: pytest.MonkeyPatch, missed: bool) -> None:
+    """What is left of the equations of e1, 2 * 3 + 5 * (-7), acts if the variable is not zero once z is found."""
+    model, ideal = elements(0, 1)
+    model.flat_variables, model.alg = [SimpleNamespace(unit="V", nominal=1.0)] * 30, SimpleNamespace()
+    point = Point(0.0, np.zeros(0), np.zeros(5), np.array([0.0, 1.0, *[9.0] * (2 * ideal.width)]))
+    table = np.zeros((2, ideal.width))
+    table[1, [0, HEAD, HEAD + 1]] = 1.0, 2.0, 5.0
+
+    def write(owner: Any, at: Point, network: IdealNetwork, rows: np.ndarray) -> None:
+        assert (owner, at, network) == (model, point, ideal)
+        assert not point.d[ideal.entries].any()
+        rows[:] = table
+        point.d[ideal.entries] = table.ravel()
+
+    def solve(owner: Any, trial: Point) -> None:
+        assert owner is model
+        assert trial.d.tolist() == point.d.tolist()
+        trial.z = np.ones(5)
+
+    def call(owner: Any, function: Any, trial: Point) -> np.ndarray:
+        assert owner is model
+        assert not trial.d[ideal.entries].any()
+        if function is model.alg:
+            return np.array([3.0, -7.0, 1e9, 1e9, 1e9])
+        assert function is model.variables
+        values = np.full(30, -4.0)
+        values[21] = 0.0 if trial.z.all() != missed else -2.0
+        return values
+
+    for name, one in (("_write", write), ("solve_implicit", solve), ("call", call)):
+        monkeypatch.setattr(module, name, one)
+    replace_dependent(model, point)
+    table[1, 1] = -29e12 if missed else 0.0
+    assert point.d[ideal.entries].tolist() == table.ravel().tolist()
+    assert not point.z.any()
 
 
 @pytest.mark.parametrize(
