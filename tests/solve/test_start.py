@@ -213,7 +213,7 @@ def test_newton_ends_when_errors_are_rounding_of_their_terms(
 )  # fmt: skip
 def test_what_is_left_after_fifty_steps_is_an_error(monkeypatch: pytest.MonkeyPatch, error: Any, found: bool) -> None:
     """A hundred-millionth of one and of the size of the terms, 16, is met."""
-    errors = [(4.0, 8.0), *[error, (-error[0], -error[1])] * 24, error]
+    errors = [(4.0, 8.0), *[(1.0, 1.0), (-1.0, -1.0)] * 24, error]
     if found:
         assert len(Newton(monkeypatch, errors).seen) == 50
     else:
@@ -282,6 +282,9 @@ def test_a_start_value_that_others_determine_agrees(
     assert caught.value.what == f"b = 8.5 and {told} contradict each other: {would} would be {actual:g}."
     coupled = [k for k in range(10) if found._coupled(ENTRIES[5], StartEntry(k, None, "fixed"))]
     assert coupled == [1, 5, 6]
+    found.model.starts = (*ENTRIES[:6], StartEntry(6, None, "fixed"), StartEntry(5, None, "fixed"))
+    with pytest.raises(ContradictingStart, match=r"^b = 8\.5 and z6 = 7 and "):  # two of three are enough
+        found._check_dependent(point, 5)
     found.model.starts = ENTRIES[3:7]
     found.given = found.given[3:]
     with pytest.raises(ContradictingStart, match=r" cannot be met: (left minus right|z5) would be"):
