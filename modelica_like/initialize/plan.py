@@ -221,8 +221,7 @@ class _Choice:
         if matrix is None:  # each has its own unknown, whatever structure solves it
             for row in range(self.own):
                 self.entries[row][len(self.free) + row] = 1.0
-        added = [self.choice.add(self.entries[row]) for row in range(self.own)]
-        return [row for row, new in enumerate(added) if new or matrix is None]
+        return [row for row in range(self.own) if self.choice.add(self.entries[row])]
 
     def _keep(self, some: bool) -> list[int]:
         """Implicit unknowns that keep their values."""

@@ -114,7 +114,7 @@ def test_modes_and_start_values_that_chase_each_other_are_told(start):
         x: Variable = var("1", "state")
         y: Variable = var("1", "given")
         T: Parameter = param("s", "time", default=1.0)
-        mode = Mode("a", "b")
+        first, mode, last = Mode("on", "off"), Mode("a", "b"), Mode("on", "off")
 
         def equations(self) -> Equations:
             yield self.T * der(self.x) == -self.x

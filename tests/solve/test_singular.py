@@ -138,6 +138,9 @@ def test_generic_points_are_moved_but_rates_are_not() -> None:
     size = 1 + np.array([3.0, 1.0, 3.0, 1.0])
     moved = (found[[0, 1, 4, 5]] - [3, -1, 3, -1]) / size
     assert ((moved[[0, 2, 3]] >= 0.05) & (moved[[0, 2, 3]] <= 0.1)).all()
+    free = np.diag(at(1.0, ()).full())
+    parts = [*(free[[0, 1, 4, 5]] - [3, -1, 3, -1]) / size / 0.1, *free[2:4]]
+    assert (min(parts) >= 0.5, max(parts) <= 1.0, len({*np.round(parts, 6)})) == (True, True, 6)
 
 
 class Root(Component):
