@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components import Clutch, Inertia
+from components import Clutch, ConstantTorque, Fixed, Inertia
 from modelica_like import Assembly, build
 from modelica_like.initialize import initialize
 from modelica_like.initialize.holds import Strike, _capacities, rest
@@ -66,3 +66,13 @@ def test_what_is_held_rests_exactly_where_it_moves_by_rounding_of_the_largest_sp
     point.x[state] = slip
     rest(model, point)
     assert point.x[state] == left
+
+
+def test_what_sticks_in_a_steady_start_shares_by_capacities(start: Any) -> None:
+    parts = {"T": ConstantTorque(tau_constant=3.0), "J": Inertia(J=1.0), "g": Fixed()}
+    parts |= {"c": Clutch(capacity=5.0), "e": Clutch(capacity=10.0)}
+    connect = {"a": ["T.flange", "J.flange_a"], "b": ["J.flange_b", "c.flange_a", "e.flange_a"]}
+    connect["h"] = ["c.flange_b", "e.flange_b", "g.flange"]
+    found = start(Assembly("held", parts=parts, connect=connect), "steady")
+    assert (found["c.mode"], found["e.mode"], found["J.w"]) == ("stuck", "stuck", 0.0)
+    assert (found["c.tau"], found["e.tau"]) == pytest.approx((-1.0, -2.0))
