@@ -134,6 +134,24 @@ def test_modes_and_start_values_that_chase_each_other_are_told(start):
     assert start(Chasing(x=1.0))["mode"] == "b"
 
 
+def test_in_other_modes_a_steady_state_is_sought_from_the_start_values_again(start):
+    """At x = 1 the mode is a, which rests at 10; there it is b, which rests at 2 and 6."""
+
+    class Switching(Component):
+        x: Variable = var("1", "state")
+        T: Parameter = param("s", "time", default=1.0)
+        mode = Mode("a", "b")
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == self.mode.choose(a=10 - self.x, b=-(self.x - 2) * (self.x - 6))
+
+        def events(self) -> Events:
+            yield self.mode.initially("b", when=self.x > 1.5)
+
+    found = start(Switching(x=1.0), "steady")
+    assert (found["x"], found["mode"]) == (pytest.approx(2.0), "b")
+
+
 def test_discrete_values_start_from_numbers_quantities_and_formulas():
     class Counter(Component):
         x: Variable = var("1", "x")
