@@ -81,6 +81,7 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
 
 def _settle(model: CompiledDae, point: Point, problem: StartProblem, start: StartKind) -> None:
     """Find states and modes: modes depend on states, and in the steady state, states depend on modes."""
+    old = modes = point.d
     for _ in range(_MODE_ROUNDS):
         if start == "steady":
             problem.apply(point)
@@ -92,17 +93,11 @@ def _settle(model: CompiledDae, point: Point, problem: StartProblem, start: Star
             modes = started(model, point)
         if np.array_equal(modes, point.d):
             return
-        point.d = modes
+        old, point.d = point.d, modes
         share(model, point)
-    raise _unsettled(model, point)
-
-
-def _unsettled(model: CompiledDae, point: Point) -> InitializationError:
-    pairs = zip(model.flat_discretes, point.d, started(model, point), strict=False)
-    changing = [one.path for one, old, new in pairs if old != new]
-    names = changing or [one.path for one in model.flat_discretes if one.names]
-    return InitializationError(
-        f"The modes at the start do not settle: {', '.join(names)} and the start values keep changing each other.",
+    changing = [one.path for one, a, b in zip(model.flat_discretes, old, modes, strict=False) if a != b]
+    raise InitializationError(
+        f"The modes at the start do not settle: {', '.join(changing)} and the start values keep changing each other.",
         advice="Give start values of states, which no mode changes.",
     )
 

@@ -13,7 +13,7 @@ from modelica_like.compile.functions import ROUNDING
 from modelica_like.compile.soon import time_resolution
 from modelica_like.flatten.holds import TERMS
 from modelica_like.initialize.ideal import replace_dependent
-from modelica_like.initialize.point import Point, call, solve_implicit
+from modelica_like.initialize.point import Point, call, largest, solve_implicit
 from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.language.holding import UNLIMITED
 
@@ -53,7 +53,7 @@ class Impact:
 
 def terms(model: CompiledDae, point: Point) -> Any:
     """Gain, capacities and restitution of every held motion; shape (holds, TERMS)."""
-    return call(model, model.hold_terms, point).reshape(-1, TERMS)
+    return call(model, model.hold_terms, point).reshape(len(model.holds), TERMS)
 
 
 def capacities(model: CompiledDae, point: Point) -> Any:
@@ -64,19 +64,13 @@ def capacities(model: CompiledDae, point: Point) -> Any:
 def rest(model: CompiledDae, point: Point) -> None:
     """Set held motions within rounding of zero to zero, if they are states."""
     held = [model.holds[k] for k in holding(model, point)]
-    states = [one for one in held if one.state is not None]
+    states = [(one.state[0], one.motion) for one in held if one.state is not None]
     if not states:
         return
     variables = np.abs(call(model, model.variables, point))
-    for one in states:
-        if one.state is not None and variables[one.motion] <= ROUNDING * _largest(model, variables, one.motion):
-            point.x[one.state[0]] = 0.0
-
-
-def _largest(model: CompiledDae, sizes: Vector, motion: int) -> float:
-    """Return the largest size of the variables in the unit of a motion, at least its nominal value."""
-    own = model.flat_variables[motion]
-    return max(own.nominal, *(float(sizes[k]) for k, one in enumerate(model.flat_variables) if one.unit == own.unit))
+    for state, motion in states:
+        if variables[motion] <= ROUNDING * largest(model, variables, motion):
+            point.x[state] = 0.0
 
 
 def holding(model: CompiledDae, point: Point) -> list[int]:
@@ -141,14 +135,14 @@ def _share(
     members = [circuit.members[place] for place in places]
     slopes = variable_slopes(model, point, [model.holds[k].motion for k in members])
     sizes = np.linalg.norm(slopes, axis=1)
-    sizes[sizes == 0.0] = 1.0
+    sizes += sizes == 0.0
     left, values, _ = np.linalg.svd(slopes / sizes[:, None])
     silent = (left[:, np.sum(values > _DEPENDENT) :] / sizes[:, None]).T
     weighted = silent * weights[members]
     pivots = _eliminate(silent, weighted)
     for row, pivot in enumerate(pivots):
         switches[places[pivot]] = 1.0
-        shares[places[pivot], places] = weighted[row] / (np.abs(weighted[row]).max() * np.sign(weighted[row, pivot]))
+        shares[places[pivot], places] = weighted[row] / np.copysign(np.abs(weighted[row]).max(), weighted[row, pivot])
     if _may_contradict(model, members):
         _yield_to_contradiction(model, point, circuit, switches, shares)
 
@@ -201,9 +195,8 @@ def _yield_to_contradiction(
 def _capacities(limits: Any) -> Vector:
     """Capacities for the split: an unlimited element takes nearly all, one without capacity nearly nothing."""
     given = np.fmax(limits.max(axis=1), 0.0)
-    limited = given[(given < UNLIMITED) & (given > 0.0)]
-    largest = float(limited.max(initial=0.0)) or 1.0
-    return np.clip(given, _SMALL * largest, _LARGE * largest)
+    limited = float(given[given < UNLIMITED].max(initial=0.0)) or 1.0
+    return np.clip(given, _SMALL * limited, _LARGE * limited)
 
 
 def _eliminate(silent: Any, weighted: Any) -> list[int]:
@@ -260,7 +253,7 @@ class Strike:
         before = self._motions()
         # Friction never stops a motion at once; if an importer lets it overrun standstill, that is not an impact.
         limits = capacities(model, point)
-        moving = [k for k in self.entering if before[k] != 0.0 and max(limits[k]) >= UNLIMITED]
+        moving = [k for k in self.entering if max(limits[k]) >= UNLIMITED]
         self.hard = self._stops(before, moving)
         self._rebound = 1.0 if self.hard and not resting else 0.0
         self.knocked: list[int] = []
@@ -294,7 +287,7 @@ class Strike:
     def _stops(self, before: Vector, moving: list[int]) -> bool:
         """Whether the stopped motion exceeds rounding and the error of event location."""
         model, sizes = self.model, np.abs(call(self.model, self.model.variables, self.point))
-        return any(abs(before[k]) > ROUNDING * _largest(model, sizes, model.holds[k].motion) for k in moving)
+        return any(abs(before[k]) > ROUNDING * largest(model, sizes, model.holds[k].motion) for k in moving)
 
     def _book(self, before: Vector, impulses: dict[int, float], approaches: dict[int, float]) -> None:
         """Record losses and changed motions."""
@@ -305,8 +298,8 @@ class Strike:
                 trials = None if self.impacts else self.trials
                 self.impacts.append(Impact(float(self.point.t), self.model.holds[k].component, float(energy), trials))
         change = np.abs(after - before)
-        held = {k for k in holding(self.model, self.point) if k not in self.loose and after[k] == 0.0}
-        bouncing = [k for k in approaches if after[k] != 0.0 and k not in held]
+        held = {k for k in holding(self.model, self.point) if after[k] == 0.0}
+        bouncing = [k for k in approaches if after[k] != 0.0]
         passing = [int(k) for k in np.flatnonzero(change > _FELT * change.max()) if k not in held]
         self.loose = list(dict.fromkeys([*self.loose, *bouncing, *passing]))
 
@@ -336,7 +329,6 @@ class Strike:
     def _unbearable(self, limits: Any, impulses: dict[int, float], reactions: dict[int, float]) -> list[int]:
         """The motions whose reactions exceed the impulsive capacity of their elements."""
         instant = 10.0 * time_resolution(self.point.t)
-        scale = max((abs(one) for one in impulses.values()), default=0.0)
         found: list[int] = []
         for k, impulse in impulses.items():
             own = self.model.holds[k]
@@ -345,7 +337,7 @@ class Strike:
             if own.loose < 0:
                 continue
             margin = max(capacity - sign * reactions[k], 0.0) * instant
-            if abs(impulse) > margin + _SAYS_NOTHING * scale:
+            if abs(impulse) > margin + _SAYS_NOTHING * max(map(abs, impulses.values())):
                 found.append(k)
         return found
 

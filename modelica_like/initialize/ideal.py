@@ -9,7 +9,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import NoValidModes
-from modelica_like.initialize.point import Point, call, solve_implicit
+from modelica_like.initialize.point import Point, call, largest, solve_implicit
 from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.structure.ideal import HEAD, IdealElement, IdealNetwork
 
@@ -33,8 +33,7 @@ def replace_dependent(model: CompiledDae, point: Point) -> None:
         return
     rows = np.zeros((len(network.elements), network.width))
     point.d[network.entries] = rows.ravel()
-    if not _write(model, point, network, rows):
-        return
+    _write(model, point, network, rows)
     moved = _moved(rows)
     if not moved:
         return
@@ -45,21 +44,21 @@ def replace_dependent(model: CompiledDae, point: Point) -> None:
     for k in moved:
         node = _zero(network.elements[k], point.d)
         missed = float(rows[k, HEAD:] @ left)
-        if sizes[node] > _MET * _largest(model, sizes, node):
+        if sizes[node] > _MET * largest(model, sizes, node):
             rows[k, 1] = _IMPULSE * missed
     point.d[network.entries] = rows.ravel()
 
 
-def _write(model: CompiledDae, point: Point, network: IdealNetwork, rows: Vector) -> bool:
-    """Write the rows of the elements whose equations are dependent; tell whether there are any."""
+def _write(model: CompiledDae, point: Point, network: IdealNetwork, rows: Vector) -> None:
+    """Write the rows of the elements whose equations are dependent."""
     own = {one.row: k for k, one in enumerate(network.elements)}
     size = len(model.implicit)
     others = [row for row in range(size) if row not in own]
     matrix = _jacobian(model, point)
-    sizes = np.abs(matrix).max(axis=1, initial=0.0)
+    sizes = np.abs(matrix).max(axis=1)
     found = dict(_dependences(matrix, [*others, *own], sizes))
-    if not found or not own.keys() >= found.keys():
-        return False
+    if not (found and own.keys() >= found.keys()):
+        return
     least = sizes.copy()
     for row, weights in found.items():
         rows[own[row], 0], rows[own[row], HEAD:] = 1.0, weights
@@ -73,7 +72,6 @@ def _write(model: CompiledDae, point: Point, network: IdealNetwork, rows: Vector
             rows[own[row], HEAD - 1] = 1.0
             rows[own[row], HEAD:] = weights[list(found)] @ np.array(list(found.values()))
     point.d[network.entries] = rows.ravel()
-    return True
 
 
 def _jacobian(model: CompiledDae, point: Point) -> Any:
@@ -92,10 +90,10 @@ def _dependences(matrix: Any, order: Sequence[int], sizes: Vector) -> list[tuple
     Returns:
         For every such row, the combination of all rows that vanishes; its own part is one.
     """
-    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    sizes = np.where(sizes, sizes, 1.0)
     work = matrix / sizes[:, None]
-    columns = np.abs(work).max(axis=0, initial=0.0)
-    work /= np.where(columns > 0.0, columns, 1.0)
+    columns = np.abs(work).max(axis=0)
+    work /= np.where(columns, columns, 1.0)
     turns, pivots, found = np.eye(len(work)), list[tuple[int, int]](), list[tuple[int, Vector]]()
     for row in order:
         for earlier, column in pivots:
@@ -119,12 +117,6 @@ def _zero(element: IdealElement, d: Vector) -> int:
     return element.zeros[int(d[element.mode])]
 
 
-def _largest(model: CompiledDae, sizes: Vector, node: int) -> float:
-    """Return the largest size of the variables in the unit of one, at least its nominal value."""
-    own = model.flat_variables[node]
-    return max(own.nominal, *(float(sizes[k]) for k, one in enumerate(model.flat_variables) if one.unit == own.unit))
-
-
 def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool:
     """Move the states so that they meet the conditions of the modes exactly, and end impulses.
 
@@ -143,7 +135,7 @@ def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool
     network = model.ideal
     if network is None:
         return False
-    rows = point.d[network.entries].reshape(-1, network.width).copy()
+    rows = point.d[network.entries].reshape(len(network.elements), network.width).copy()
     moved = _moved(rows)
     if not moved:
         return False
@@ -151,7 +143,7 @@ def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool
     limit = _LOST if keep is None else keep
     for k in moved:
         node = _zero(network.elements[k], point.d)
-        if not rows[k, 1] or abs(values[node]) <= limit * _largest(model, np.abs(values), node):
+        if not rows[k, 1] or abs(values[node]) <= limit * largest(model, np.abs(values), node):
             rows[k, 1] = 0.0
             nodes.append(node)
         elif keep is None:

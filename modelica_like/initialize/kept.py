@@ -60,9 +60,8 @@ def find_kept(model: CompiledDae, point: Point, states: list[int], jacobian: Mat
 
 
 def _lies_in(basis: Matrix, row: Vector) -> bool:
-    """Return whether a row is a combination of orthonormal ones; false for a row of zeros."""
-    size = float(np.linalg.norm(row))
-    return size > 0.0 and bool(np.linalg.norm(row - basis.T @ (basis @ row)) <= _SAME * size)
+    """Return whether a row is a combination of orthonormal ones; a row of zeros is one."""
+    return bool(np.linalg.norm(row - basis.T @ (basis @ row)) <= _SAME * np.linalg.norm(row))
 
 
 def solve_kept(kept: Kept, jacobian: Matrix, right: Matrix, of_held: Matrix) -> Any:
@@ -84,7 +83,5 @@ def solve_kept(kept: Kept, jacobian: Matrix, right: Matrix, of_held: Matrix) -> 
 
 def _orthonormal(rows: Matrix) -> Matrix:
     """Orthonormal rows that span the same space."""
-    if not rows.size:
-        return np.zeros((0, rows.shape[1]))
     _, sizes, right = np.linalg.svd(rows, full_matrices=False)
     return right[sizes > _SAME]

@@ -141,8 +141,8 @@ def _regular(matrix: Any, entries: Vector) -> bool:
         return bool(np.linalg.cond(scaled.full()) < _WELL_CONDITIONED)
     upper = ca.qr_sparse(scaled)[1]
     on_diagonal = np.equal(*upper.sparsity().get_triplet())
-    factor = np.abs(np.array(upper.nonzeros())[on_diagonal])
-    return len(factor) == len(sizes) and bool(factor.max() < _WELL_CONDITIONED * factor.min())
+    factor = np.array(upper.nonzeros())[on_diagonal]  # norms
+    return bool(factor.max() < _WELL_CONDITIONED * factor.min())
 
 
 def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> Any:
@@ -221,8 +221,7 @@ class _Choice:
         if matrix is None:  # each has its own unknown, whatever structure solves it
             for row in range(self.own):
                 self.entries[row][len(self.free) + row] = 1.0
-        added = [self.choice.add(self.entries[row]) for row in range(self.own)]
-        return [row for row, new in enumerate(added) if new or matrix is None]
+        return [row for row in range(self.own) if self.choice.add(self.entries[row])]
 
     def _keep(self, some: bool) -> list[int]:
         """Implicit unknowns that keep their values."""

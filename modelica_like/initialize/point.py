@@ -6,6 +6,7 @@ Evaluate functions there, solve the implicit equations, check that the blocks ar
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import casadi as ca
@@ -53,6 +54,12 @@ def call(model: CompiledDae, function: Any, point: Point) -> Vector:
     return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
 
+def largest(model: CompiledDae, sizes: Vector, node: int) -> float:
+    """Return the largest size of the variables in the unit of one, at least its nominal value."""
+    own = model.flat_variables[node]
+    return max(own.nominal, *(float(sizes[k]) for k, one in enumerate(model.flat_variables) if one.unit == own.unit))
+
+
 def solve_implicit(model: CompiledDae, point: Point) -> None:
     """Solve the implicit equations for z by Newton's method.
 
@@ -67,13 +74,13 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
     for _ in range(_MAX_NEWTON):
         new, condition = fast(point.t, point.x, point.z, model.p, model.u, point.d)
         sizes = np.abs(new - point.z)
-        largest = sizes.max()
-        if not (condition[0] < _WELL_CONDITIONED and largest < np.inf):
+        farthest = sizes.max()
+        if not (condition[0] < _WELL_CONDITIONED and isfinite(farthest)):
             _check_regular(model, point)
         change = float((sizes / (1.0 + np.abs(new))).max())
         point.z = new
         # The residual of a small unknown cannot fall below the rounding of the largest one.
-        if change < 1e-13 or largest <= _ROUNDING * np.abs(new).max():
+        if change < 1e-13 or farthest <= _ROUNDING * np.abs(new).max():
             return
     if not change <= 1e-9:
         raise InitializationError(

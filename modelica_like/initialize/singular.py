@@ -49,7 +49,7 @@ def implicit_singular(model: CompiledDae, point: Place) -> SingularAtStart:
 
     begin, whole = 0, jacobian(model.p)
     for number, block in enumerate(model.implicit_blocks):
-        own = slice(begin, begin + sum(name in block[0] for name in model.implicit[begin:]))
+        own = slice(begin, begin + sum(name in block[0] for name in model.implicit))
         if not is_regular(whole[own, own]):
             return _singular(model, point, number, block, lambda p, own=own: is_regular(jacobian(p)[own, own]))
         begin = own.stop

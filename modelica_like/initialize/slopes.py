@@ -90,10 +90,9 @@ class _Partials:
 
 def _filled(entries: Vector, shape: tuple[int, int], places: Any) -> Vector:
     """Fill a matrix column by column."""
-    if len(places) < shape[0] * shape[1]:
-        given, entries = entries, np.zeros(shape[0] * shape[1])
-        entries[places] = given
-    return entries.reshape(shape, order="F")
+    filled = np.zeros(shape[0] * shape[1])
+    filled[places] = entries
+    return filled.reshape(shape, order="F")
 
 
 def slopes(
@@ -114,8 +113,7 @@ def slopes(
     def make() -> tuple[list[Any], Any]:
         made: ca.Function = getattr(model, name) if function is None else function()
         # Linear equations are solved in numbers.
-        as_numbers = function is not None and not made.is_a("SXFunction")
-        symbols = made.mx_in() if as_numbers else [*model.arguments.values()]
+        symbols = [*model.arguments.values()] if made.is_a("SXFunction") else made.mx_in()
         value = made(*symbols)
         return symbols, value if rows is None else value[list(rows)]
 

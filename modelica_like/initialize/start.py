@@ -39,6 +39,7 @@ class _Sorted:
     Attributes:
         fixed, guesses, defaults: of states; only the first of several fixed ones of a state.
         again: the other fixed ones, each with the first.
+        factors: of all fixed ones.
         implicit: of implicit unknowns, used as first guesses.
     """
 
@@ -46,6 +47,7 @@ class _Sorted:
         direct = direct_starts(model)
         states = [(k, *entry.state) for k, entry in enumerate(model.starts) if entry.state is not None]
         of = {kind: [one for one in states if model.starts[one[0]].strength == kind] for kind in _STRENGTHS}
+        self.factors = {k: factor for k, _, factor in of["fixed"]}
         self.again = [(k, direct[state]) for k, state, _ in of["fixed"] if direct[state] != k]
         self.fixed = _Places(one for one in of["fixed"] if direct[one[1]] == one[0])
         self.guesses, self.defaults = _Places(of["guess"]), _Places(of["default"])
@@ -86,7 +88,7 @@ class StartProblem:
 
     def _compare(self, number: int, earlier: int) -> None:
         """Compare a start value with the earlier one of the same motion."""
-        value, other = (self.given[k] / (self.model.starts[k].state or (0, 1.0))[1] for k in (number, earlier))
+        value, other = (self.given[k] / self._sorted.factors[k] for k in (number, earlier))
         if abs(value - other) > _CONSISTENT * (1.0 + abs(other)):
             raise ContradictingStart(
                 f"{self._told(earlier)} and {self._told(number)} contradict each other: they are the same motion.",
@@ -126,7 +128,7 @@ class StartProblem:
         y = np.zeros(plan.system.function.size1_out(0))
         nx, ny = len(model.states), len(y)
         state = np.concatenate([point.x, y, point.z])
-        error, sizes = np.zeros(len(target)), np.full(len(target), -1.0)
+        error = sizes = np.full(len(target), np.nan)
         system = _Evaluation(model, plan)
         for _ in range(_MAX_NEWTON):
             matrix, values = system(
@@ -138,9 +140,9 @@ class StartProblem:
             step = _solve(matrix, -error)
             state[columns] += step
             sizes = _sizes(matrix, state[columns])
-            if step.size == 0 or np.max(np.abs(step) / (1.0 + np.abs(state[columns]))) < 1e-13:
+            if np.max(np.abs(step) / (1.0 + np.abs(state[columns]))) <= 1e-13:
                 break
-        if not np.all(np.isfinite(state)) or np.max(np.abs(error) / (1.0 + sizes), initial=0.0) > _CONSISTENT:
+        if not np.all(np.abs(error) < _CONSISTENT * (1.0 + sizes)):
             raise self._not_found(plan, point)
         point.x, point.z = state[:nx], state[nx + ny :]
 
@@ -219,8 +221,6 @@ def _sizes(matrix: Any, state: Vector) -> Vector:
 
 def _solve(matrix: Any, right: Vector) -> Vector:
     """Solve a square system; nan where it is singular."""
-    if not right.size:
-        return right
     if isinstance(matrix, ca.DM):
         try:
             return np.array(ca.solve(matrix, ca.DM(right), "csparse")).ravel()

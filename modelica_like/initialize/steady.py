@@ -38,15 +38,15 @@ def solve_steady(model: CompiledDae, point: Point) -> None:
     function = _steady_function(model)
     for _ in range(_MAX_NEWTON):
         value, jacobian = (np.asarray(part.full()) for part in function(*_arguments(model, point)))
-        if not (np.all(np.isfinite(value)) and np.all(np.isfinite(jacobian))):
+        if not np.isfinite(np.hstack([value, jacobian])).all():
             break
         step = _step(model, point, moving, -value.ravel(), jacobian)
         point.x[moving] += step[: len(moving)]
         point.z += step[len(moving) :]
-        if step.size == 0 or np.max(np.abs(step) / (1.0 + np.abs(step))) < 1e-13:
+        if np.abs(step).max(initial=0.0) <= 1e-13:
             break
     residual = np.asarray(function(*_arguments(model, point))[0].full()).ravel()
-    if residual.size and not np.max(np.abs(residual)) <= _STEADY:
+    if not np.abs(residual).max(initial=0.0) <= _STEADY:
         worst = int(np.argmax(np.abs(residual)))
         name = model.states[moving[worst]] if worst < len(moving) else model.implicit[worst - len(moving)]
         raise InitializationError(

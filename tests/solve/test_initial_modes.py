@@ -1,12 +1,17 @@
 """Start values of nonlinear equations, and the modes that follow from start values."""
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
+import modelica_like.initialize as module
 from components import Clutch, ConstantTorque, Inertia
 from modelica_like import simulate
 from modelica_like.errors import InitializationError, SingularAtStart
+from modelica_like.initialize import Point, chosen_modes, started
 from modelica_like.language import (
     Component,
     Discrete,
@@ -114,7 +119,7 @@ def test_modes_and_start_values_that_chase_each_other_are_told(start):
         x: Variable = var("1", "state")
         y: Variable = var("1", "given")
         T: Parameter = param("s", "time", default=1.0)
-        mode = Mode("a", "b")
+        first, mode, last = Mode("on", "off"), Mode("a", "b"), Mode("on", "off")
 
         def equations(self) -> Equations:
             yield self.T * der(self.x) == -self.x
@@ -127,6 +132,24 @@ def test_modes_and_start_values_that_chase_each_other_are_told(start):
     with pytest.raises(InitializationError, match=r"^The modes at the start do not settle: mode and the start values"):
         start(Chasing(y=1.0))
     assert start(Chasing(x=1.0))["mode"] == "b"
+
+
+def test_in_other_modes_a_steady_state_is_sought_from_the_start_values_again(start):
+    """At x = 1 the mode is a, which rests at 10; there it is b, which rests at 2 and 6."""
+
+    class Switching(Component):
+        x: Variable = var("1", "state")
+        T: Parameter = param("s", "time", default=1.0)
+        mode = Mode("a", "b")
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == self.mode.choose(a=10 - self.x, b=-(self.x - 2) * (self.x - 6))
+
+        def events(self) -> Events:
+            yield self.mode.initially("b", when=self.x > 1.5)
+
+    found = start(Switching(x=1.0), "steady")
+    assert (found["x"], found["mode"]) == (pytest.approx(2.0), "b")
 
 
 def test_discrete_values_start_from_numbers_quantities_and_formulas():
@@ -145,3 +168,32 @@ def test_discrete_values_start_from_numbers_quantities_and_formulas():
     run = simulate(Counter(), 1.0, points=1, parameters={"period": "1 s"})
     assert run.final["follows"] == 2.0
     assert simulate(Counter(number=7), 1.0, points=1).final["x"] == 7.0
+
+
+def test_discrete_values_at_the_start_follow_from_modes_and_their_own_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first true condition of a mode wins; of the rows of updates, those at the start count."""
+    rows = [(3, True), (2, False), (4, True)]
+    modes = [(0, 5, None), (1, 6, None), (0, 7, None), (1, 8, None), (1, 9, None)]
+    model: Any = SimpleNamespace(start_conditions="conditions", discrete_starts="starts", updates="updates")
+    model.start_modes = modes
+    model.update_rows = [SimpleNamespace(reset=SimpleNamespace(index=k), at_start=one) for k, one in rows]
+    point = Point(2.0, np.array([3.0]), np.array([4.0]), np.array([1.0, 2.0, 30.0, 40.0, 50.0, 60.0]))
+    d = point.d.tolist()
+
+    def call(owner: Any, function: str, at: Point) -> np.ndarray:
+        assert owner is model
+        assert (at.t, at.x.tolist(), at.z.tolist()) == (2.0, [3.0], [4.0])
+        if function == "conditions":
+            return np.array([1.0, 0.0, 1.0, 1.0, 1.0])
+        if function == "starts":
+            assert at.d.tolist() == d
+            return np.array([-1.0, -2.0, -30.0, -40.0, -50.0, -60.0])
+        assert at.d.tolist() == [5.0, 8.0, 30.0, -40.0, -50.0, 60.0]
+        return np.array([300.0, 200.0, 400.0])
+
+    monkeypatch.setattr(module, "call", call)
+    assert chosen_modes(model, point).tolist() == [5.0, 8.0, 30.0, 40.0, 50.0, 60.0]
+    assert started(model, point).tolist() == [5.0, 8.0, 30.0, 300.0, 400.0, 60.0]
+    model.update_rows = []
+    assert started(model, point).tolist() == [5.0, 8.0, 30.0, 40.0, 50.0, 60.0]
+    assert point.d.tolist() == d

@@ -295,6 +295,7 @@ def test_the_steady_state_depends_on_the_mode_the_guess_chooses(start):
 
     found = start(Rubbing(), "steady", bearing__w=guess(1.0))
     assert found["rotor.w"] == pytest.approx(4.0, rel=1e-12)
+    assert start(Rubbing(), "steady", bearing__w=1.0)["rotor.w"] == pytest.approx(4.0, rel=1e-12)
     assert found["bearing.mode"] == "forward"
     with pytest.raises(InitializationError, match=r"bearing\.mode does not stay stuck"):
         start(Rubbing(), "steady")

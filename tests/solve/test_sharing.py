@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components import Clutch, Inertia
+from components import Clutch, ConstantTorque, Fixed, Inertia
 from modelica_like import Assembly, build
 from modelica_like.initialize import initialize
 from modelica_like.initialize.holds import Strike, _capacities, rest
@@ -48,11 +48,14 @@ def test_an_impulse_is_unbearable_beyond_what_can_be_borne_for_an_instant(
     assert not unbearable(1e-15, 0.0, 0.0, larger=-1.0)  # nothing but rounding
 
 
-@pytest.mark.parametrize(("slip", "left"), [(0.9e-7, 0.0), (-0.9e-7, 0.0), (1.1e-7, 1.1e-7)])
-def test_what_is_held_rests_exactly_where_it_moves_by_rounding_of_the_largest_speed(slip: float, left: float) -> None:
+@pytest.mark.parametrize("speed", [1000.0, -1000.0])
+@pytest.mark.parametrize(("slip", "left"), [(0.9e-7, 0.0), (-0.9e-7, 0.0), (1.1e-7, 1.1e-7), (-1.1e-7, -1.1e-7)])
+def test_what_is_held_rests_exactly_where_it_moves_by_rounding_of_the_largest_speed(
+    slip: float, left: float, speed: float
+) -> None:
     """1e-10 of 1000 rad/s."""
     parts = {
-        "a": Inertia(J=1.0, phi=0.0, w=1000.0),
+        "a": Inertia(J=1.0, phi=0.0, w=speed),
         "c": Clutch(capacity=5.0, phi_rel=0.0, w_rel=0.0),
         "b": Inertia(J=1.0),
     }
@@ -63,3 +66,24 @@ def test_what_is_held_rests_exactly_where_it_moves_by_rounding_of_the_largest_sp
     point.x[state] = slip
     rest(model, point)
     assert point.x[state] == left
+
+
+def test_what_sticks_in_a_steady_start_shares_by_capacities(start: Any) -> None:
+    parts = {"T": ConstantTorque(tau_constant=3.0), "J": Inertia(J=1.0), "g": Fixed()}
+    parts |= {"c": Clutch(capacity=5.0), "e": Clutch(capacity=10.0)}
+    connect = {"a": ["T.flange", "J.flange_a"], "b": ["J.flange_b", "c.flange_a", "e.flange_a"]}
+    connect["h"] = ["c.flange_b", "e.flange_b", "g.flange"]
+    found = start(Assembly("held", parts=parts, connect=connect), "steady")
+    assert (found["c.mode"], found["e.mode"], found["J.w"]) == ("stuck", "stuck", 0.0)
+    assert (found["c.tau"], found["e.tau"]) == pytest.approx((-1.0, -2.0))
+
+
+def test_speeds_that_are_the_same_but_for_rounding_start_without_slip() -> None:
+    assert 0.3 - 3 * 0.1 < 0.0
+    parts = {
+        "a": Inertia(J=1.0, phi=0.0, w=3 * 0.1),
+        "c": Clutch(capacity=5.0, phi_rel=0.0),
+        "b": Inertia(J=1.0, w=0.3),
+    }
+    model = build(Assembly("d", parts=parts, series={"s": list(parts)}))
+    assert initialize(model).x[model.states.index("c.w_rel")] == 0.0

@@ -71,6 +71,10 @@ def test_why_a_block_is_singular(helps: Any, given: Any, why: str, advice: str) 
     assert error.advice.startswith(advice)
 
 
+def test_what_is_held_among_other_equations_may_be_undetermined_for_another_reason() -> None:
+    assert told(["a.tau"], (A, B), holds=HOLDS[:1]).why.startswith("Its equations do not")
+
+
 @pytest.mark.parametrize(
     ("sources", "name", "why"),
     [
@@ -87,7 +91,7 @@ def test_who_prescribes_what_is_held(sources: str, name: str, why: str) -> None:
 
 @pytest.mark.parametrize(("slope", "named"), [(-1.0, True), (1.0, True), (1e-13, False), (-1e-13, False)])
 def test_a_determinant_of_any_sign_is_regular(slope: float, named: bool) -> None:
-    determinants = lambda t, x, z, p, u, d: ca.DM([0, slope * p[0]])  # noqa: E731
+    determinants = lambda t, x, z, p, u, d: ca.DM([0, (t == 0.0) * len(x) * slope * p[0]])  # noqa: E731
     error = singular_block(model(determinants=determinants, singular=[None, (("x",), (A,))]), POINT, 1)
     assert error.why.startswith("a.k is zero") == named
 
@@ -95,9 +99,10 @@ def test_a_determinant_of_any_sign_is_regular(slope: float, named: bool) -> None
 def test_the_first_implicit_block_that_is_singular_is_told() -> None:
     def of(*diagonal: float) -> SingularAtStart:
         blocks = [((name,), (A,)) for name in "xyz"]
-        jacobian = lambda *_: ca.diag(ca.DM(diagonal))  # noqa: E731
+        jacobian = lambda t, x, *_: (t == 0.0) * len(x) * ca.diag(ca.DM(diagonal))  # noqa: E731
         return implicit_singular(model(alg_jacobian=jacobian, implicit=(*"xyz",), implicit_blocks=blocks), POINT)
 
+    assert "in block 1 (x)." in of(0, 1, 1).what
     assert "in block 2 (y)." in of(1, 0, 0).what
     assert "in block 3 (z)." in of(1, 1, np.nan).what
     assert of(1, 1, 1).what == "The equations for x, y, z have no finite value at t = 0 s."
@@ -133,6 +138,9 @@ def test_generic_points_are_moved_but_rates_are_not() -> None:
     size = 1 + np.array([3.0, 1.0, 3.0, 1.0])
     moved = (found[[0, 1, 4, 5]] - [3, -1, 3, -1]) / size
     assert ((moved[[0, 2, 3]] >= 0.05) & (moved[[0, 2, 3]] <= 0.1)).all()
+    free = np.diag(at(1.0, ()).full())
+    parts = [*(free[[0, 1, 4, 5]] - [3, -1, 3, -1]) / size / 0.1, *free[2:4]]
+    assert (min(parts) >= 0.5, max(parts) <= 1.0, len({*np.round(parts, 6)})) == (True, True, 6)
 
 
 class Root(Component):

@@ -17,6 +17,8 @@ def test_what_is_far_from_singular(size: int) -> None:
     chain = 2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1)
     last = np.eye(size)[-1]
     assert regular(np.eye(size))
+    assert regular(-np.eye(size))
+    assert regular(np.diag((-1.0) ** np.arange(size)))
     assert regular(chain)
     assert regular(10.0 ** np.linspace(-9, 9, size)[:, None] * chain)  # rows have units of their own
     loop = chain.copy()
@@ -25,6 +27,7 @@ def test_what_is_far_from_singular(size: int) -> None:
     assert not regular(loop + 1e-13 * np.outer(last, last))
     assert regular(loop + 1e-2 * np.outer(last, last))
     assert not regular(chain * (1 - np.outer(last, np.ones(size))))  # an equation without unknowns
+    assert not regular(chain * (1 - np.outer(np.ones(size), last)))  # an unknown without equations
     assert not regular(np.where(np.eye(size) > 0, np.inf, chain))
 
 

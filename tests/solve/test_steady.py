@@ -1,0 +1,231 @@
+"""Steady states: Newton's method, conserved quantities, modes that do not stay; against closed forms."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from modelica_like import build
+from modelica_like.errors import InitializationError, Source
+from modelica_like.initialize import initialize, steady
+from modelica_like.initialize.kept import Kept
+from modelica_like.initialize.point import Point
+from modelica_like.initialize.steady import (
+    check_modes_hold,
+    modes_between,
+    moving_states,
+    solve_steady,
+    steady_change,
+)
+from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, sqrt, var
+
+
+class Levels(Component):
+    """a settles at 2 or r, b and c exchange what they have until b = k·c, nothing depends on s; z + z³ = a + b."""
+
+    a: Variable = var("1", "level")
+    b: Variable = var("1", "level")
+    c: Variable = var("1", "level")
+    s: Variable = var("s", "integral")
+    h: Variable = var("1", "sum of b and c beyond r")
+    z: Variable = var("1", "implicit")
+    T: Parameter = param("s", "time", default=1.0)
+    k: Parameter = param("1", "ratio", default=3.0)
+    r: Parameter = param("1", "root", default=6.0)
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.a) == -(self.a - 2) * (self.a - self.r)
+        yield self.T * der(self.b) == self.k * self.c - self.b
+        yield self.T * der(self.c) == self.b - self.k * self.c
+        yield der(self.s) == self.z
+        yield self.h == self.b + self.c - self.r
+        yield self.z + self.z**3 == self.a + self.b
+
+
+def levels(a: float) -> tuple[Any, Point]:
+    model = build(Levels(a=guess(a), b=5.0, c=1.0, s=11.0))
+    return model, initialize(model, 0.0, "steady")
+
+
+@pytest.mark.parametrize(("begins", "root"), [(9.0, 6.0), (4.5, 6.0), (3.5, 2.0), (-7.0, 2.0)])
+def test_newton_finds_the_next_root_and_keeps_what_is_conserved(begins: float, root: float) -> None:
+    model, point = levels(begins)
+    found = dict(zip(model.states, point.x, strict=True))
+    wanted = {"a": root, "b": 4.5, "c": 1.5, "s": 11.0}
+    assert found == pytest.approx(wanted, rel=1e-13)
+    (z,) = [one.real for one in np.roots([1, 0, 1, -root - 4.5]) if abs(one.imag) < 1e-9]
+    assert point.z == pytest.approx([z], rel=1e-13)
+    assert [model.states[k] for k in moving_states(model)] == ["a", "b", "c"]
+
+
+@pytest.mark.parametrize(("error", "steps"), [(4e-7, 2), (-4e-7, 2), (1e-6, 3)])
+def test_newton_ends_when_only_rounding_moves(monkeypatch: pytest.MonkeyPatch, error: float, steps: int) -> None:
+    """A step leaves a quarter of the squared error: 4e-14 is rounding, 2.5e-13 is not."""
+    model, point = levels(6.0)
+    calls: list[int] = []
+    function = steady._steady_function(model)
+    monkeypatch.setattr(steady, "_steady_function", lambda _: lambda *at: calls.append(1) or function(*at))
+    point.x[model.states.index("a")] += error
+    solve_steady(model, point)
+    assert len(calls) == steps + 1  # and the residual at the end
+
+
+def told(model: Component) -> str:
+    with pytest.raises(InitializationError) as caught:
+        initialize(build(model), 0.0, "steady")
+    return caught.value.what.removeprefix("No steady state was found at t = 0 s: ")
+
+
+def test_what_changes_most_is_told() -> None:
+    class Pushed(Component):
+        """Least squares of both rates are at y = 3.4: they are -2.4/s and 1.2/s."""
+
+        x: Variable = var("1", "state", default=0.0)
+        y: Variable = var("1", "state", default=0.0)
+        v: Variable = var("1", "depends on x")
+        T: Parameter = param("s", "time", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.y) == 8 - 2 * self.y
+            yield self.T * der(self.x) == 1 - self.y + 0 * self.v
+            yield self.v + self.v**3 == self.x
+
+    class Rootless(Component):
+        x: Variable = var("1", "state", default=0.0)
+        y: Variable = var("1", "implicit", default=guess(0.4))
+        z: Variable = var("1", "implicit", default=guess(0.4))
+        T: Parameter = param("s", "time", default=1.0)
+        a: Parameter = param("1", "of y", default=1.0)
+        b: Parameter = param("1", "of z", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == self.y - self.x
+            yield self.y**2 + self.y == self.a
+            yield self.z**2 + self.z == self.b
+
+    class Falling(Component):
+        x: Variable = var("1", "state", default=0.4)
+        T: Parameter = param("s", "time", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == -3 - self.x**2
+
+    assert told(Pushed()) == "x keeps changing."
+    assert told(Rootless(a=-3.0)) == "y keeps changing."
+    assert told(Rootless(b=-3.0)) == "z keeps changing."
+    assert told(Falling()) == "x keeps changing."
+
+
+def test_a_guess_where_a_rate_or_a_slope_is_not_finite_is_told() -> None:
+    class Root(Component):
+        x: Variable = var("1", "state")
+        y: Variable = var("1", "state", default=0.0)
+        T: Parameter = param("s", "time", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.y) == self.x - self.y
+            yield self.T * der(self.x) == 1 - sqrt(self.x)
+
+    for begins in (0.0, -1.0):
+        assert told(Root(x=guess(begins))) == "x keeps changing."
+
+
+def test_changes_of_a_steady_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By r, k and T, and by changes of the states: b + c = S is conserved, and c = S/(1 + k)."""
+    model, point = levels(9.0)
+    position = [model.parameter_position[name] for name in ("r", "k", "T")]
+    theta = np.zeros((len(model.p) + len(model.u) + model.discrete_size, 4))
+    theta[position, range(3)] = 1.0
+    theta[position, 3] = 0.25, 0.5, 2.0
+    a, b, c, s = (model.states.index(name) for name in "abcs")
+
+    def changed(moved: np.ndarray | None = None) -> np.ndarray:
+        return steady_change(model, point, theta, moved)[[a, b, c, s]]
+
+    np.testing.assert_allclose(changed(), [
+        [1.0, 0.0, 0.0, 0.25], [0.0, 6 / 16, 0.0, 3 / 16], [0.0, -6 / 16, 0.0, -3 / 16], [0.0] * 4,
+    ], atol=1e-13)  # fmt: skip
+    moved = np.zeros((len(model.states), 4))
+    moved[:, 1:] = np.array([5.0, 3.0, 1.0, -2.0])[np.argsort([a, b, c, s])][:, None]
+    more = np.outer([0.0, 3.0, 1.0, -2.0], [0.0, 1.0, 1.0, 1.0])
+    before = moved.copy()
+    np.testing.assert_allclose(changed(moved), changed() + more, atol=1e-13)
+    assert (moved == before).all()
+
+    # If h is held, b + c follows r, whatever moves.
+    free, rows = changed(), np.eye(4)[[b, c]].sum(axis=0)[None, moving_states(model)]
+    kept = Kept((model.position["h"],), np.zeros(1), rows)
+    monkeypatch.setattr(steady, "find_kept", lambda *_: kept)
+    by_r = np.outer([0.0, 0.75, 0.25, 0.0], [1.0, 0.0, 0.0, 0.25])
+    np.testing.assert_allclose(changed(), free + by_r, atol=1e-13)
+    of_s = np.outer([0.0, 0.0, 0.0, -2.0], [0.0, 1.0, 1.0, 1.0])
+    np.testing.assert_allclose(changed(moved), free + by_r + of_s, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "present", "chosen", "wanted"),
+    [
+        (1.0, -2.0, 0, 2, 1),  # it turns: between lies rest
+        (-1.0, 0.2, 2, 0, 1),
+        (1.0, 2.0, 0, 2, 2),
+        (-1.0, -2.0, 2, 0, 0),
+        (0.5, 0.5, 0, 2, 2),
+        (0.0, 2.0, 0, 2, 2),
+        (1.0, 0.0, 0, 2, 2),
+        (1.0, -2.0, 0, 0, 0),  # its mode stays
+        (1.0, -2.0, 0, 1, 1),
+        (1.0, -2.0, 1, 2, 1),
+    ],
+)
+def test_what_turns_on_the_way_rests(
+    monkeypatch: pytest.MonkeyPatch, before: float, after: float, present: int, chosen: int, wanted: int
+) -> None:
+    """Of two motions the second one stays as it is; mode 1 holds."""
+    holds = [SimpleNamespace(motion=k, mode=k, number=1) for k in (2, 1)]
+    model: Any = SimpleNamespace(holds=holds, variables=SimpleNamespace())
+    begin: Any = SimpleNamespace(values=np.array([9.0, 1.0, before]))
+    end: Any = SimpleNamespace(values=np.array([-9.0, 1.0, after]), d=np.array([3.0, 0.0, present]))
+
+    def values(*given: Any) -> np.ndarray:
+        assert given[:2] == (model, model.variables)
+        return given[2].values
+
+    monkeypatch.setattr(steady, "call", values)
+    modes = np.array([3.0, 2.0, chosen])
+    assert modes_between(model, begin, end, modes).tolist() == [3.0, 2.0, wanted]
+    assert modes.tolist() == [3.0, 2.0, chosen]
+
+
+@pytest.mark.parametrize(
+    ("changes", "leaves"),
+    [
+        ({}, True),
+        ({"timed": True}, False),
+        ({"sources": (0, 2)}, False),
+        ({"target": 1}, False),
+        ({"index": 0}, False),  # its guard is negative
+        ({"index": 1}, False),  # zero: at the limit, it stays
+        ({"index": 3}, True),
+    ],
+)
+def test_a_mode_that_ends_at_once_is_told(monkeypatch: pytest.MonkeyPatch, changes: Any, leaves: bool) -> None:
+    """The last transition counts; the first one is of a mode that is not present."""
+    model: Any = SimpleNamespace(guards=SimpleNamespace())
+    given = {"mode": 1, "timed": False, "sources": (1,), "target": 2, "index": 2, "source": Source("drive.toml")}
+    other = {**given, "mode": 0}
+    model.transitions = [SimpleNamespace(**{**one, **changes}) for one in (other, given)]
+    names = ("forward", "stuck", "backward")
+    model.flat_discretes = [SimpleNamespace(path=path, names=names) for path in ("a.mode", "b.mode")]
+    point: Any = SimpleNamespace(t=2.0, d=np.array([3.0, 1.0]))
+
+    def guards(*given: Any) -> np.ndarray:
+        assert given == (model, model.guards, point)
+        return np.array([-1.0, 0.0, 2.0, 0.5])
+
+    monkeypatch.setattr(steady, "call", guards)
+    if leaves:
+        with pytest.raises(InitializationError, match=r"at t = 2 s: b\.mode does not stay stuck\."):
+            check_modes_hold(model, point)
+    else:
+        check_modes_hold(model, point)
