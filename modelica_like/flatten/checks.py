@@ -50,7 +50,7 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
     if not component.parts:
         for name, connector in component.connectors.items():
             if connector.used:
-                flows += [f"{name}.{n}" for n, f in connector.fields.items() if isinstance(f, Variable) and f.is_flow]
+                flows += [f"{name}.{n}" for n, f in connector.quantities.items() if f.is_flow]
     if len(equations) == len(own) + len(flows) or (component.parts and not own and not equations):
         return
     unknowns = [*own, *flows]

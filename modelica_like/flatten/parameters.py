@@ -12,6 +12,7 @@ from modelica_like.errors import CyclicAssembly, MissingValue, ValueOutOfRange
 from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.dimensions import Dimensions, check_expression
 from modelica_like.flatten.model import FlatParameter
+from modelica_like.flatten.template import column
 from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id
@@ -127,9 +128,8 @@ class Parameters:
         return symbol
 
     def _with_numbers(self, expression: Any) -> Any:
-        found = [self._quantities[key] for leaf in ca.symvar(expression) if (key := leaf_id(leaf)) in self._quantities]
-        symbols, numbers = ca.vertcat(*(one[0] for one in found)), ca.DM([one[1] for one in found])
-        return ca.substitute(expression, symbols, ca.SX(numbers)) if found else expression
+        found = [one for one in ca.symvar(expression) if leaf_id(one) in self._quantities]
+        return ca.substitute(expression, column(found), column(self._quantities[leaf_id(one)][1] for one in found))
 
     def _unit_of_leaf(self, leaf: Any) -> Unit:
         key = leaf_id(leaf)
@@ -173,19 +173,18 @@ class Parameters:
         Raises:
             ValueOutOfRange: one is not finite, or outside its min and max.
         """
-        if self.derived:
-            numbers = ca.Function("derived", [self.symbols()], [self.formulas()])([one.value for one in self.flat])
-            pairs = zip(self.derived, numbers.full().ravel(), strict=True)
-            self.derived = [replace(one, value=one.checked(float(number), f"{number:g}")) for one, number in pairs]
+        numbers = ca.Function("derived", [self.symbols()], [self.formulas()])([one.value for one in self.flat])
+        pairs = zip(self.derived, numbers.full().ravel(), strict=True)
+        self.derived = [replace(one, value=one.checked(float(number), f"{number:g}")) for one, number in pairs]
 
     def formulas(self) -> Any:
         """Return the expressions of the parameters that follow from others."""
-        return ca.vertcat(*self._formulas) if self._formulas else ca.SX(0, 1)
+        return column(self._formulas)
 
     def symbols(self) -> Any:
         """Return the vector p."""
-        return ca.vertcat(*self._symbols) if self._symbols else ca.SX(0, 1)
+        return column(self._symbols)
 
     def expressions(self) -> Any:
         """Return the vector q."""
-        return ca.vertcat(ca.SX(0, 1), *self._q)
+        return column(self._q)
