@@ -19,7 +19,8 @@ UnitOf = Callable[[Any], Unit]
 
 _SUMS = {ca.OP_ADD, ca.OP_SUB, ca.OP_FMIN, ca.OP_FMAX, ca.OP_FMOD, ca.OP_HYPOT, ca.OP_COPYSIGN, ca.OP_REMAINDER}
 _SAME = {ca.OP_NEG, ca.OP_FABS, ca.OP_TWICE, ca.OP_ASSIGN}
-_RELATIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
+_COMPARED = dict.fromkeys((ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE), "the sides of a comparison")
+_COMPARED[ca.OP_ATAN2] = "the coordinates of an angle"
 _PLAIN = {ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN}
 _POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction(-1)}
 
@@ -32,7 +33,6 @@ class _Clash(Exception):
     """Two terms of a sum or a relation differ."""
 
     def __init__(self, left: Unit, right: Unit, what: str) -> None:
-        super().__init__(what)
         self.left, self.right, self.what = left, right, what
 
 
@@ -53,7 +53,7 @@ class Dimensions:
 
     def unit(self, expression: Expr | float) -> Unit:
         """Return the unit of an expression; zero and unknown units fit everything."""
-        root: Any = expression if isinstance(expression, ca.SX) else ca.SX(cast(Any, expression))
+        root: Any = ca.SX(cast(Any, expression))
         pending = [root]
         while pending:
             node = pending[-1]
@@ -87,30 +87,27 @@ class Dimensions:
                 raise _NotANumber
             return ANY if float(node) == 0.0 else ONE
         operation = node.op()
-        if operation == ca.OP_ADD and all(map(_is_choice, operands)):
-            return units[0] if _MIXED not in units and same_dimension(*units) else _MIXED
+        if operation == ca.OP_ADD and all(map(_is_choice, operands)) and (_MIXED in units or not same_dimension(*units)):
+            return _MIXED
         if operation in _SUMS:
-            return _common(units[0], units[1], "the terms of a sum")
-        if operation == ca.OP_ATAN2:
-            _common(units[0], units[1], "the coordinates of an angle")
-            return ONE
-        if operation in _RELATIONS:
-            _common(units[0], units[1], "the sides of a comparison")
+            return _common(*units, "the terms of a sum")
+        if operation in _COMPARED:
+            _common(*units, _COMPARED[operation])
             return ONE
         if operation in _PLAIN:
             return ONE
         if operation in _SAME:
             return units[0]
         if operation == ca.OP_MUL:
-            return _times(units[0], units[1])
+            return _times(*units)
         if operation == ca.OP_DIV:
-            return _times(units[0], units[1] if units[1] == ANY else units[1] ** -1)
+            return _times(*units, -1)
         if operation in _POWERS:
-            return ANY if units[0] == ANY else units[0] ** _POWERS[operation]
+            return _times(ONE, *units, _POWERS[operation])
         if operation == ca.OP_IF_ELSE_ZERO:
             return units[1]
         if operation in (ca.OP_POW, ca.OP_CONSTPOW):
-            return _power(units[0], units[1], operands[1])
+            return _power(*units, operands[1])
         for unit in units:
             _common(unit, ONE, "the argument of a function and a number")
         return ONE
@@ -129,16 +126,16 @@ def _common(left: Unit, right: Unit, what: str) -> Unit:
     return right if left == ANY else left
 
 
-def _times(left: Unit, right: Unit) -> Unit:
+def _times(left: Unit, right: Unit, power: float | Fraction = 1) -> Unit:
     if _MIXED in (left, right):
         raise _Clash(left, right, "the factors of a product")
-    return ANY if ANY in (left, right) else left * right
+    return left * right**power
 
 
 def _power(base: Unit, exponent_unit: Unit, exponent: Any) -> Unit:
     _common(exponent_unit, ONE, "an exponent and a number")
     if exponent.is_constant():
-        return ANY if base == ANY else base ** Fraction(float(exponent)).limit_denominator(60)
+        return _times(ONE, base, Fraction(float(exponent)).limit_denominator(60))
     return _common(base, ONE, "the base of a variable power and a number")
 
 
