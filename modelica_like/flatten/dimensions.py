@@ -87,8 +87,8 @@ class Dimensions:
                 raise _NotANumber
             return ANY if float(node) == 0.0 else ONE
         operation = node.op()
-        if operation == ca.OP_ADD and all(map(_is_choice, operands)) and (_MIXED in units or not same_dimension(*units)):
-            return _MIXED
+        if operation == ca.OP_ADD and all(map(_is_choice, operands)):
+            return _MIXED if _MIXED in units or not same_dimension(*units) else _common(*units, "")
         if operation in _SUMS:
             return _common(*units, "the terms of a sum")
         if operation in _COMPARED:

@@ -27,8 +27,8 @@ SUMS: dict[str, Callable[[Any, Any], Any]] = {
 PLAIN: dict[str, Callable[[Any], Any]] = {"sin": ca.sin, "exp": ca.exp, "tanh": ca.tanh, "log": ca.log}
 KEPT: dict[str, Callable[[Any], Any]] = {"neg": lambda a: -a, "abs": ca.fabs, "twice": lambda a: 2 * a}
 POWERS: dict[str, tuple[Callable[[Any], Any], Fraction]] = {
-    "square": (lambda a: a**2, Fraction(2)), "root": (ca.sqrt, Fraction(1, 2)), "inverse": (lambda a: 1 / a, Fraction(-1)),
-    "cube": (lambda a: a**3, Fraction(3)), "third": (lambda a: a ** (1 / 3), Fraction(1, 3)),
+    "square": (lambda a: a**2, Fraction(2)), "root": (ca.sqrt, Fraction(1, 2)), "cube": (lambda a: a**3, Fraction(3)),
+    "inverse": (lambda a: 1 / a, Fraction(-1)), "third": (lambda a: a ** (1 / 3), Fraction(1, 3)),
 }  # fmt: skip
 
 
@@ -114,7 +114,7 @@ trees = st.recursive(leaves, branches, max_leaves=5)
 
 
 @given(trees)
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=200)
 def test_units_are_those_of_exponents(tree):
     written = Written()
     expression, unit = written.write(tree)
@@ -161,6 +161,6 @@ def test_a_number_that_is_none_is_told():
 def test_deep_expressions_need_no_deep_stack():
     written = Written()
     deep = leaf = written.leaf("m")[0]
-    for _ in range(3000):
+    for _ in range(1500):
         deep = ca.sqrt(deep * leaf) + leaf
     assert str(written.dimensions.unit(deep)) == "m"
