@@ -8,6 +8,7 @@ import casadi as ca
 
 from modelica_like.errors import LanguageError, Source
 from modelica_like.language.discrete import moves
+from modelica_like.language.expr import operands
 
 JUST_TRUE = 1e-300
 """Guard of a relation with equality, where both sides are equal."""
@@ -26,12 +27,13 @@ def guard_of(condition: Any, source: Source, *, negated: bool = False) -> Any:
     """
     operation = condition.op() if isinstance(condition, ca.SX) else None
     if operation == ca.OP_NOT:
-        return guard_of(condition.dep(0), source, negated=not negated)
+        return guard_of(*operands(condition), source, negated=not negated)
     if operation in (ca.OP_AND, ca.OP_OR):
         join = ca.fmin if (operation == ca.OP_AND) != negated else ca.fmax
-        return join(*(guard_of(condition.dep(k), source, negated=negated) for k in (0, 1)))
+        return join(*(guard_of(one, source, negated=negated) for one in operands(condition)))
     if operation in (ca.OP_LT, ca.OP_LE):
-        difference = condition.dep(1) - condition.dep(0) if not negated else condition.dep(0) - condition.dep(1)
+        first, second = operands(condition)
+        difference = first - second if negated else second - first
         if (operation == ca.OP_LT) != negated:
             return difference
         # A sum, so that its rate is that of the difference: a relation that stops being true now does not count.

@@ -11,7 +11,7 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError, Source, UnitMismatch
-from modelica_like.language.expr import Expr
+from modelica_like.language.expr import Expr, operands
 from modelica_like.units import ANY, ONE, Unit, same_dimension
 
 UnitOf = Callable[[Any], Unit]
@@ -25,6 +25,8 @@ _PLAIN = {ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN}
 _POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction(-1)}
 
 
+_FINEST = 60
+"""Largest denominator of an exponent; a power of a number can have any."""
 _MIXED = Unit((("different units in different modes", 1),))
 """Sum of a mode's branches with different units: valid only in an equation with zero."""
 
@@ -56,20 +58,15 @@ class Dimensions:
         root: Any = ca.SX(cast(Any, expression))
         pending = [root]
         while pending:
-            node = pending[-1]
-            key = node.element_hash()
-            if key in self._known:
-                pending.pop()
-                continue
-            operands = [] if node.is_leaf() else [node.dep(k) for k in range(node.n_dep())]
-            open_operands = [dep for dep in operands if dep.element_hash() not in self._known]
-            if open_operands:
-                pending.extend(open_operands)
-                continue
-            units = [self._known[dep.element_hash()][1] for dep in operands]
-            # The node itself is kept too, so that no other node can get its identity.
-            self._known[key] = (node, self._of_node(node, operands, units))
-            pending.pop()
+            node = pending.pop()
+            parts = operands(node)
+            unknown = [one for one in parts if one.element_hash() not in self._known]
+            if unknown:
+                pending += [node, *unknown]
+            elif node.element_hash() not in self._known:
+                units = [self._known[one.element_hash()][1] for one in parts]
+                # The node itself is kept too, so that no other node can get its identity.
+                self._known[node.element_hash()] = (node, self._of_node(node, parts, units))
         return self._known[root.element_hash()][1]
 
     def unit_or_any(self, expression: Expr | float) -> Unit:
@@ -79,15 +76,15 @@ class Dimensions:
         except (_Clash, _NotANumber):
             return ANY
 
-    def _of_node(self, node: Any, operands: list[Any], units: list[Unit]) -> Unit:
+    def _of_node(self, node: Any, parts: list[Any], units: list[Unit]) -> Unit:
         if node.is_symbolic():
             return self._unit_of(node)
-        if not operands:
+        if not parts:
             if math.isnan(float(node)):
                 raise _NotANumber
             return ANY if float(node) == 0.0 else ONE
         operation = node.op()
-        if operation == ca.OP_ADD and all(map(_is_choice, operands)):
+        if operation == ca.OP_ADD and all(map(_is_choice, parts)):
             return _MIXED if _MIXED in units or not same_dimension(*units) else _common(*units, "")
         if operation in _SUMS:
             return _common(*units, "the terms of a sum")
@@ -107,7 +104,7 @@ class Dimensions:
         if operation == ca.OP_IF_ELSE_ZERO:
             return units[1]
         if operation in (ca.OP_POW, ca.OP_CONSTPOW):
-            return _power(*units, operands[1])
+            return _power(*units, parts[1])
         for unit in units:
             _common(unit, ONE, "the argument of a function and a number")
         return ONE
@@ -116,7 +113,7 @@ class Dimensions:
 def _is_choice(node: Any) -> bool:
     """Tell whether a term comes from `Mode.choose`."""
     while node.op() == ca.OP_ADD:
-        node = node.dep(1)
+        *_, node = operands(node)
     return node.op() == ca.OP_IF_ELSE_ZERO
 
 
@@ -135,7 +132,7 @@ def _times(left: Unit, right: Unit, power: float | Fraction = 1) -> Unit:
 def _power(base: Unit, exponent_unit: Unit, exponent: Any) -> Unit:
     _common(exponent_unit, ONE, "an exponent and a number")
     if exponent.is_constant():
-        return _times(ONE, base, Fraction(float(exponent)).limit_denominator(60))
+        return _times(ONE, base, Fraction(float(exponent)).limit_denominator(_FINEST))
     return _common(base, ONE, "the base of a variable power and a number")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from modelica_like.language.expr import Symbol, symbols_in
+from modelica_like.language.expr import Symbol, operands, symbols_in
 from modelica_like.language.fields import Parameter
 from modelica_like.language.mode import Mode, Transition
 
@@ -41,8 +41,8 @@ def _condition(condition: Any, path: Callable[[Symbol], str], *, turned: bool = 
     """Say a condition, or (`turned`) its opposite."""
     operation = condition.op()
     if operation == ca.OP_NOT:
-        return _condition(condition.dep(0), path, turned=not turned)
-    sides = [condition.dep(k) for k in range(condition.n_dep())]
+        return _condition(*operands(condition), path, turned=not turned)
+    sides = operands(condition)
     if operation in (ca.OP_AND, ca.OP_OR):
         both = (operation == ca.OP_AND) != turned
         parts = [_condition(one, path, turned=turned) for one in sides]

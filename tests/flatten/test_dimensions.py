@@ -145,6 +145,7 @@ def test_a_choice_of_three_is_one_choice():
     assert str(written.dimensions.unit(three)) == "m"
     mixed = ca.if_else(k == 0, a, 0) + ca.if_else(k == 1, k, 0) + ca.if_else(k == 2, c, 0)
     check_equation(mixed, ca.SX(0), written.dimensions, "It", NOWHERE)
+    check_equation(written.leaf("*")[0] - mixed, ca.SX(0), written.dimensions, "It", NOWHERE)
     for wrong in (ca.if_else(k == 0, a, 0) + k, k + ca.if_else(k == 0, a, 0), mixed - mixed * k):
         with pytest.raises(UnitMismatch, match="differ"):
             check_expression(wrong, ONE, written.dimensions, "it")
