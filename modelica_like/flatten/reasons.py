@@ -72,7 +72,7 @@ def _side(expression: Any, path: Callable[[Symbol], str]) -> str:
     (plain,) = ca.substitute([expression], [ca.vertcat(*symbols)], [ca.vertcat(*named)])
     told = re.sub(r"(?<![\w.])\d[\d.]*(e[+-]?\d+)?", lambda number: f"{float(number[0]):g}", str(plain))
     told = re.sub(r"\(([\w.]+[*/][\w.]+)\)", r"\1", re.sub(r"fabs\(([^()]*)\)", r"|\1|", told))
-    told = told[1:-1] if told.startswith("(") and expression.n_dep() > 1 else told
+    told = re.sub(r"^\((.*)\)$", r"\1", told)
     field = _field(symbols[0])
     if plain.is_symbolic() and isinstance(field, Parameter):
         return f"{{{told}}}"

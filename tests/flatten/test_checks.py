@@ -179,6 +179,17 @@ def test_one_value_alone_or_another_error_is_told_by_its_equation():
         flatten(Odd(a=1, b=1))
 
 
+def test_a_declared_unit_stays_as_it_is_written():
+    class Power(Component):
+        k: Parameter = param("N.m.rad/s", "power", default=1.0)
+        P: Variable = var("W", "power")
+
+        def equations(self) -> Equations:
+            yield self.P == self.k
+
+    assert str(flatten(Power()).variables[0].unit) == "W"
+
+
 def test_the_first_equation_of_an_output_decides():
     class Twice(Component):
         a: Parameter = param("m", "length", default=1.0)
