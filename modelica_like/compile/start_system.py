@@ -32,7 +32,7 @@ class StartSystem:
     rates: tuple[int, ...] = ()
 
 
-def start_system(reduced: ReducedDae, rest: bool = False) -> StartSystem:
+def start_system(reduced: ReducedDae, rest: bool) -> StartSystem:
     """Build the start system.
 
     A variable such as the speed of the last mass of a chain is the sum of all relative speeds. Written out, N such

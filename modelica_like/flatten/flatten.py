@@ -297,7 +297,7 @@ class _Flattener:
             if component is self.root or self._is_open(component, name):
                 self.inputs.append(node)
             elif component.value(name) is not None:
-                value = self.parameters.q(self.parameters.declare(component, name, path))
+                value = self.parameters.q(self.parameters.position(component, name))
                 self.linear.append(LinearEquation(((node, 1.0),), -value, Origin(path, "value", _WIRE)))
             else:
                 what, advice = f"{path} is an input without a value.", "Connect it or give it a value."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import casadi as ca
 
@@ -17,7 +17,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id
 from modelica_like.language.fields import Input, Parameter, Value
-from modelica_like.units import ONE, Unit, coherent, read_quantity
+from modelica_like.units import Unit, coherent, read_quantity
 
 
 class Parameters:
@@ -73,8 +73,7 @@ class Parameters:
         unit = coherent(unit_of_field(component, name))
         read = read_quantity(value.given) if field.unit_text == "*" and isinstance(value.given, str) else None
         tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
-        number = value.number if value.number is not None else 0.0
-        bounds, written = (field.min, field.max), read[1] if read else None
+        number, bounds, written = cast(float, value.number), (field.min, field.max), read[1] if read else None
         self.flat.append(FlatParameter(path, unit, field.description, number, *bounds, tunable, above, written))
         self._symbols.append(symbol)
         return symbol
@@ -122,9 +121,12 @@ class Parameters:
 
     def _quantity(self, text: str) -> Any:
         """Return a symbol for a number with a unit, so that the unit is checked with the formula."""
-        number, unit = read_quantity(text) or (math.nan, ONE)
+        number, unit = cast("tuple[float, Unit]", read_quantity(text))
+        return self._constant(text, number * unit.factor + unit.offset, unit)
+
+    def _constant(self, text: str, number: float, unit: Unit) -> Any:
         symbol = ca.SX.sym(text)
-        self._quantities[leaf_id(symbol)] = symbol, number * unit.factor + unit.offset, unit
+        self._quantities[leaf_id(symbol)] = symbol, number, unit
         return symbol
 
     def _with_numbers(self, expression: Any) -> Any:
@@ -142,7 +144,9 @@ class Parameters:
         if not isinstance(field, Parameter | Input):
             known = [key for key, one in owner.fields.items() if isinstance(one, Parameter)]
             raise unknown("parameter", f"{label}: {owner.label}", path, known)
-        return self._q[self.position(owner, name)]
+        found = self._q[self.position(owner, name)]
+        # A constant has a unit, too.
+        return self._constant(path, float(found), unit_of_field(owner, name)) if found.is_constant() else found
 
     def position(self, component: Component, name: str) -> int:
         """Return the position of a parameter in q.
@@ -163,9 +167,9 @@ class Parameters:
             )
         return position
 
-    def q(self, position: int | None) -> Any:
+    def q(self, position: int) -> Any:
         """Return one entry of q."""
-        return 0.0 if position is None else self._q[position]
+        return self._q[position]
 
     def check_derived(self) -> None:
         """Compute the parameters that follow from others.

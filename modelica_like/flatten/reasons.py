@@ -39,10 +39,9 @@ def reason(transition: Transition, path: Callable[[Symbol], str]) -> str:
 
 def _condition(condition: Any, path: Callable[[Symbol], str], *, turned: bool = False) -> str:
     """Say a condition, or (`turned`) its opposite."""
-    operation = condition.op()
+    operation, sides = condition.op(), operands(condition)
     if operation == ca.OP_NOT:
-        return _condition(*operands(condition), path, turned=not turned)
-    sides = operands(condition)
+        return _condition(sides[0], path, turned=not turned)
     if operation in (ca.OP_AND, ca.OP_OR):
         both = (operation == ca.OP_AND) != turned
         parts = [_condition(one, path, turned=turned) for one in sides]

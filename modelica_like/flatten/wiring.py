@@ -56,7 +56,7 @@ class Wiring:
                 self.freed.update(id(one) for one in ends)
                 return
         keys = [self._key(scope, end, source) for end in ends]
-        for key in keys[1:]:
+        for key in keys:
             self.parent[self._root(key)] = self._root(keys[0])
 
     def _refuse(self, what: str, where: Source | tuple[Source, ...], advice: str) -> None:

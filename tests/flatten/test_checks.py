@@ -185,7 +185,7 @@ def test_a_declared_unit_stays_as_it_is_written():
         P: Variable = var("W", "power")
 
         def equations(self) -> Equations:
-            yield self.P == self.k
+            yield self.k == self.P
 
     assert str(flatten(Power()).variables[0].unit) == "W"
 

@@ -28,7 +28,7 @@ _CALLS = {
 }  # fmt: skip
 _SYMMETRIC = (
     "min", "max", "fmin", "fmax", "minimum", "maximum", "all_of", "any_of", "logic_and", "logic_or", "hypot",
-    "same_dimension",
+    "same_dimension", "allclose",
 )  # fmt: skip
 """Functions whose arguments have no order."""
 _TOLERANCE = 1e-6

@@ -90,6 +90,98 @@ def test_pairs_with_one_border_are_together(base):
     ]
 
 
+class Plain(Component):
+    """One border of three values, of which two may slide."""
+
+    x: Variable = var("1", "value")
+    T: Parameter = param("s", "time", default=2.0)
+    more: str = ""
+    out = Mode("up", "down", "off")
+
+    def equations(self) -> Equations:
+        drive = self.out.choose(up=1, down=-1, off=0)
+        yield self.T * der(self.x) == (0 if self.more == "nothing" else drive)
+
+    def events(self) -> Events:
+        x = self.x * self.out.choose(up=1, down=1, off=0.5) if self.more == "itself" else self.x
+        says: Any = {"notice": {"notice": "goes"}, "fails": {"notice": "ends", "fails": True}}
+        says |= {"resets": {"reset": {self.x: 0}}}
+        if self.more == "timed":
+            yield self.out.go("up", "down", at=self.T)
+            yield self.out.go("down", "up", at=2 * self.T)
+        if self.more == "off":
+            yield self.out.go("off", "up", when=x < 0)
+        limit = {"shifted": 0.1, "almost": 1e-9}.get(self.more, 0)
+        yield self.out.go("down", "up", when=x < 0, **says.get(self.more, {}))
+        yield self.out.go("up", "down", when=x > limit)
+        yield self.out.go("down", "off", when=x < -2)
+        yield self.out.go("off", "down", when=x > 3)
+
+
+@pytest.mark.parametrize("more", ["", "timed", "off"])
+def test_values_with_opposite_guards_make_a_pair(more):
+    model = build(Plain(x=1.0, more=more))
+    assert names(model, _borders(model)) == [[("out", "down", "up")]]
+    ((pair,),) = _borders(model)
+    there, back = (model.transitions[k] for k in (pair.there, pair.back))
+    assert (there.target, back.target, there.timed, back.timed) == (0, 1, False, False)
+    assert (pair.first in there.sources, pair.second in back.sources, pair.number) == (True, True, 3)
+    assert not np.isclose(there.index, back.index)
+
+
+@pytest.mark.parametrize("more", ["notice", "fails", "resets", "shifted", "almost", "nothing", "itself"])
+def test_other_values_make_none(more):
+    """A transition that says or resets something, guards that are not opposite, a mode without effect or on itself."""
+    model = build(Plain(x=1.0, more=more))
+    assert _borders(model) == []
+    assert sliding(model) is model
+
+
+def test_a_mode_that_holds_a_motion_does_not_slide():
+    class Held(Component):
+        v: Variable = var("1", "speed")
+        f: Variable = var("1", "force")
+        T: Parameter = param("s", "time", default=1.0)
+        mode = Mode("free", "held", holds={"held": "v"})
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.v) == self.f - 1
+            yield self.mode.choose(free=self.f, held=self.T * der(self.v)) == 0
+
+        def events(self) -> Events:
+            yield self.mode.go("free", "held", when=self.v < 0)
+            yield self.mode.go("held", "free", when=self.v > 0)
+
+    assert _borders(build(Held(v=1.0))) == []
+
+
+class Curved(Component):
+    """The mode acts through an equation that stays implicit and is no straight line, or through a straight one."""
+
+    x: Variable = var("1", "value")
+    y: Variable = var("1", "what acts")
+    T: Parameter = param("s", "time", default=2.0)
+    k: Parameter = param("1", "curvature", default=0.1)
+    on: str = "y"
+    out = Mode("up", "down")
+
+    def equations(self) -> Equations:
+        drive = self.out.choose(up=1, down=-1)
+        yield self.T * der(self.x) == (self.y if self.on == "y" else drive)
+        yield self.y + self.k * self.y**5 == (drive if self.on == "y" else self.x)
+
+    def events(self) -> Events:
+        yield self.out.go("up", "down", when=self.x > 0)
+        yield self.out.go("down", "up", when=self.x < 0)
+
+
+@pytest.mark.parametrize(("on", "count"), [("y", 0), ("x", 1)])
+def test_modes_act_through_straight_equations(on, count):
+    model = build(Curved(x=1.0, on=on))
+    assert model.implicit == ("y",)
+    assert len(_borders(model)) == count
+
+
 class Reference:
     """What holds in modes of sliding, by numbers from the model without them."""
 
