@@ -61,6 +61,7 @@ class Two(Component):
         yield self.level.go("low", "high", when=any_of(self.u > 0.1, all_of(self.y > 1, self.u < -0.5)))
         yield self.level.go("high", "low", when=self.seen < -2, reset={self.y: self.u})
         yield when(clock(self.T), {self.seen: self.u})
+        yield when(clock(3 * self.T), {self.y: self.x / 2})
 
 
 def names(model: CompiledDae, borders: list[list[Pair]]) -> list[list[tuple[str, str, str]]]:
@@ -111,6 +112,8 @@ class Plain(Component):
             yield self.out.go("down", "up", at=2 * self.T)
         if self.more == "off":
             yield self.out.go("off", "up", when=x < 0)
+        if self.more == "when":
+            yield when(clock(self.T), {self.x: self.out.choose(up=1, down=2, off=3)})
         limit = {"shifted": 0.1, "almost": 1e-9}.get(self.more, 0)
         yield self.out.go("down", "up", when=x < 0, **says.get(self.more, {}))
         yield self.out.go("up", "down", when=x > limit)
@@ -129,7 +132,7 @@ def test_values_with_opposite_guards_make_a_pair(more):
     assert not np.isclose(there.index, back.index)
 
 
-@pytest.mark.parametrize("more", ["notice", "fails", "resets", "shifted", "almost", "nothing", "itself"])
+@pytest.mark.parametrize("more", ["notice", "fails", "resets", "shifted", "almost", "nothing", "itself", "when"])
 def test_other_values_make_none(more):
     """A transition that says or resets something, guards that are not opposite, a mode without effect or on itself."""
     model = build(Plain(x=1.0, more=more))
@@ -277,8 +280,10 @@ def test_what_follows_a_sliding_mode_has_its_first_value_and_samples_are_mixed(b
     for seed in range(3):
         one = Reference(base, asked, seed)
         found = made.updates(one.t, one.x, [], base.p, base.u, one.sliding()).full().ravel()
-        targets = [base.flat_discretes[row.reset.index].path for row in base.update_rows]
+        rows = [row.reset for row in base.update_rows]
+        targets = [base.flat_discretes[one.index].path if one.kind == "discrete" else one.kind for one in rows]
         values = dict(zip(targets, found, strict=True))
+        assert values["state"] == np.inf
         assert values["flag"] == 0.0
         assert values["seen"] == pytest.approx(dict(zip(targets, one.mixed("updates"), strict=True))["seen"])
 
