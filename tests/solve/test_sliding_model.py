@@ -240,7 +240,10 @@ class Reference:
 
     def mixed(self, name: str) -> Any:
         first = self.at(name, self.d)
-        return first + sum(a * (self.at(name, self._in(k)) - first) for k, a in enumerate(self.shares()))
+        given = np.isfinite(first)  # infinity: a variable that is not set
+        others = [self.at(name, self._in(k))[given] - first[given] for k in range(2)]
+        first[given] += self.shares() @ others
+        return first
 
     def sliding(self) -> Any:
         """Modes as the model with sliding has them."""
