@@ -255,16 +255,17 @@ class _Flattener:
     def _connect(self, added: int | None) -> None:
         for ends in self.wiring.sets():
             connectors = [self.wiring.connectors[end] for end in ends]
-            source = self.wiring.sources[ends[0]]
-            for name, field in connectors[0].quantities.items():
-                nodes = [self.variable_of[id(connector), name] for connector in connectors]
+            first, *_ = ends
+            source = self.wiring.sources[first]
+            for name, field in self.wiring.connectors[first].quantities.items():
+                node, *others = nodes = [self.variable_of[id(connector), name] for connector in connectors]
                 origin = Origin(" – ".join(connector.path for connector in connectors), "connection", source)
                 if field.is_flow:
                     signs = [1.0 if seen_outside else -1.0 for _, seen_outside in ends]
                     self.linear.append(LinearEquation(tuple(zip(nodes, signs, strict=True)), 0.0, origin))
                 else:
-                    for node in nodes[1:]:
-                        self.linear.append(LinearEquation(((nodes[0], 1.0), (node, -1.0)), 0.0, origin))
+                    for other in others:
+                        self.linear.append(LinearEquation(((node, 1.0), (other, -1.0)), 0.0, origin))
         for component in self.root.walk():
             for connector in component.connectors.values():
                 if connector.used and not self.wiring.is_connected(connector):

@@ -185,7 +185,7 @@ class FlatModel:
     general: list[tuple[int, int]]
     starts: list[StartValue]
     inputs: list[int]
-    components: dict[str, Component] = field(repr=False)
+    components: dict[str, Component]
     flags: tuple[tuple[Any, int], ...] = ()
     pres: dict[int, int] = field(default_factory=dict[int, int])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, cast
 
 import casadi as ca
@@ -35,7 +35,7 @@ class Slot:
     """A symbol of a template: path from the component, and order of differentiation."""
 
     path: str
-    order: int = 0
+    order: int
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ ClassTransition = TransitionForm[str, tuple[str, int]]
 """A transition of a template."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Template:
     """The equations of a component, as CasADi functions of (v, p, d, t).
 
@@ -123,8 +123,8 @@ class Template:
     ideals: tuple[IdealForm, ...]
     energy_slots: tuple[Slot, ...]
     energy: ca.Function
-    connections: tuple[Connection | FreeEnd, ...] = field(compare=False)
-    inferred: dict[str, Unit] = field(compare=False)
+    connections: tuple[Connection | FreeEnd, ...]
+    inferred: dict[str, Unit]
 
 
 class InitialResidual(Symbol):

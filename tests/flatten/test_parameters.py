@@ -47,7 +47,8 @@ def test_values_are_in_si_units():
     flat = flatten(Part())
     assert numbers(flat) == {"a": 2000.0, "b": 2500.0, "T": 298.15, "k": 1.0}
     assert [(one.path, str(one.unit)) for one in flat.parameters] == [("a", "N"), ("k", "*")]
-    assert [(one.path, str(one.unit), one.tunable) for one in flat.derived] == [("b", "N", False), ("T", "K", False)]
+    derived = [(one.path, str(one.unit), one.tunable, one.above) for one in flat.derived]
+    assert derived == [("b", "N", False, 0), ("T", "K", False, 0)]
 
 
 def test_a_given_formula_means_names_of_the_drive_and_a_default_those_of_the_part():
