@@ -158,9 +158,9 @@ class CompiledDae:
     implicit_blocks: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...] = ()
     motion_sources: tuple[str, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
-    _make_energy: Callable[[], ca.Function] | None = field(default=None, repr=False)
-    _make_start: Callable[[bool], StartSystem] | None = field(default=None, repr=False)
-    _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
+    _make_energy: Callable[[], ca.Function] | None = None
+    _make_start: Callable[[bool], StartSystem] | None = None
+    _cache: dict[Any, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return self.summary.replace("ReducedDae", "CompiledDae", 1)

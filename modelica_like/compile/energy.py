@@ -22,18 +22,10 @@ def energy_terms(reduced: ReducedDae) -> Any:
     for instance in flat.instances:
         template = instance.template
         prefix = f"{instance.path}." if instance.path else ""
-        slots: list[Any] = []
-        for slot in template.energy_slots:
-            node = variable[prefix + slot.path]
-            value = reduced.values[node] if slot.order == 0 else reduced.rate(node)
-            slots.append(value)
-        v = ca.vertcat(*slots) if slots else ca.SX(0, 1)
-        p = flat.q[list(instance.parameters)] if instance.parameters else ca.SX(0, 1)
-        d = flat.d[list(instance.discretes)] if instance.discretes else ca.SX(0, 1)
-        terms = template.energy(v, p, d, flat.time)
-        powers = terms[3:]
-        inflow = ca.sum1(powers) if powers.numel() else ca.SX(0)
-        passing = ca.sum1(ca.fabs(powers)) if powers.numel() else ca.SX(0)
-        rows.append(ca.horzcat(terms[0], terms[1], terms[2], inflow, passing))
-    table = ca.vertcat(*rows)
-    return ca.horzcat(table[:, :4], reduced.total_derivative(table[:, 0]), table[:, 4])
+        nodes = [(variable[prefix + slot.path], slot.order) for slot in template.energy_slots]
+        slots = [reduced.rate(node) if order else reduced.values[node] for node, order in nodes]
+        p, d = flat.q[list(instance.parameters)], flat.d[list(instance.discretes)]
+        stored, loss, source, *powers = ca.vertsplit(template.energy(ca.vertcat(*slots), p, d, flat.time))
+        rows.append((stored, loss, source, sum(powers), sum(map(ca.fabs, powers))))
+    stored, loss, source, inflow, passing = (ca.vertcat(*one) for one in zip(*rows, strict=True))
+    return ca.horzcat(stored, loss, source, inflow, reduced.total_derivative(stored), passing)

@@ -93,18 +93,18 @@ def _borders(model: CompiledDae) -> list[Border]:
     for pair in _pairs(model, samples):
         guard = samples[:, model.transitions[pair.there].index]
         turned = replace(pair, first=pair.second, second=pair.first, there=pair.back, back=pair.there)
-        for values, border in found:
-            for one, sign in ((pair, 1.0), (turned, -1.0)):
-                if _same(sign * guard, values):
-                    border.append(one)
-        if not any(_same(sign * guard, values) for values, _ in found for sign in (1.0, -1.0)):
+        ways = (pair, guard), (turned, -guard)
+        alike = [(border, one) for values, border in found for one, own in ways if _same(own, values)]
+        for border, one in alike:
+            border.append(one)
+        if not alike:
             found.append((guard, [pair]))
     return [border for _, border in found]
 
 
 def _same(values: Any, others: Any) -> bool:
     """Whether samples are equal but for rounding; false where one is no number."""
-    return bool((np.abs(values - others) <= _ROUNDING * np.abs(values)).all())
+    return np.allclose(values, others, rtol=_ROUNDING, atol=0)
 
 
 def _pairs(model: CompiledDae, samples: Any) -> Iterator[Pair]:
@@ -125,11 +125,9 @@ def _pairs(model: CompiledDae, samples: Any) -> Iterator[Pair]:
 def _samples(model: CompiledDae) -> Any:
     """Values of the guards at arbitrary points, shape (points, guards)."""
     random, rows = np.random.default_rng(1), list[Any]()
-    sizes = [model.guards.size1_in(k) for k in range(5)]
     for _ in range(_SAMPLES):
-        t, x, z, p, u = (random.uniform(0.5, 1.5, n) for n in sizes)
-        signs = random.choice([-1.0, 1.0], len(x) + len(z))
-        x, z = x * signs[: len(x)], z * signs[len(x) :]
+        t, p, u = (random.uniform(size=model.guards.size1_in(name)) for name in "tpu")
+        x, z = (random.normal(size=model.guards.size1_in(name)) for name in "xz")
         rows.append(model.guards(t, x, z, p, u, random.integers(2, size=model.discrete_size)).full().ravel())
     return np.array(rows)
 

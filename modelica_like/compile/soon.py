@@ -7,6 +7,8 @@ from typing import Any
 
 import casadi as ca
 
+from modelica_like.language.expr import operands
+
 TIME_RESOLUTION = 1e-10
 """Time resolution of events relative to max(1 s, |t|).
 
@@ -50,6 +52,6 @@ def joined(guards: Any, relation: Callable[[Any], Any]) -> Any:
 
     def rebuilt(guard: Any) -> Any:
         join = _JOINS.get(guard.op())
-        return join(rebuilt(guard.dep(0)), rebuilt(guard.dep(1))) if join else relation(guard)
+        return join(*map(rebuilt, operands(guard))) if join else relation(guard)
 
     return ca.vertcat(*(rebuilt(guard) for guard in ca.vertsplit(guards)))

@@ -8,6 +8,7 @@ from typing import Any
 
 import casadi as ca
 
+from modelica_like.flatten.template import column
 from modelica_like.structure.reduce import ReducedDae
 
 _STORED = 0
@@ -31,7 +32,7 @@ class StartSystem:
     rates: tuple[int, ...] = ()
 
 
-def start_system(reduced: ReducedDae, rest: bool = False) -> StartSystem:
+def start_system(reduced: ReducedDae, rest: bool) -> StartSystem:
     """Build the start system.
 
     A variable such as the speed of the last mass of a chain is the sum of all relative speeds. Written out, N such
@@ -47,7 +48,7 @@ def start_system(reduced: ReducedDae, rest: bool = False) -> StartSystem:
     resting = [node for node, state in order if state is None]
     nodes = tuple(dict.fromkeys([*(s.node for s in flat.starts), *resting]))
     needed = _needed(reduced, nodes)
-    y = ca.vertcat(*(system.symbols[level] for level, _ in needed)) if needed else ca.SX(0, 1)
+    y = column(system.symbols[level] for level, _ in needed)
     explicit = ca.vertcat(*(system.symbols[level] - expression for level, expression in needed))
     wanted = ca.vertcat(*(system.node_values[node] for node in nodes))
     values = ca.densify(ca.vertcat(explicit, reduced.alg, wanted))
@@ -102,7 +103,7 @@ def _storing(reduced: ReducedDae) -> list[int]:
         if not template.energy_slots:
             continue
         used = zip(*template.energy.sparsity_jac(0, 0).get_triplet(), strict=True)
-        slots = (template.energy_slots[column] for row, column in used if row == _STORED)
+        slots = (template.energy_slots[slot] for row, slot in used if row == _STORED)
         found += [variable[prefix + slot.path] for slot in slots if slot.order == 0]
     return found
 
@@ -117,17 +118,10 @@ def _needed(reduced: ReducedDae, nodes: Iterable[int]) -> list[tuple[int, Any]]:
     system = reduced.system
     pending = {placed[0] for node in nodes if (placed := system.node_level[node]) is not None}
     position = {level: k for k, (level, _) in enumerate(reduced.explicit)}
-    if not pending & set(position):
-        return []
-    uses = _uses(reduced)
-    needed: set[int] = set()
-    stack = [level for level in pending if level in position]
-    while stack:
-        level = stack.pop()
-        if level in needed:
-            continue
-        needed.add(level)
-        stack += [other for other in uses[position[level]] if other in position]
+    uses, needed = _uses(reduced), set[int]()
+    while pending := pending & position.keys():
+        needed |= pending
+        pending = {other for level in pending for other in uses[position[level]]}
     return [pair for pair in reduced.explicit if pair[0] in needed]
 
 
@@ -138,6 +132,6 @@ def _uses(reduced: ReducedDae) -> list[list[int]]:
     expressions = ca.vertcat(*(expression for _, expression in reduced.explicit))
     function = ca.Function("explicit", [symbols, flat.p, flat.d, flat.time], [expressions])
     uses: list[list[int]] = [[] for _ in reduced.explicit]
-    for row, column in zip(*function.jac_sparsity(0, 0).get_triplet(), strict=True):
-        uses[row].append(column)
+    for row, level in zip(*function.jac_sparsity(0, 0).get_triplet(), strict=True):
+        uses[row].append(level)
     return uses

@@ -44,32 +44,28 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
     Raises:
         ComponentUnbalanced: it does not.
     """
-    unknown = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
-    own = [n for n in unknown if n not in joined]
-    flows: list[str] = []
+    own = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
+    unknowns = [n for n in own if n not in joined]
     if not component.parts:
-        for name, connector in component.connectors.items():
-            if connector.used:
-                flows += [f"{name}.{n}" for n, f in connector.fields.items() if isinstance(f, Variable) and f.is_flow]
-    if len(equations) == len(own) + len(flows) or (component.parts and not own and not equations):
+        used = {name: connector for name, connector in component.connectors.items() if connector.used}
+        unknowns += [f"{name}.{n}" for name, one in used.items() for n, f in one.quantities.items() if f.is_flow]
+    if len(equations) == len(unknowns):
         return
-    unknowns = [*own, *flows]
     kind = type(component).__name__
     count = f"{len(equations)} equation{'s' if len(equations) != 1 else ''}"
     listed = f"{len(unknowns)} unknowns ({', '.join(unknowns)})" if unknowns else "no unknowns of its own"
     what = f"{kind} declares {count} for {listed}."
     base = type(component).__mro__[1]
-    driven = _driven_input(component, equations) if len(equations) > len(unknowns) else ""
-    missing = len(equations) < len(unknowns) and base is not Component and issubclass(base, Component)
-    if missing and base.equations is not Component.equations:
+    missing = len(equations) < len(unknowns)
+    if missing and getattr(base, "equations", Component.equations) is not Component.equations:
         advice = f"Its base {base.__name__} has equations of its own: is `yield from super().equations()` missing?"
-    elif driven:
+    elif missing:
+        advice = "Each own variable, output and flow needs one: is a `yield` missing?"
+    elif driven := _driven_input(component, equations):
         advice = (
             f"{driven} is an input of a part: inputs are connected, not set by equations. "
             f"Declare an output in {kind}, and yield connect(self.…, self.{driven})."
         )
-    elif len(equations) < len(unknowns):
-        advice = "Each own variable, output and flow needs one: is a `yield` missing?"
     else:
         advice = "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."
     where = equations[-1].source if equations else ()
@@ -79,7 +75,7 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
 def _driven_input(component: Component, equations: list[Equation]) -> str:
     """Return an input of a part that occurs in an equation, relative to the component, or an empty text."""
     leaves = (symbol for e in equations for side in (e.left, e.right) for symbol in symbols_in(side))
-    foreign = (one for one in leaves if one is not TIME and one.owner is not component)
+    foreign = (one for one in leaves if isinstance(one.owner, Component) and one.owner is not component)
     own = component.path
     paths = (f"{one.owner.path}.{one.name}" for one in foreign if isinstance(one.owner.fields.get(one.name), Input))
     return next((path.removeprefix(f"{own}.") for path in paths), "")
@@ -163,7 +159,7 @@ def _unit_of_leaf(component: Component, inferred: dict[str, Unit], leaf: Any, di
     unit = unit_of_field(symbol.owner, symbol.name)
     if unit == ANY and symbol.owner is component:
         unit = inferred.get(symbol.name, ANY)
-    return unit if unit == ANY or symbol.order == 0 else unit / _SECOND**symbol.order
+    return unit / _SECOND**symbol.order
 
 
 def _infer(component: Component, equation: Equation, dimensions: Dimensions, inferred: dict[str, Unit]) -> None:

@@ -8,6 +8,7 @@ import casadi as ca
 
 from modelica_like.errors import LanguageError, Source
 from modelica_like.language.discrete import moves
+from modelica_like.language.expr import operands
 
 JUST_TRUE = 1e-300
 """Guard of a relation with equality, where both sides are equal."""
@@ -25,24 +26,22 @@ def guard_of(condition: Any, source: Source, *, negated: bool = False) -> Any:
         LanguageError: the condition is not made of relations.
     """
     operation = condition.op() if isinstance(condition, ca.SX) else None
-    if operation is not None and condition.is_constant():
-        return ca.SX(1.0 if bool(float(condition)) != negated else -1.0)
     if operation == ca.OP_NOT:
-        return guard_of(condition.dep(0), source, negated=not negated)
+        return guard_of(*operands(condition), source, negated=not negated)
     if operation in (ca.OP_AND, ca.OP_OR):
         join = ca.fmin if (operation == ca.OP_AND) != negated else ca.fmax
-        return join(*(guard_of(condition.dep(k), source, negated=negated) for k in (0, 1)))
+        return join(*(guard_of(one, source, negated=negated) for one in operands(condition)))
     if operation in (ca.OP_LT, ca.OP_LE):
-        difference = condition.dep(1) - condition.dep(0) if not negated else condition.dep(0) - condition.dep(1)
+        first, second = operands(condition)
+        difference = first - second if negated else second - first
         if (operation == ca.OP_LT) != negated:
             return difference
         # A sum, so that its rate is that of the difference: a relation that stops being true now does not count.
         return difference + ca.if_else(difference == 0, JUST_TRUE, 0)
-    if operation in (ca.OP_EQ, ca.OP_NE):
-        # Between events a mode is constant: its conditions are plainly on or off.
-        return ca.if_else(condition, -1.0, 1.0) if negated else ca.if_else(condition, 1.0, -1.0)
-    if operation == ca.OP_PARAMETER and not moves(condition):
-        return guard_of(condition != 0, source, negated=negated)
+    if operation in (ca.OP_EQ, ca.OP_NE, ca.OP_CONST) or (operation == ca.OP_PARAMETER and not moves(condition)):
+        # Between events a mode or a parameter is constant: such a condition is plainly on or off.
+        on = -1.0 if negated else 1.0
+        return ca.if_else(condition, on, -on)
     raise LanguageError(
         "The condition of a transition is not a relation.",
         where=source,

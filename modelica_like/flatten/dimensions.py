@@ -11,7 +11,7 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError, Source, UnitMismatch
-from modelica_like.language.expr import Expr
+from modelica_like.language.expr import Expr, operands
 from modelica_like.units import ANY, ONE, Unit, same_dimension
 
 UnitOf = Callable[[Any], Unit]
@@ -19,11 +19,14 @@ UnitOf = Callable[[Any], Unit]
 
 _SUMS = {ca.OP_ADD, ca.OP_SUB, ca.OP_FMIN, ca.OP_FMAX, ca.OP_FMOD, ca.OP_HYPOT, ca.OP_COPYSIGN, ca.OP_REMAINDER}
 _SAME = {ca.OP_NEG, ca.OP_FABS, ca.OP_TWICE, ca.OP_ASSIGN}
-_RELATIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
+_COMPARED = dict.fromkeys((ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE), "the sides of a comparison")
+_COMPARED[ca.OP_ATAN2] = "the coordinates of an angle"
 _PLAIN = {ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN}
 _POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction(-1)}
 
 
+_FINEST = 60
+"""Largest denominator of an exponent; a power of a number can have any."""
 _MIXED = Unit((("different units in different modes", 1),))
 """Sum of a mode's branches with different units: valid only in an equation with zero."""
 
@@ -32,7 +35,6 @@ class _Clash(Exception):
     """Two terms of a sum or a relation differ."""
 
     def __init__(self, left: Unit, right: Unit, what: str) -> None:
-        super().__init__(what)
         self.left, self.right, self.what = left, right, what
 
 
@@ -53,23 +55,18 @@ class Dimensions:
 
     def unit(self, expression: Expr | float) -> Unit:
         """Return the unit of an expression; zero and unknown units fit everything."""
-        root: Any = expression if isinstance(expression, ca.SX) else ca.SX(cast(Any, expression))
+        root: Any = ca.SX(cast(Any, expression))
         pending = [root]
         while pending:
-            node = pending[-1]
-            key = node.element_hash()
-            if key in self._known:
-                pending.pop()
-                continue
-            operands = [] if node.is_leaf() else [node.dep(k) for k in range(node.n_dep())]
-            open_operands = [dep for dep in operands if dep.element_hash() not in self._known]
-            if open_operands:
-                pending.extend(open_operands)
-                continue
-            units = [self._known[dep.element_hash()][1] for dep in operands]
-            # The node itself is kept too, so that no other node can get its identity.
-            self._known[key] = (node, self._of_node(node, operands, units))
-            pending.pop()
+            node = pending.pop()
+            parts = operands(node)
+            unknown = [one for one in parts if one.element_hash() not in self._known]
+            if unknown:
+                pending += [node, *unknown]
+            elif node.element_hash() not in self._known:
+                units = [self._known[one.element_hash()][1] for one in parts]
+                # The node itself is kept too, so that no other node can get its identity.
+                self._known[node.element_hash()] = (node, self._of_node(node, parts, units))
         return self._known[root.element_hash()][1]
 
     def unit_or_any(self, expression: Expr | float) -> Unit:
@@ -79,38 +76,35 @@ class Dimensions:
         except (_Clash, _NotANumber):
             return ANY
 
-    def _of_node(self, node: Any, operands: list[Any], units: list[Unit]) -> Unit:
+    def _of_node(self, node: Any, parts: list[Any], units: list[Unit]) -> Unit:
         if node.is_symbolic():
             return self._unit_of(node)
-        if not operands:
+        if not parts:
             if math.isnan(float(node)):
                 raise _NotANumber
             return ANY if float(node) == 0.0 else ONE
         operation = node.op()
-        if operation == ca.OP_ADD and all(map(_is_choice, operands)):
-            return units[0] if _MIXED not in units and same_dimension(*units) else _MIXED
+        if operation == ca.OP_ADD and all(map(_is_choice, parts)):
+            return _MIXED if _MIXED in units or not same_dimension(*units) else _common(*units, "")
         if operation in _SUMS:
-            return _common(units[0], units[1], "the terms of a sum")
-        if operation == ca.OP_ATAN2:
-            _common(units[0], units[1], "the coordinates of an angle")
-            return ONE
-        if operation in _RELATIONS:
-            _common(units[0], units[1], "the sides of a comparison")
+            return _common(*units, "the terms of a sum")
+        if operation in _COMPARED:
+            _common(*units, _COMPARED[operation])
             return ONE
         if operation in _PLAIN:
             return ONE
         if operation in _SAME:
             return units[0]
         if operation == ca.OP_MUL:
-            return _times(units[0], units[1])
+            return _times(*units)
         if operation == ca.OP_DIV:
-            return _times(units[0], units[1] if units[1] == ANY else units[1] ** -1)
+            return _times(*units, -1)
         if operation in _POWERS:
-            return ANY if units[0] == ANY else units[0] ** _POWERS[operation]
+            return _times(ONE, *units, _POWERS[operation])
         if operation == ca.OP_IF_ELSE_ZERO:
             return units[1]
         if operation in (ca.OP_POW, ca.OP_CONSTPOW):
-            return _power(units[0], units[1], operands[1])
+            return _power(*units, parts[1])
         for unit in units:
             _common(unit, ONE, "the argument of a function and a number")
         return ONE
@@ -119,7 +113,7 @@ class Dimensions:
 def _is_choice(node: Any) -> bool:
     """Tell whether a term comes from `Mode.choose`."""
     while node.op() == ca.OP_ADD:
-        node = node.dep(1)
+        *_, node = operands(node)
     return node.op() == ca.OP_IF_ELSE_ZERO
 
 
@@ -129,16 +123,16 @@ def _common(left: Unit, right: Unit, what: str) -> Unit:
     return right if left == ANY else left
 
 
-def _times(left: Unit, right: Unit) -> Unit:
+def _times(left: Unit, right: Unit, power: float | Fraction = 1) -> Unit:
     if _MIXED in (left, right):
         raise _Clash(left, right, "the factors of a product")
-    return ANY if ANY in (left, right) else left * right
+    return left * right**power
 
 
 def _power(base: Unit, exponent_unit: Unit, exponent: Any) -> Unit:
     _common(exponent_unit, ONE, "an exponent and a number")
     if exponent.is_constant():
-        return ANY if base == ANY else base ** Fraction(float(exponent)).limit_denominator(60)
+        return _times(ONE, base, Fraction(float(exponent)).limit_denominator(_FINEST))
     return _common(base, ONE, "the base of a variable power and a number")
 
 

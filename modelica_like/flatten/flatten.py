@@ -33,7 +33,7 @@ from modelica_like.flatten.parameters import Parameters
 from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
 from modelica_like.language.component import Component
-from modelica_like.language.declared import Declared
+from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.discrete import INITIAL, TERMINAL
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
@@ -149,10 +149,9 @@ class _Flattener:
             self.discretes.append(FlatDiscrete(prefix + name, ONE, mode.description, start, mode.names))
         for end, connector in component.connectors.items():
             if connector.used:
-                for name, field in connector.fields.items():
-                    if isinstance(field, Variable):
-                        kind = "flow" if field.is_flow else "potential"
-                        self._declare_variable(connector, name, f"{prefix}{end}.{name}", kind, field)
+                for name, field in connector.quantities.items():
+                    kind = "flow" if field.is_flow else "potential"
+                    self._declare_variable(connector, name, f"{prefix}{end}.{name}", kind, field)
 
     def _disturb(self) -> int:
         """Declare the input that is added to a signal."""
@@ -162,9 +161,10 @@ class _Flattener:
             near = did_you_mean(self.disturbed, paths)
             raise UnknownName(f"{self.root.label} has no connected signal '{self.disturbed}'{near or '.'}")
         path = f"{self.disturbed}.added"
+        added = len(self.variables)
         self.variables.append(replace(paths[self.disturbed], path=path, kind="input", description="added"))
-        self.inputs.append(len(self.variables) - 1)
-        return self.inputs[-1]
+        self.inputs.append(added)
+        return added
 
     def _declare_variable(self, owner: Declared, name: str, path: str, kind: str, field: Variable) -> None:
         self.variable_of[id(owner), name] = len(self.variables)
@@ -181,33 +181,36 @@ class _Flattener:
         self.starts.append(StartValue(node, 0.0, "fixed"))
 
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
-        value = component.start(name)
-        scope = component._owner if name in component._starts else component
-        with component.at_its_place(name):
-            start = 0.0 if value is None else self.parameters.evaluate(value, scope or component, path)
         self.discrete_of[id(component), name] = len(self.discretes)
+        start = self._start(component, name, path)
         self.discretes.append(FlatDiscrete(path, coherent(field.unit), field.description, start, (), field.kind))
+
+    def _start(self, component: Component, name: str, path: str) -> Any:
+        """Return a start value, which the owner gives in terms of its names, or the class by default."""
+        given, field = component._starts.get(name), component.fields[name]
+        value, scope = (field.read(field.default), None) if given is None else (given, component._owner)
+        with component.at_its_place(name):
+            return self.parameters.evaluate(value, scope or component, path)
 
     def _hide(self, owner: int, name: str, path: str, one: Hidden, start: Any = 0.0) -> int:
         """Declare a discrete value that no user has declared."""
         self.discrete_of[owner, name] = len(self.discretes)
         self.discretes.append(FlatDiscrete(path, ONE, one.description, start, one.names, hidden=True))
-        return len(self.discretes) - 1
+        return self.discrete_of[owner, name]
 
     def _discrete(self, component: Component, path: str) -> int:
         """Return the position of a mode, a discrete value, a `pre`, or `initial()`."""
-        key = (0, path) if path in (INITIAL.name, TERMINAL.name) else self._owner(component, _plain(path))
+        key = (id(None), path) if path in (INITIAL.name, TERMINAL.name) else self._owner(component, _plain(path))
         if path != _plain(path):
             of = self.discrete_of[key]
             key = key[0], f"pre({key[1]})"
             if key not in self.discrete_of:
                 flat = self.discretes[of]
                 self.pres[self._hide(*key, f"pre({flat.path})", Hidden("", ""), flat.start)] = of
-        elif path == TERMINAL.name and key not in self.discrete_of:
-            self._hide(*key, path, Hidden("", "whether a run ends"))
         elif key not in self.discrete_of:
-            first = self._hide(*key, path, Hidden("", "whether a run begins"), 1.0)
-            self.pres[first] = first
+            begins = path == INITIAL.name
+            here = self._hide(*key, path, Hidden("", f"whether a run {'begins' if begins else 'ends'}"), float(begins))
+            self.pres |= {here: here} if begins else {}
         return self.discrete_of[key]
 
     # -- instances ---------------------------------------------------------------------------------------------------
@@ -252,22 +255,21 @@ class _Flattener:
     def _connect(self, added: int | None) -> None:
         for ends in self.wiring.sets():
             connectors = [self.wiring.connectors[end] for end in ends]
-            source = self.wiring.sources[ends[0]]
-            for name, field in connectors[0].fields.items():
-                if not isinstance(field, Variable):
-                    continue
-                nodes = [self.variable_of[id(connector), name] for connector in connectors]
+            first, *_ = ends
+            source = self.wiring.sources[first]
+            for name, field in self.wiring.connectors[first].quantities.items():
+                node, *others = nodes = [self.variable_of[id(connector), name] for connector in connectors]
                 origin = Origin(" – ".join(connector.path for connector in connectors), "connection", source)
                 if field.is_flow:
                     signs = [1.0 if seen_outside else -1.0 for _, seen_outside in ends]
                     self.linear.append(LinearEquation(tuple(zip(nodes, signs, strict=True)), 0.0, origin))
                 else:
-                    for node in nodes[1:]:
-                        self.linear.append(LinearEquation(((nodes[0], 1.0), (node, -1.0)), 0.0, origin))
+                    for other in others:
+                        self.linear.append(LinearEquation(((node, 1.0), (other, -1.0)), 0.0, origin))
         for component in self.root.walk():
             for connector in component.connectors.values():
                 if connector.used and not self.wiring.is_connected(connector):
-                    self._end_flows(connector.path, connector)
+                    self._end_flows(connector)
         for driver, sink, source in self.wiring.signals:
             nodes = [self.variable_of[id(symbol.owner), symbol.name] for symbol in (driver, sink)]
             origin = Origin(self.variables[nodes[1]].path, "connection", source)
@@ -276,11 +278,11 @@ class _Flattener:
                 terms = (*terms, (added, 1.0))
             self.linear.append(LinearEquation(terms, 0.0, origin))
 
-    def _end_flows(self, path: str, connector: Any) -> None:
-        for name, field in connector.fields.items():
-            if isinstance(field, Variable) and field.is_flow:
+    def _end_flows(self, connector: Connector) -> None:
+        for name, field in connector.quantities.items():
+            if field.is_flow:
                 node = self.variable_of[id(connector), name]
-                self.linear.append(LinearEquation(((node, 1.0),), 0.0, Origin(path, "free end", _WIRE)))
+                self.linear.append(LinearEquation(((node, 1.0),), 0.0, Origin(connector.path, "free end", _WIRE)))
 
     def _bind_inputs(self, component: Component) -> None:
         for name, field in component.fields.items():
@@ -296,7 +298,7 @@ class _Flattener:
             if component is self.root or self._is_open(component, name):
                 self.inputs.append(node)
             elif component.value(name) is not None:
-                value = self.parameters.q(self.parameters.declare(component, name, path))
+                value = self.parameters.q(self.parameters.position(component, name))
                 self.linear.append(LinearEquation(((node, 1.0),), -value, Origin(path, "value", _WIRE)))
             else:
                 what, advice = f"{path} is an input without a value.", "Connect it or give it a value."
@@ -322,13 +324,9 @@ class _Flattener:
             given = component._starts.get(name)
             if given is None and field.default is None:
                 continue
-            value = field.read(field.default) if given is None else given
             node = self.variable_of[id(component), name]
-            path = self.variables[node].path
-            scope = component if given is None else component._owner or component
-            with component.at_its_place(name):
-                start = self.parameters.evaluate(value, scope, path)
-            strength = "default" if given is None else "fixed" if value.fixed else "guess"
+            start = self._start(component, name, self.variables[node].path)
+            strength = "default" if given is None else "fixed" if given.fixed else "guess"
             self.starts.append(StartValue(node, start, strength))
 
     def _split_linear(self, instances: list[Instance]) -> list[tuple[int, int]]:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import casadi as ca
+import numpy as np
 
 from modelica_like.errors import LanguageError
 from modelica_like.language.component import Component
-from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
+from modelica_like.language.expr import Symbol, flagged_motion, symbol_of, symbols_in
 from modelica_like.language.fields import Variable
 from modelica_like.language.holding import UNLIMITED, Hold
 from modelica_like.language.mode import Mode
@@ -64,8 +65,8 @@ def ideal_forms(component: Component, residuals: list[Any]) -> tuple[IdealForm, 
         symbol = symbol_of(component, mode.name)
         zeros = [_variable(component, mode, mode.ideal[name], "variable") for name in mode.names]
         for row, residual in enumerate(residuals):
-            own = [ca.substitute(residual, symbol, ca.SX(k)) for k in range(2)] if is_expression(residual) else []
-            if own and all(_only(one, zero) and _depends(one, zero) for one, zero in zip(own, zeros, strict=True)):
+            own = [ca.substitute(residual, symbol, ca.SX(k)) for k in range(2)]
+            if all(_only(one, zero) and _depends(one, zero) for one, zero in zip(own, zeros, strict=True)):
                 forms.append(IdealForm(mode.name, (zeros[0].name, zeros[1].name), row))
                 break
         else:
@@ -136,10 +137,8 @@ def _equation(
     rate, symbol = symbol_of(component, motion.name, 1), symbol_of(component, mode.name)
     number = mode.number(name)
     for row, residual in enumerate(residuals):
-        if not (is_expression(residual) and ca.depends_on(residual, symbol) and ca.depends_on(residual, rate)):
-            continue
         slope = ca.jacobian(residual, rate)
-        if _number(ca.substitute(slope, symbol, ca.SX(number))) != 0.0:
+        if ca.depends_on(residual, symbol) and _number(ca.substitute(slope, symbol, ca.SX(number))) != 0.0:
             # The derivative of the motion in another mode does not hold it.
             gain = ca.if_else(ca.SX(symbol) == number, slope, 0)
             return row, gain, _only(ca.substitute(residual, symbol, ca.SX(number)), rate)
@@ -156,21 +155,16 @@ def _only(residual: Any, rate: Symbol) -> bool:
 
 
 def _is_variable(symbol: Symbol) -> bool:
-    return symbol is not TIME and isinstance(symbol.owner.fields.get(symbol.name), Variable)
+    return symbol.owner is not None and isinstance(symbol.owner.fields.get(symbol.name), Variable)
 
 
 def _number(expression: Any) -> float:
     """Value of an expression at a generic point, without prescribed motions."""
-    symbols = symbols_in(expression)
-    if not symbols:
-        return float(ca.SX(expression))
-    values = [0.0 if flagged_motion(s.name) else _generic(s, k) for k, s in enumerate(symbols)]
-    function = ca.Function("value", [ca.vertcat(*map(ca.SX, symbols))], [expression])
-    return float(function(values))
+    symbols, chance = symbols_in(expression), np.random.default_rng(1)
+    values = [0.0 if flagged_motion(s.name) else _generic(s, chance.uniform()) for s in symbols]
+    return float(ca.Function("value", [ca.SX(ca.vertcat(*symbols))], [expression])(values))
 
 
-def _generic(symbol: Symbol, k: int) -> float:
-    if symbol is TIME or _is_variable(symbol):
-        return 0.3 + 0.61803398875 * (k % 7 + 1)
-    mode = symbol.owner.modes.get(symbol.name) if isinstance(symbol.owner, Component) else None
-    return 1.0 if mode is None else float(mode.number(mode.start))
+def _generic(symbol: Symbol, chance: float) -> float:
+    mode = getattr(symbol.owner, "modes", {}).get(symbol.name)
+    return chance if mode is None else mode.number(mode.start)

@@ -185,7 +185,7 @@ class FlatModel:
     general: list[tuple[int, int]]
     starts: list[StartValue]
     inputs: list[int]
-    components: dict[str, Component] = field(repr=False)
+    components: dict[str, Component]
     flags: tuple[tuple[Any, int], ...] = ()
     pres: dict[int, int] = field(default_factory=dict[int, int])
 
@@ -249,8 +249,4 @@ def evaluate(model: FlatModel, function: str, values: Any) -> dict[int, Any]:
 
 
 def _gather(vector: Any, rows: list[tuple[int, ...]]) -> Any:
-    height = len(rows[0])
-    if height == 0:
-        return ca.SX(0, len(rows))
-    flat = [k for row in rows for k in row]
-    return ca.reshape(vector[flat], height, len(rows))
+    return ca.reshape(vector[[k for row in rows for k in row]], len(rows[0]), len(rows))

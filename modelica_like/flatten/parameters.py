@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import casadi as ca
 
@@ -12,11 +12,12 @@ from modelica_like.errors import CyclicAssembly, MissingValue, ValueOutOfRange
 from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.dimensions import Dimensions, check_expression
 from modelica_like.flatten.model import FlatParameter
+from modelica_like.flatten.template import column
 from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id
 from modelica_like.language.fields import Input, Parameter, Value
-from modelica_like.units import ONE, Unit, coherent, read_quantity
+from modelica_like.units import Unit, coherent, read_quantity
 
 
 class Parameters:
@@ -72,8 +73,7 @@ class Parameters:
         unit = coherent(unit_of_field(component, name))
         read = read_quantity(value.given) if field.unit_text == "*" and isinstance(value.given, str) else None
         tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
-        number = value.number if value.number is not None else 0.0
-        bounds, written = (field.min, field.max), read[1] if read else None
+        number, bounds, written = cast(float, value.number), (field.min, field.max), read[1] if read else None
         self.flat.append(FlatParameter(path, unit, field.description, number, *bounds, tunable, above, written))
         self._symbols.append(symbol)
         return symbol
@@ -121,15 +121,17 @@ class Parameters:
 
     def _quantity(self, text: str) -> Any:
         """Return a symbol for a number with a unit, so that the unit is checked with the formula."""
-        number, unit = read_quantity(text) or (math.nan, ONE)
+        number, unit = cast("tuple[float, Unit]", read_quantity(text))
+        return self._constant(text, number * unit.factor + unit.offset, unit)
+
+    def _constant(self, text: str, number: float, unit: Unit) -> Any:
         symbol = ca.SX.sym(text)
-        self._quantities[leaf_id(symbol)] = symbol, number * unit.factor + unit.offset, unit
+        self._quantities[leaf_id(symbol)] = symbol, number, unit
         return symbol
 
     def _with_numbers(self, expression: Any) -> Any:
-        found = [self._quantities[key] for leaf in ca.symvar(expression) if (key := leaf_id(leaf)) in self._quantities]
-        symbols, numbers = ca.vertcat(*(one[0] for one in found)), ca.DM([one[1] for one in found])
-        return ca.substitute(expression, symbols, ca.SX(numbers)) if found else expression
+        found = [one for one in ca.symvar(expression) if leaf_id(one) in self._quantities]
+        return ca.substitute(expression, column(found), column(self._quantities[leaf_id(one)][1] for one in found))
 
     def _unit_of_leaf(self, leaf: Any) -> Unit:
         key = leaf_id(leaf)
@@ -142,7 +144,9 @@ class Parameters:
         if not isinstance(field, Parameter | Input):
             known = [key for key, one in owner.fields.items() if isinstance(one, Parameter)]
             raise unknown("parameter", f"{label}: {owner.label}", path, known)
-        return self._q[self.position(owner, name)]
+        found = self._q[self.position(owner, name)]
+        # A constant has a unit, too.
+        return self._constant(path, float(found), unit_of_field(owner, name)) if found.is_constant() else found
 
     def position(self, component: Component, name: str) -> int:
         """Return the position of a parameter in q.
@@ -163,9 +167,9 @@ class Parameters:
             )
         return position
 
-    def q(self, position: int | None) -> Any:
+    def q(self, position: int) -> Any:
         """Return one entry of q."""
-        return 0.0 if position is None else self._q[position]
+        return self._q[position]
 
     def check_derived(self) -> None:
         """Compute the parameters that follow from others.
@@ -173,19 +177,18 @@ class Parameters:
         Raises:
             ValueOutOfRange: one is not finite, or outside its min and max.
         """
-        if self.derived:
-            numbers = ca.Function("derived", [self.symbols()], [self.formulas()])([one.value for one in self.flat])
-            pairs = zip(self.derived, numbers.full().ravel(), strict=True)
-            self.derived = [replace(one, value=one.checked(float(number), f"{number:g}")) for one, number in pairs]
+        numbers = ca.Function("derived", [self.symbols()], [self.formulas()])([one.value for one in self.flat])
+        pairs = zip(self.derived, numbers.full().ravel(), strict=True)
+        self.derived = [replace(one, value=one.checked(float(number), f"{number:g}")) for one, number in pairs]
 
     def formulas(self) -> Any:
         """Return the expressions of the parameters that follow from others."""
-        return ca.vertcat(*self._formulas) if self._formulas else ca.SX(0, 1)
+        return column(self._formulas)
 
     def symbols(self) -> Any:
         """Return the vector p."""
-        return ca.vertcat(*self._symbols) if self._symbols else ca.SX(0, 1)
+        return column(self._symbols)
 
     def expressions(self) -> Any:
         """Return the vector q."""
-        return ca.vertcat(ca.SX(0, 1), *self._q)
+        return column(self._q)

@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from modelica_like.language.expr import Symbol, symbols_in
+from modelica_like.language.expr import Symbol, operands, symbols_in
 from modelica_like.language.fields import Parameter
 from modelica_like.language.mode import Mode, Transition
 
@@ -39,10 +39,9 @@ def reason(transition: Transition, path: Callable[[Symbol], str]) -> str:
 
 def _condition(condition: Any, path: Callable[[Symbol], str], *, turned: bool = False) -> str:
     """Say a condition, or (`turned`) its opposite."""
-    operation = condition.op()
+    operation, sides = condition.op(), operands(condition)
     if operation == ca.OP_NOT:
-        return _condition(condition.dep(0), path, turned=not turned)
-    sides = [condition.dep(k) for k in range(condition.n_dep())]
+        return _condition(sides[0], path, turned=not turned)
     if operation in (ca.OP_AND, ca.OP_OR):
         both = (operation == ca.OP_AND) != turned
         parts = [_condition(one, path, turned=turned) for one in sides]
@@ -72,7 +71,7 @@ def _side(expression: Any, path: Callable[[Symbol], str]) -> str:
     (plain,) = ca.substitute([expression], [ca.vertcat(*symbols)], [ca.vertcat(*named)])
     told = re.sub(r"(?<![\w.])\d[\d.]*(e[+-]?\d+)?", lambda number: f"{float(number[0]):g}", str(plain))
     told = re.sub(r"\(([\w.]+[*/][\w.]+)\)", r"\1", re.sub(r"fabs\(([^()]*)\)", r"|\1|", told))
-    told = told[1:-1] if told.startswith("(") and expression.n_dep() > 1 else told
+    told = re.sub(r"^\((.*)\)$", r"\1", told)
     field = _field(symbols[0])
     if plain.is_symbolic() and isinstance(field, Parameter):
         return f"{{{told}}}"

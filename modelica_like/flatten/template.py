@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, cast
 
 import casadi as ca
@@ -20,7 +20,7 @@ from modelica_like.language.declared import Declared
 from modelica_like.language.delay import parts
 from modelica_like.language.discrete import INITIAL, TERMINAL, Marker, Pre
 from modelica_like.language.equation import Connection, Equation, FreeEnd, as_equation, as_statement
-from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
+from modelica_like.language.expr import TIME, Symbol, flagged_motion, symbol_of, symbols_in
 from modelica_like.language.fields import Parameter, Variable
 from modelica_like.language.functions import der
 from modelica_like.language.mode import StartMode, Transition
@@ -35,7 +35,7 @@ class Slot:
     """A symbol of a template: path from the component, and order of differentiation."""
 
     path: str
-    order: int = 0
+    order: int
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ ClassTransition = TransitionForm[str, tuple[str, int]]
 """A transition of a template."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Template:
     """The equations of a component, as CasADi functions of (v, p, d, t).
 
@@ -123,8 +123,8 @@ class Template:
     ideals: tuple[IdealForm, ...]
     energy_slots: tuple[Slot, ...]
     energy: ca.Function
-    connections: tuple[Connection | FreeEnd, ...] = field(compare=False)
-    inferred: dict[str, Unit] = field(compare=False)
+    connections: tuple[Connection | FreeEnd, ...]
+    inferred: dict[str, Unit]
 
 
 class InitialResidual(Symbol):
@@ -143,28 +143,29 @@ class Names:
     def add(self, expressions: Iterable[Any]) -> None:
         """Add the symbols of expressions."""
         for expression in expressions:
-            if not is_expression(expression):
-                continue
             for symbol in symbols_in(expression):
                 if symbol is not TIME:
                     self._add(symbol)
 
     def _add(self, symbol: Symbol) -> None:
         path = path_of(symbol, self.root)
-        kind = None if symbol.owner is None or isinstance(symbol, Pre) else symbol.owner.fields.get(symbol.name)
+        kind = None if symbol.owner is None else symbol.owner.fields.get(symbol.name)
         if isinstance(kind, Variable) or isinstance(symbol, InitialResidual):
-            self.variables.setdefault(Slot(path, symbol.order), symbol)
+            self.variables[Slot(path, symbol.order)] = symbol
         elif isinstance(kind, Parameter) or flagged_motion(symbol.name):
-            self.parameters.setdefault(path, symbol)
+            self.parameters[path] = symbol
         else:
-            self.discretes.setdefault(path, symbol)
+            self.discretes[path] = symbol
 
     def function(self, name: str, outputs: list[Any]) -> ca.Function:
         """Make a function of all names so far."""
-        inputs = [
-            ca.vertcat(ca.SX(0, 1), *group.values()) for group in (self.variables, self.parameters, self.discretes)
-        ]
-        return ca.Function(name, [*inputs, TIME], [ca.vertcat(ca.SX(0, 1), *outputs)], ["v", "p", "d", "t"], [name])
+        inputs = [column(group.values()) for group in (self.variables, self.parameters, self.discretes)]
+        return ca.Function(name, [*inputs, TIME], [column(outputs)], ["v", "p", "d", "t"], [name])
+
+
+def column(entries: Iterable[Any]) -> Any:
+    """Return a column of expressions, which may have no rows."""
+    return ca.SX(ca.vertcat(*entries))
 
 
 def relative_path(owner: Declared, root: Component, name: str) -> str:
@@ -368,15 +369,14 @@ def _energy_terms(component: Component, wiring: Iterable[Connection | FreeEnd]) 
 
 def _rows(sparsity: ca.Sparsity) -> tuple[tuple[int, ...], ...]:
     rows: list[list[int]] = [[] for _ in range(sparsity.size1())]
-    for row, column in zip(*sparsity.get_triplet(), strict=True):
-        rows[row].append(column)
+    for row, slot in zip(*sparsity.get_triplet(), strict=True):
+        rows[row].append(slot)
     return tuple(tuple(sorted(row)) for row in rows)
 
 
 def _linear_forms(names: Names, residuals: list[Any]) -> tuple[tuple[LinearForm | None, ...], ca.Function]:
     """Find the equations that are linear in all their slots, with coefficients that only parameters determine."""
-    v = ca.vertcat(ca.SX(0, 1), *names.variables.values())
-    p = ca.vertcat(ca.SX(0, 1), *names.parameters.values())
+    v, p = column(names.variables.values()), column(names.parameters.values())
     others = ca.vertcat(v, *names.discretes.values(), TIME)
     values: list[Any] = []
 
@@ -388,10 +388,9 @@ def _linear_forms(names: Names, residuals: list[Any]) -> tuple[tuple[LinearForm 
 
     forms: list[LinearForm | None] = []
     for residual in residuals:
-        residual = ca.SX(residual)
-        jacobian = ca.jacobian(residual, v) if v.numel() else ca.SX(1, 0)
-        constant = ca.substitute(residual, v, ca.SX.zeros(v.shape)) if v.numel() else residual
-        if any(ca.which_depends(ca.vertcat(*jacobian.nonzeros(), constant), others, 1, True)):
+        jacobian = ca.jacobian(residual, v)
+        constant = ca.substitute(residual, v, ca.SX.zeros(v.shape))
+        if ca.depends_on(ca.vertcat(*jacobian.nonzeros(), constant), others):
             forms.append(None)
             continue
         columns = jacobian.sparsity().get_triplet()[1]

@@ -56,7 +56,7 @@ class Wiring:
                 self.freed.update(id(one) for one in ends)
                 return
         keys = [self._key(scope, end, source) for end in ends]
-        for key in keys[1:]:
+        for key in keys:
             self.parent[self._root(key)] = self._root(keys[0])
 
     def _refuse(self, what: str, where: Source | tuple[Source, ...], advice: str) -> None:
@@ -177,8 +177,9 @@ def _different_kinds(first: Connector, second: Connector, source: Source) -> Wro
     kinds = [f"{type(c).__name__} ({', '.join(f.unit_text for f in c.fields.values())})" for c in (first, second)]
     converter = first.domain.converters.get(type(second).__name__)
     between = f"{converter} goes between." if converter else "Join connectors of one kind."
-    article = "An" if kinds[0][0] in "AEIOU" else "A"
+    first_one, second_one = kinds
+    article = "an" if first_one.startswith(tuple("AEIOU")) else "a"
     return WrongConnection(
-        f"connect({first.label}, {second.label}): {article.lower()} {kinds[0]} cannot join a {kinds[1]}. {between}",
+        f"connect({first.label}, {second.label}): {article} {first_one} cannot join a {second_one}. {between}",
         where=source,
     )

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.language.expr import Expr, Symbol, symbol_of
-from modelica_like.language.fields import Field
+from modelica_like.language.fields import Field, Variable
 from modelica_like.language.icon import Stroke
 
 
@@ -65,8 +65,6 @@ class Declared:
 
     def is_constant(self, name: str) -> bool:
         """Return whether a field keeps its value between events."""
-        from modelica_like.language.fields import Variable
-
         return not isinstance(self.fields.get(name), Variable)
 
     @property
@@ -147,6 +145,11 @@ class Connector(Declared):
     def used(self) -> bool:
         """Whether an optional connector is connected."""
         return self._used
+
+    @property
+    def quantities(self) -> dict[str, Variable]:
+        """Its potentials and flows by name."""
+        return {name: one for name, one in self.fields.items() if isinstance(one, Variable)}
 
     def power(self) -> Expr | float:
         """Power in W that flows into the component."""

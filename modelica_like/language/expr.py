@@ -96,6 +96,11 @@ def symbols_in(expression: Expr) -> list[Symbol]:
     return [_symbols[leaf_id(leaf)] for leaf in ca.symvar(whole)]
 
 
+def operands(node: Any) -> list[Any]:
+    """Return what the outermost operation of an expression is applied to."""
+    return [node.dep(k) for k in range(node.n_dep())]
+
+
 _FLAG = re.compile(r"prescribed\((\w+)\)")
 
 

@@ -78,6 +78,13 @@ def test_the_order_of_connecting_does_not_matter(shuffle):
         np.testing.assert_allclose(values, expected, atol=1e-8)
 
 
+def test_free_ends_and_values_are_plain_equations():
+    flat = flatten(star([[0, 2]], 2))
+    ends = {e.origin.path: [(flat.node_name(node), c, e.constant) for node, c in e.terms]
+            for e in flat.linear if e.origin.kind == "free end"}  # fmt: skip
+    assert ends == {f"rotors[{k}].flange_b": [(f"rotors[{k}].flange_b.tau", 1.0, 0.0)] for k in (1, 2)}
+
+
 def test_connecting_twice_changes_nothing():
     once, twice = star([[0, 2]], 2), star([[0, 2], [2, 0], [0, 2, 0]], 2)
     assert connections(flatten(once)) == connections(flatten(twice))

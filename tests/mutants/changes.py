@@ -26,7 +26,10 @@ _CALLS = {
     "floor": "ceil", "logic_or": "logic_and", "logic_and": "logic_or", "setdefault": "__setitem__",
     "minimum": "maximum", "maximum": "minimum", "argmax": "argmin", "argmin": "argmax", "sin": "cos", "cos": "sin",
 }  # fmt: skip
-_SYMMETRIC = ("min", "max", "fmin", "fmax", "minimum", "maximum", "all_of", "any_of", "logic_and", "logic_or", "hypot")
+_SYMMETRIC = (
+    "min", "max", "fmin", "fmax", "minimum", "maximum", "all_of", "any_of", "logic_and", "logic_or", "hypot",
+    "same_dimension", "allclose",
+)  # fmt: skip
 """Functions whose arguments have no order."""
 _TOLERANCE = 1e-6
 """What is smaller is one, or a limit beside zero; how small it is no test can tell."""

@@ -244,6 +244,29 @@ def test_a_whole_number_is_its_floor(solver):
     assert (found.at(0.2)["number"], found.at(1.0)["number"], found.at(1.8)["number"]) == (0.0, 1.0, 0.0)
 
 
+class Jumping(Component):
+    """Stays where it is until it jumps."""
+
+    x: Variable = var("1", "value")
+    T: Parameter = param("s", "when", default=1.0)
+    to: Parameter = param("1", "where to", default=3.0)
+    number: Variable = var("1", "floor of that")
+    mode = Mode("before", "after")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 0 / self.T
+        yield self.number == floor(self.x, events=True)
+
+    def events(self) -> Events:
+        yield self.mode.go("before", "after", at=self.T, reset={self.x: self.to})
+
+
+@pytest.mark.parametrize("to", [3.0, 2.0, 7.0, -4.0, 2.9])
+def test_a_jump_to_a_whole_number_counts(solver, to):
+    found = run(Jumping(x=2.5, to=to), 2.0, solver)
+    assert (found.at(0.5)["number"], found.final["number"]) == (2.0, np.floor(to))
+
+
 def test_functions_with_events(solver):
     found = run(Forms(), 3.0, solver)
     t = found.time
