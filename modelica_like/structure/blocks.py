@@ -206,8 +206,7 @@ class BlockSolver:
             return "explicit"
         guesses = ca.vertcat(*(self.unknowns[column] for column in tears))
         slopes = ca.jacobian(ca.vertcat(*remaining), guesses)
-        linear = not any(ca.which_depends(ca.vertcat(*slopes.nonzeros()), guesses, 1, True)) if slopes.nnz() else False
-        if linear and len(tears) <= SMALL and self.kept.isdisjoint(rest):
+        if not ca.depends_on(slopes, guesses) and len(tears) <= SMALL and self.kept.isdisjoint(rest):
             constants = ca.substitute(ca.vertcat(*remaining), guesses, ca.SX.zeros(len(tears)))
             matrix = ca.densify(slopes)
             solution, determinant = cramer(matrix, -constants)

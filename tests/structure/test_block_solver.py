@@ -138,9 +138,16 @@ def test_an_equation_is_solved_in_the_authors_arithmetic_or_by_its_slope() -> No
 
 def test_an_unknown_that_cancels_leaves_no_rounding() -> None:
     tiny = 1e-20
-    order = BlockSolver(ca.vertcat(B + A - P - B, B - MODE), ca.vertcat(A, B), ca.SX(0, 1), []).run().order
-    assert [k for k, _ in sorted(order, key=lambda one: one[0])] == [0, 1]
-    assert numbers([dict(order)[0]], [P], [tiny]) == [tiny]
+    residual = ca.vertcat((B + A) * P - MODE - B * P, B - P)
+    order = BlockSolver(residual, ca.vertcat(A, B), ca.SX(0, 1), []).run().order
+    assert sorted(k for k, _ in order) == [0, 1]
+    assert numbers([dict(order)[0]], [P, MODE], [2.0, tiny]) == [tiny / 2.0]
+
+
+def test_equations_that_depend_on_each_other_have_the_determinant_zero() -> None:
+    solved = BlockSolver(ca.vertcat(A + B - P, A + B - MODE), ca.vertcat(A, B), MODE, []).run()
+    assert [one.kind for one in solved.blocks] == ["linear"]
+    assert numbers([one for _, one in solved.determinants], [P, MODE], [1.0, 2.0]) == [0.0]
 
 
 @pytest.mark.parametrize(
@@ -153,9 +160,9 @@ def test_an_unknown_that_cancels_leaves_no_rounding() -> None:
         (ca.if_else(A == P, 1, 2), True),
         (ca.if_else(ca.logic_not(A), 1, 2), True),
         (ca.if_else(ca.logic_and(P > 1, ca.sin(A)), 1, 2), True),
-        ((A + ca.floor(P)) - A, False),
-        ((ca.sin(A) + ca.floor(ca.sin(P) + 3)) - ca.sin(A), False),
-        (((A + P) - A) * ca.floor(P * B), False),
+        ((A + ca.floor(P)) - P - A, False),
+        ((ca.exp(A) + ca.floor(ca.sin(P) + 3)) - B - ca.exp(A), False),
+        (((A + P) - B - A) * ca.floor(P * B), False),
     ],
     ids=str,
 )
