@@ -169,18 +169,11 @@ def _vanishes(system: System, rows: list[int], dependent: list[int]) -> bool:
     nominal = np.array([level.nominal for level in system.levels])[:, None]
     points = nominal * chance.uniform(-np.pi, np.pi, (len(nominal), _SAMPLES))
     times = 10.0 ** chance.uniform(*_TIMES, (1, _SAMPLES))
-    values = function.map(_SAMPLES)(points, *_constants(system), times).full()
+    values = function.map(_SAMPLES)(points, *system.constants, times).full()
     found = np.linalg.det(values.T.reshape(_SAMPLES, len(rows), -1))
     found = found[np.isfinite(found)]
     sizes = np.abs(found)
     return bool(len(found) and (found.min() < 0 < found.max() or sizes.min() < _VANISHES * sizes.max()))
-
-
-def _constants(system: System) -> tuple[list[float], list[float]]:
-    """Parameters, and discrete values at the start."""
-    model = system.model
-    starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
-    return [one.value for one in model.parameters], starts + [0.0] * (model.d.numel() - len(starts))
 
 
 def _group(system: System, part: dict[int, dict[int, bool]], count: int) -> Group:
@@ -257,10 +250,10 @@ def _first_weights(system: System, slopes: Any) -> Any:
     for start in model.starts:
         placed = system.node_level[start.node]
         if placed is not None:
-            p, d = _constants(system)
+            p, d = system.constants
             values[placed[0]] = float(ca.Function("start", [model.p, model.d], [start.value])(p, d)) / placed[1]
     function = ca.Function("slopes", [system.everything, model.p, model.d, model.time], [ca.densify(slopes)])
-    found = function(values, *_constants(system), 0.0).full()
+    found = function(values, *system.constants, 0.0).full()
     found = np.where(np.isfinite(found), found, 0.0)
     sizes = np.linalg.norm(found, axis=1, keepdims=True)
     found += _OFF * np.where(sizes > 0, sizes, 1.0) * np.random.default_rng(2).uniform(-1, 1, found.shape)
