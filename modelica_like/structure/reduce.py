@@ -142,12 +142,12 @@ def reduce(flat: FlatModel) -> ReducedDae:
     rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
     ideals = find_ideals(flat)
     kept = [one.row for one in ideals]
-    solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates, kept).run()
+    solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
     if circuits:
         residual = share_reactions(system, holds, circuits, residual)
-        solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates, kept).run()
+        solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
     own = len(counts) - sum(len(one.chains) for one in chosen.following)
     reduced = _assemble(system, counts[:own], states, unknowns, origins, solved)
     held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
@@ -195,10 +195,6 @@ def _check_input_rates(system: System) -> None:
                 "which is not known.",
                 advice="Give the derivative as a separate input, or filter the input before it prescribes a motion.",
             )
-
-
-def _volatile(system: System) -> Any:
-    return ca.vertcat(system.everything, system.model.d, system.model.time)
 
 
 def _incidence(system: System) -> list[list[int]]:

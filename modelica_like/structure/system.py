@@ -68,6 +68,11 @@ class System:
         return ca.vertcat(ca.SX(0, 1), *self.symbols)
 
     @property
+    def volatile(self) -> Any:
+        """The column of all symbols that change during a run."""
+        return ca.vertcat(self.everything, self.model.d, self.model.time)
+
+    @property
     def constants(self) -> tuple[list[float], Any]:
         """Values of parameters, and of modes and discrete values at the start; those that are no numbers are zero."""
         starts = np.zeros(self.model.d.numel())
