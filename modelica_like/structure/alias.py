@@ -143,7 +143,7 @@ class _Elimination:
                 self.used.add(number)
                 self.cause[root] = number
                 return self._learn(root, 0.0 if _is_zero(constant) else -constant / slope)
-            case [(first, float(a)), (second, float(b))] if self._may_merge(first, second) and _is_zero(
+            case [(first, float(a)), (second, float(b))] if self._may_merge(first, second, -b / a) and _is_zero(
                 self._sum(equation.constant, products)
             ):
                 self.used.add(number)
@@ -178,9 +178,16 @@ class _Elimination:
                 affected |= self._learn(below, 0.0)
         return affected
 
-    def _may_merge(self, first: int, second: int) -> bool:
+    def _may_merge(self, first: int, second: int, ratio: float) -> bool:
+        """First = ratio * second."""
         if first in self.inputs and second in self.inputs:
             return False
+        # As a derivative, an input would take the factor of the integral's name; only that of another input has none.
+        for one, other, times in ((first, second, 1.0 / ratio), (second, first, ratio)):
+            if one in self.inputs and other in self.integral:
+                base = self._integral_root(other)
+                if base not in self.inputs or self._derivative(base)[1] * times != 1.0:
+                    return False
         # der(x) = -x remains an equation: a class is not its own derivative.
         if second in self._integrals(first) or first in self._integrals(second):
             return False
@@ -216,7 +223,9 @@ class _Elimination:
             else:
                 # der(keep) = der(drop) / factor = times / factor * node
                 self.derivative[keep] = (node, times / factor)
-                self.integral[self.find(node)[0]] = keep
+                below, _ = self.find(node)
+                self.integral[below] = keep
+                affected |= self.watchers.get(below, set())
         return affected
 
     def _merge_derivatives(self, keep: int, node: int, times: float) -> set[int]:

@@ -4,42 +4,14 @@ import itertools
 from dataclasses import replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from linear_models import ORIGIN, chains, coefficients, model
 
-from modelica_like.errors import Source
-from modelica_like.flatten.model import Coefficient, FlatModel, FlatVariable, LinearEquation, Origin
+from modelica_like.flatten.model import Coefficient, FlatModel, LinearEquation
 from modelica_like.structure.alias import Aliases, find_aliases
-from modelica_like.units import ONE
-
-ORIGIN = Origin("", "test", Source(""))
-
-
-def model(orders: list[int], rows: list[dict[int, float]], constants: list[float] | None = None) -> FlatModel:
-    """Flat model of variables of which some are differentiated, with linear equations over the nodes."""
-    variables = [FlatVariable(f"x{k}", ONE, "", "local", "default", 0.0, 1.0, None, None) for k in range(len(orders))]
-    nodes = [(k, 0) for k in range(len(orders))]
-    derivative: dict[int, int] = {}
-    for k, order in enumerate(orders):
-        node = k
-        for level in range(1, order + 1):
-            derivative[node] = len(nodes)
-            nodes.append((k, level))
-            node = derivative[node]
-    given = constants or [0.0] * len(rows)
-    linear = [LinearEquation(tuple(row.items()), c, ORIGIN) for row, c in zip(rows, given, strict=True)]
-    none = ca.SX(0, 1)
-    return FlatModel(
-        name="test", variables=variables, nodes=nodes, derivative=derivative, parameters=[], p=none, q=none, derived=[],
-        formulas=none, discretes=[], d=none, time=ca.SX.sym("t"), instances=[], linear=linear, general=[], starts=[],
-        inputs=[], components={},
-    )  # fmt: skip
-
-
-coefficients = st.sampled_from([1.0, -1.0, 2.0, -0.5, 3.0, 0.1])
 
 
 @st.composite
@@ -85,22 +57,6 @@ def test_every_solution_of_the_equations_fulfils_the_aliases_and_none_is_lost(sy
         assert np.linalg.norm(matrix[number] @ embedding) < 1e-9
     # Nothing with one or two unknowns is left over.
     assert all(np.count_nonzero(np.abs(row) > 1e-12) > 2 for row in left)
-
-
-@st.composite
-def chains(draw: st.DrawFn) -> tuple[FlatModel, list[dict[int, float]], list[float]]:
-    """Equations between variables and their derivatives, with inputs and given values."""
-    orders = draw(st.lists(st.integers(0, 2), min_size=2, max_size=5))
-    size = len(orders) + sum(orders)
-    rows: list[dict[int, float]] = []
-    constants: list[float] = []
-    for _ in range(draw(st.integers(1, 7))):
-        count = draw(st.sampled_from([1, 2, 2, 2, 2, 3]))
-        chosen = draw(st.lists(st.integers(0, size - 1), min_size=1, max_size=count, unique=True))
-        rows.append({k: draw(coefficients) for k in chosen})
-        constants.append(draw(st.sampled_from([0.0, 0.0, 0.0, 1.0, -2.0])))
-    inputs = [k for k, order in enumerate(orders) if not order and draw(st.integers(0, 3)) == 0]
-    return replace(model(orders, rows, constants), inputs=inputs), rows, constants
 
 
 DERIVATIVES = 8
@@ -282,15 +238,28 @@ def test_an_unknown_is_not_its_own_derivative(order):
     assert found.remaining == [1]
 
 
-def test_an_input_that_is_the_derivative_of_one_unknown_is_not_that_of_another():
-    """der(x0) = u and der(x1) = u: the integrals differ by a constant, so the second equation stays."""
-    made = replace(model([1, 1, 0], [{3: 1.0, 2: -1.0}, {4: 1.0, 2: -1.0}]), inputs=[2])
+def test_an_input_is_not_the_derivative_of_an_unknown():
+    """der(x0) = u and der(x1) = -2 u stay equations: the input keeps its own sign and factor."""
+    made = replace(model([1, 1, 0], [{3: 1.0, 2: -1.0}, {4: 1.0, 2: 2.0}]), inputs=[2])
     found = find_aliases(made)
-    assert found.root[3] == found.root[2] == 2
-    assert found.remaining == [1]
-    assert found.root[4] != 2
-    assert found.derivative[found.root[0]][0] == 2
-    assert found.derivative[found.root[1]][0] == found.root[4]
+    assert found.root == [0, 1, 2, 3, 4]
+    assert found.remaining == [0, 1]
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+@pytest.mark.parametrize("factor", [1.0, -1.0, 2.0])
+def test_an_input_may_be_the_derivative_of_another_one(order, factor):
+    """x0 = u1, x1 = der(x0), and x1 = factor u2, in any order: der(u1) = factor u2."""
+    rows = [{0: 1.0, 2: -1.0}, {1: 1.0, 4: -1.0}, {1: 1.0, 3: -factor}]
+    found = find_aliases(replace(model([1, 0, 0, 0], [rows[k] for k in order]), inputs=[2, 3]))
+    assert found.root[0] == 2
+    if factor == 1.0:
+        assert found.root[1] == found.root[4] == 3
+        assert found.derivative[2] == (3, 1.0)
+        assert not found.remaining
+    else:
+        assert found.root[4] != 3
+        assert [order[k] for k in found.remaining] in ([1], [2])
 
 
 def test_what_represents_a_class():
