@@ -208,7 +208,7 @@ class BlockSolver:
         slopes = ca.jacobian(ca.vertcat(*remaining), guesses)
         if not ca.depends_on(slopes, guesses) and len(tears) <= SMALL and self.kept.isdisjoint(rest):
             constants = ca.substitute(ca.vertcat(*remaining), guesses, ca.SX.zeros(len(tears)))
-            solution, determinant = cramer(slopes, -constants)
+            solution, determinant = cramer(ca.densify(slopes), -constants)
             # Relative to Hadamard's bound, so that "nearly zero" has a meaning without units.
             bound = prod(ca.vertsplit(ca.sqrt(ca.sum2(slopes**2)))) + _UNIT
             self.solved.determinants.append((len(self.solved.blocks), determinant / bound))
