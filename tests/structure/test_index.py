@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from modelica_like.errors import Source, StructureError
+from modelica_like.errors import Overdetermined, Source, StructureError
 from modelica_like.flatten.model import Origin
 from modelica_like.structure.index import Pantelides, prefer_relative_states
 from modelica_like.structure.states import select_states
@@ -150,14 +150,14 @@ def test_a_chain_is_preferred_if_one_of_its_levels_is() -> None:
 
 
 @st.composite
-def constraints(draw: st.DrawFn) -> tuple[list[int], list[int], np.ndarray]:
-    """Preferences, numbers of differentiations, and slopes of rank as many as there are."""
+def constraints(draw: st.DrawFn) -> tuple[list[list[int]], list[int], np.ndarray]:
+    """Preferences of all levels, numbers of differentiations, and slopes of rank as many as there are."""
     size = draw(st.integers(1, 5))
     count = draw(st.integers(0, size))
     chance = np.random.default_rng(draw(st.integers(0, 2**32)))
     slopes = np.where(chance.random((count, size)) < 0.6, chance.normal(size=(count, size)), 0.0)
     assume(not count or np.linalg.matrix_rank(slopes) == count)
-    preferences = chance.integers(0, 4, size).tolist()
+    preferences = chance.integers(0, 4, (size, 3)).tolist()
     return preferences, chance.integers(1, 3, count).tolist(), slopes
 
 
@@ -173,15 +173,14 @@ def test_states_are_what_the_first_regular_choice_of_the_least_wanted_leaves(giv
     """Of equals the one that was declared last is no state."""
     preferences, counts, slopes = given_
     size, highest = len(preferences), 3
-    made = system([highest] * size, preferences)
-    for chain, preference in enumerate(preferences):
-        for level in made.chains[chain]:
+    made = system([highest] * size)
+    for chain, own in zip(made.chains, preferences, strict=True):
+        for level, preference in zip(chain, own, strict=True):
             made.levels[level].preference = preference
     rows = [{k: float(one) for k, one in enumerate(row)} for row in slopes]
-    columns = sorted(range(size), key=lambda k: (preferences[k], -k))
-    once = first_basis(slopes, columns) if counts else []
+    once = first_basis(slopes, sorted(range(size), key=lambda k: (preferences[k][1], -k))) if counts else []
     second = slopes[[k for k, count in enumerate(counts) if count == 2]]
-    twice = first_basis(second, [k for k in columns if k in once]) if len(second) else []
+    twice = first_basis(second, sorted(once, key=lambda k: (preferences[k][0], -k))) if len(second) else []
     dummies = {*(made.chains[k][1] for k in once), *(made.chains[k][0] for k in twice)}
     expected = [level for k in range(size) for level in made.chains[k][:-1] if level not in dummies]
     assert select_states(made, [*counts, 0], [*rows, {}]) == expected
@@ -192,3 +191,13 @@ def test_unknowns_without_derivatives_and_inputs_are_no_states() -> None:
     made.inputs = [2]
     slopes = [{1: 1.0, 3: 0.5, 0: 0.0}]
     assert select_states(made, [1], slopes) == [0]
+
+
+def test_constraints_that_follow_from_others_are_told() -> None:
+    """By the path of their component, or by their kind."""
+    made = system([2, 2])
+    made.model = SimpleNamespace(components={}, linear=[])  # pyright: ignore[reportAttributeAccessIssue]
+    made.origins = [Origin(path, "Gear", Source("")) for path in ("train.gear", "", "")]
+    slopes = [{0: 1.0, 1: 2.0}, {0: -2.0, 1: -4.0}, {0: 0.5, 1: 1.0}]
+    with pytest.raises(Overdetermined, match=r"the constraint of train\.gear, Gear follows from others"):
+        select_states(made, [1, 1, 1], slopes)

@@ -71,3 +71,19 @@ def test_a_row_determines_the_column_of_its_largest_entry() -> None:
     assert choice.pivot == 1
     assert choice.add({0: 1.0, 1: -3.0, 2: 2.1})
     assert choice.pivot == 2
+
+
+def test_rounding_is_measured_by_all_terms_of_a_column() -> None:
+    """0.5 - 3e8 + (3e8 - 0.1): what is left in the last column is as uncertain as both large terms."""
+    choice = Elimination(3)
+    assert choice.add({0: 1.0, 2: 0.3e9})
+    assert choice.add({1: 1.0, 2: -0.3e9 + 0.1})
+    assert not choice.add({0: 1.0, 1: 1.0, 2: 0.5})
+    assert choice.add({0: 1.0, 1: 1.0, 2: 3.0})
+
+
+def test_a_small_independent_row_is_not_rounding() -> None:
+    choice = Elimination(2)
+    assert choice.add({0: 1.0, 1: 1e-10})
+    assert not choice.add({0: 1e-3, 1: 1e-13})
+    assert choice.add({0: 1.0})
