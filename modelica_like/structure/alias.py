@@ -12,7 +12,6 @@ PREFERENCES = ("avoid", "default", "prefer", "always")
 """Preferences of states, in rising order."""
 
 _ROUNDING = 1e-13
-_NUMBER = (float, int)
 
 
 @dataclass(frozen=True)
@@ -41,13 +40,8 @@ def find_aliases(model: FlatModel) -> Aliases:
     return _Elimination(model).run()
 
 
-def is_number(value: Any) -> bool:
-    """Return whether a coefficient is a number rather than an expression of parameters."""
-    return isinstance(value, _NUMBER)
-
-
 def _is_zero(value: Any) -> bool:
-    return value == 0.0 if isinstance(value, _NUMBER) else bool(value.is_zero())
+    return value == 0.0 if isinstance(value, float | int) else bool(value.is_zero())
 
 
 class _Elimination:
@@ -68,8 +62,7 @@ class _Elimination:
         self.cause: dict[int, int] = {}
         self.contradictions: list[tuple[int, ...]] = []
         self.inputs = set(model.inputs)
-        preference = [PREFERENCES.index(one.state) * 2 for one in model.variables]
-        self.preference = [preference[variable] + (order == 0) for variable, order in model.nodes]
+        self.preference = [PREFERENCES.index(model.variables[variable].state) for variable, _ in model.nodes]
 
     def run(self) -> Aliases:
         queue, used = self.queue, self.used
@@ -131,10 +124,9 @@ class _Elimination:
         return left, products
 
     def _sum(self, constant: Any, products: list[tuple[Any, Any]]) -> Any:
-        total: Any = constant if isinstance(constant, float) else 0.0 + self.model.coefficient(constant)
+        total = self.model.coefficient(constant)
         for coefficient, value in products:
-            if not _is_zero(value) and not (is_number(coefficient) and coefficient == 0.0):
-                total = total + self.model.coefficient(coefficient) * value
+            total = total + self.model.coefficient(coefficient) * value
         return total
 
     def _consider(self, number: int) -> set[int]:
@@ -145,19 +137,19 @@ class _Elimination:
         if not terms:
             self.contradictions.append(self._causes(number))
             return set()
-        # Computing the constant takes longer than all the rest; only short equations need it.
-        constant = self._sum(equation.constant, products) if len(terms) <= 2 else 0.0
-        if len(terms) == 1:
-            ((root, coefficient),) = terms.items()
-            if coefficient is not None and root not in self.integral and root not in self.inputs:
+        match [*terms.items()]:
+            case [(root, float(slope))] if root not in self.integral and root not in self.inputs:
+                constant = self._sum(equation.constant, products)
                 self.used.add(number)
                 self.cause[root] = number
-                return self._learn(root, -constant / coefficient if not _is_zero(constant) else 0.0)
-        if len(terms) == 2 and _is_zero(constant):
-            (first, a), (second, b) = terms.items()
-            if a is not None and b is not None and self._may_merge(first, second):
+                return self._learn(root, 0.0 if _is_zero(constant) else -constant / slope)
+            case [(first, float(a)), (second, float(b))] if self._may_merge(first, second, -b / a) and _is_zero(
+                self._sum(equation.constant, products)
+            ):
                 self.used.add(number)
                 return self._merge(first, second, -b / a)
+            case _:
+                pass
         self.remaining.add(number)
         for root in terms:
             self.watchers.setdefault(root, set()).add(number)
@@ -186,9 +178,16 @@ class _Elimination:
                 affected |= self._learn(below, 0.0)
         return affected
 
-    def _may_merge(self, first: int, second: int) -> bool:
+    def _may_merge(self, first: int, second: int, ratio: float) -> bool:
+        """First = ratio * second."""
         if first in self.inputs and second in self.inputs:
             return False
+        # As a derivative, an input would take the factor of the integral's name; only that of another input has none.
+        for one, other, times in ((first, second, 1.0 / ratio), (second, first, ratio)):
+            if one in self.inputs and other in self.integral:
+                base = self._integral_root(other)
+                if base not in self.inputs or self._derivative(base)[1] * times != 1.0:
+                    return False
         # der(x) = -x remains an equation: a class is not its own derivative.
         if second in self._integrals(first) or first in self._integrals(second):
             return False
@@ -224,7 +223,9 @@ class _Elimination:
             else:
                 # der(keep) = der(drop) / factor = times / factor * node
                 self.derivative[keep] = (node, times / factor)
-                self.integral[self.find(node)[0]] = keep
+                below, _ = self.find(node)
+                self.integral[below] = keep
+                affected |= self.watchers.get(below, set())
         return affected
 
     def _merge_derivatives(self, keep: int, node: int, times: float) -> set[int]:

@@ -131,9 +131,8 @@ def _entries(system: System, counts: list[int]) -> dict[int, dict[int, bool]]:
     """Variables of every constraint, and whether its slope by them moves; of highest derivatives after all only."""
     rows = [k for k, count in enumerate(counts) if count]
     entries: dict[int, dict[int, bool]] = {row: {} for row in rows}
-    jacobian = ca.jacobian(system.residual[rows], system.everything) if rows else ca.SX(0, 0)
-    volatile = ca.vertcat(system.everything, system.model.d, system.model.time)
-    moving = ca.which_depends(jacobian.nz[:], volatile, 1, True) if jacobian.nnz() else ()
+    jacobian = ca.jacobian(system.residual[rows], system.everything)
+    moving = ca.which_depends(jacobian.nz[:], system.volatile, 1, True)
     for place, column, moves in zip(*jacobian.sparsity().get_triplet(), moving, strict=True):
         level, row = system.levels[column], rows[place]
         if level.order + counts[row] == len(system.chains[level.chain]) - 1 and column not in system.inputs:
@@ -168,19 +167,11 @@ def _vanishes(system: System, rows: list[int], dependent: list[int]) -> bool:
     function = ca.Function("slopes", [system.everything, model.p, model.d, model.time], [slopes])
     nominal = np.array([level.nominal for level in system.levels])[:, None]
     points = nominal * chance.uniform(-np.pi, np.pi, (len(nominal), _SAMPLES))
-    times = 10.0 ** chance.uniform(*_TIMES, (1, _SAMPLES))
-    values = function.map(_SAMPLES)(points, *_constants(system), times).full()
-    found = np.linalg.det(values.T.reshape(_SAMPLES, len(rows), -1))
-    found = found[np.isfinite(found)]
+    times = np.logspace(*_TIMES, _SAMPLES)[None]
+    values = function.map(_SAMPLES)(points, *system.constants, times).full().T.reshape(_SAMPLES, len(rows), -1)
+    found = np.linalg.det(values[[bool(np.isfinite(one).all()) for one in values]])
     sizes = np.abs(found)
     return bool(len(found) and (found.min() < 0 < found.max() or sizes.min() < _VANISHES * sizes.max()))
-
-
-def _constants(system: System) -> tuple[list[float], list[float]]:
-    """Parameters, and discrete values at the start."""
-    model = system.model
-    starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
-    return [one.value for one in model.parameters], starts + [0.0] * (model.d.numel() - len(starts))
 
 
 def _group(system: System, part: dict[int, dict[int, bool]], count: int) -> Group:
@@ -228,15 +219,15 @@ def _follow(system: System, group: Group, numbers: Counter[str]) -> Following:
     system.model = replace(model, discretes=[*model.discretes, *discretes], d=ca.vertcat(model.d, symbols))
     weights = ca.reshape(symbols[1:], len(moved), -1)
     states = ca.vertcat(*(system.symbols[system.chains[chain][0]] for chain in chains))
-    sums = ca.mtimes(weights.T, _measured(system, group.levels))
+    sums = ca.mtimes(weights.T, _measured(system, group, group.levels))
     system.residual = ca.vertcat(system.residual, states - sums)
     system.origins += [origin] * len(chains)
     return Following(group, moved, len(model.discretes), tuple(chains), slopes, origin)
 
 
-def _measured(system: System, levels: Sequence[int]) -> Any:
-    """Variables, or their derivatives, over nominal values."""
-    return ca.vertcat(*(system.symbols[level] / system.levels[level].nominal for level in levels))
+def _measured(system: System, group: Group, levels: Sequence[int]) -> Any:
+    """Variables, or their derivatives, over the nominal values of the variables."""
+    return system.column(levels) / ca.DM([system.levels[level].nominal for level in group.levels])
 
 
 def _add_chain(system: System, name: str, count: int) -> int:
@@ -257,10 +248,10 @@ def _first_weights(system: System, slopes: Any) -> Any:
     for start in model.starts:
         placed = system.node_level[start.node]
         if placed is not None:
-            p, d = _constants(system)
+            p, d = system.constants
             values[placed[0]] = float(ca.Function("start", [model.p, model.d], [start.value])(p, d)) / placed[1]
     function = ca.Function("slopes", [system.everything, model.p, model.d, model.time], [ca.densify(slopes)])
-    found = function(values, *_constants(system), 0.0).full()
+    found = function(values, *system.constants, 0.0).full()
     found = np.where(np.isfinite(found), found, 0.0)
     sizes = np.linalg.norm(found, axis=1, keepdims=True)
     found += _OFF * np.where(sizes > 0, sizes, 1.0) * np.random.default_rng(2).uniform(-1, 1, found.shape)
@@ -296,7 +287,7 @@ def write_choice(one: Following, system: System, states: list[int], level_values
     for order in range(one.group.count):
         sums = [system.chains[chain][order] for chain in one.chains]
         targets += [("state", states.index(level) if level in states else -1) for level in sums]
-        values.append(ca.mtimes(weights.T, _measured(system, levels)))
+        values.append(ca.mtimes(weights.T, _measured(system, one.group, levels)))
         levels = [above for level in levels if (above := system.derivative(level)) is not None]
     arguments = [system.everything, model.p, model.d, model.time]
     written = ca.Function("choice", arguments, [_LEAST - left**2, ca.vertcat(*values)])

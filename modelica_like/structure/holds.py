@@ -134,15 +134,13 @@ def find_circuits(
         states: levels that are states.
     """
     rigid = [k for k, one in enumerate(holds) if one.rigid and one.reaction >= 0]
-    placed = [system.node_level[holds[k].motion] for k in rigid]
-    levels = [pair[0] for pair in placed if pair is not None]
-    if len(rigid) < 2 or (len(levels) == len(rigid) and len(set(levels)) == len(levels) and set(levels) <= set(states)):
+    if len(rigid) < 2:
         return []
     slopes = _slopes(system, [holds[k].motion for k in rigid], order, states)
     sizes = np.linalg.norm(slopes, axis=1)
     moving = sizes > 0.0
     rigid = [k for k, moves in zip(rigid, moving, strict=True) if moves]
-    left, values, _ = np.linalg.svd(slopes[moving] / sizes[moving, None]) if rigid else (np.eye(0), np.zeros(0), None)
+    left, values, _ = np.linalg.svd(slopes[moving] / sizes[moving, None])
     silent = left[:, np.sum(values > _DEPENDENT) :]
     together = np.abs(silent @ silent.T) > _DEPENDENT
     first, circuits = system.model.d.numel(), list[Circuit]()
@@ -157,8 +155,7 @@ def _slopes(system: System, nodes: list[int], order: list[tuple[Any, Any]], stat
     motions = system.node_values[nodes]
     if order:
         _, (motions,) = ca.substitute_inplace([s for s, _ in order], [e for _, e in order], [motions], False)
-    x = ca.vertcat(*(system.symbols[n] for n in states)) if states else ca.SX(0, 1)
-    return np.asarray(system.generic(ca.jacobian(motions, x)).full())
+    return system.generic(ca.jacobian(motions, system.column(states))).full()
 
 
 def _groups(together: Any) -> list[list[int]]:

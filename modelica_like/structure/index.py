@@ -70,13 +70,11 @@ class Pantelides:
             equations, levels, found = self._augment(equation)
             if found:
                 return
-            for level in levels:
-                if self.system.derivative(level) is None:
-                    self.system.add_level(self.system.levels[level].chain)
+            above = {level: self.system.add_level(self.system.levels[level].chain) for level in levels}
             for one in equations:
                 self._differentiate(one)
             for level in levels:
-                self._assign(self._above(level), self._derived[self._equation_of[level]])
+                self._assign(above[level], self._derived[self._equation_of[level]])
             equation = self._derived[equation]
 
     def _augment(self, start: int) -> tuple[list[int], dict[int, int], bool]:
@@ -89,27 +87,21 @@ class Pantelides:
                     continue
                 came_from[level] = equation
                 if level not in self._equation_of:
-                    self._flip(came_from, level, start)
+                    self._flip(came_from, level)
                     return equations, came_from, True
                 equations.append(self._equation_of[level])
         return equations, came_from, False
 
-    def _flip(self, came_from: dict[int, int], level: int, start: int) -> None:
-        while True:
+    def _flip(self, came_from: dict[int, int], level: int | None) -> None:
+        while level is not None:
             equation = came_from[level]
             released = self._level_of.get(equation)
             self._assign(level, equation)
-            if equation == start or released is None:
-                return
             level = released
 
     def _assign(self, level: int, equation: int) -> None:
         self._equation_of[level] = equation
         self._level_of[equation] = level
-
-    def _above(self, level: int) -> int:
-        above = self.system.derivative(level)
-        return self.system.add_level(self.system.levels[level].chain) if above is None else above
 
     def _differentiate(self, equation: int) -> None:
         root = self._root[equation]

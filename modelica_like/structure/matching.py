@@ -40,22 +40,19 @@ class Matching:
                     continue
                 came_from[column] = current
                 if column not in self._row_of:
-                    self._flip(came_from, column, number)
+                    self._flip(came_from, column)
                     return True
                 pending.append(self._row_of[column])
         # No path leads from these columns to an open one, and rows added later cannot create one.
         self._taken.update(came_from)
-        self._rows.pop()
         return False
 
-    def _flip(self, came_from: dict[int, int], column: int, start: int) -> None:
-        while True:
+    def _flip(self, came_from: dict[int, int], column: int | None) -> None:
+        while column is not None:
             row = came_from[column]
             released = self._column_of.get(row)
             self._row_of[column] = row
             self._column_of[row] = column
-            if row == start or released is None:
-                return
             column = released
 
     def undetermined(self) -> list[int]:
@@ -99,6 +96,16 @@ class Elimination:
 
     def add(self, row: Mapping[int, float]) -> bool:
         """Add a row, entries by columns; False if it depends on the rows so far."""
+        left = self._left(row)
+        if not left:
+            return False
+        pivot = max(left, key=lambda column: abs(left[column]))
+        self._row_of[pivot] = len(self._rows)
+        self._rows.append((pivot, left))
+        return True
+
+    def _left(self, row: Mapping[int, float]) -> dict[int, float]:
+        """What is left of a row in the columns that have no row; nothing if it depends on the rows so far."""
         values = dict(row)
         sizes = {column: abs(value) for column, value in values.items()}
         pending = [self._row_of[column] for column in values if column in self._row_of]
@@ -116,18 +123,8 @@ class Elimination:
                 change = value * entry / known[pivot]
                 values[column] = values.get(column, 0.0) - change
                 sizes[column] = sizes.get(column, 0.0) + abs(change)
-        left = {column: value for column, value in values.items() if abs(value) > _ROUNDING * sizes[column]}
-        if not left:
-            return False
-        pivot = max(left, key=lambda column: abs(left[column]))
-        self._row_of[pivot] = len(self._rows)
-        self._rows.append((pivot, left))
-        return True
+        return {column: value for column, value in values.items() if abs(value) > _ROUNDING * sizes[column]}
 
     def undetermined(self) -> list[int]:
-        """Columns that another choice of pivots could leave open, in order."""
-        open_columns = {column for column in range(self.columns) if column not in self._row_of}
-        for pivot, known in reversed(self._rows):
-            if not open_columns.isdisjoint(known):
-                open_columns.add(pivot)
-        return sorted(open_columns)
+        """Columns that another choice of pivots could leave open, in order: giving their value would be new."""
+        return [column for column in range(self.columns) if self._left({column: 1.0})]

@@ -7,6 +7,7 @@ from typing import Any
 
 import casadi as ca
 
+from modelica_like.structure.blocks import triangular
 from modelica_like.structure.system import System
 
 
@@ -43,29 +44,18 @@ class Flags:
         """
         if not self.variables:
             return False
-        equation_block, unknown_block = _blocks(residual, ca.vertcat(*(self.system.symbols[n] for n in unknowns)))
-        block_of = dict(zip(unknowns, unknown_block, strict=True))
-        values = [1.0] * len(self.variables)
+        jacobian = ca.jacobian_sparsity(residual, ca.vertcat(*(self.system.symbols[n] for n in unknowns)))
+        block_of_row, block_of_level = dict[int, int](), dict[int | None, int]()
+        for number, (rows, columns) in enumerate(triangular(jacobian)):
+            block_of_row |= dict.fromkeys(rows, number)
+            block_of_level |= dict.fromkeys((unknowns[column] for column in columns), number)
+        values = ca.SX.ones(len(self.variables))
         for row, column in zip(*ca.jacobian_sparsity(self._residual, self._symbols).get_triplet(), strict=True):
-            rate = self._acceleration(self.variables[column])
-            if rate in block_of and block_of[rate] == equation_block[row]:
-                values[column] = 0.0
-        self._put(ca.SX(ca.DM(values)))
+            if block_of_level.get(self._acceleration(self.variables[column])) == block_of_row[row]:
+                values[column] = 0
+        self._put(values)
         return True
 
     def _acceleration(self, variable: int) -> int | None:
         placed = self.system.node_level[variable]
         return None if placed is None else self.system.derivative(placed[0])
-
-
-def _blocks(residual: Any, unknowns: Any) -> tuple[list[int], list[int]]:
-    """Number of the block of every equation and of every unknown."""
-    count, row_order, column_order, row_starts, column_starts, _, _ = ca.jacobian_sparsity(residual, unknowns).btf()
-    results: list[list[int]] = []
-    for order, starts in ((row_order, row_starts), (column_order, column_starts)):
-        block = [0] * len(order)
-        for number in range(count):
-            for place in order[starts[number] : starts[number + 1]]:
-                block[place] = number
-        results.append(block)
-    return results[0], results[1]

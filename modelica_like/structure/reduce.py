@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -73,10 +73,10 @@ class ReducedDae:
     determinants: tuple[tuple[tuple[str, ...], tuple[Origin, ...], Any], ...]
     index: int
     differentiated: tuple[Origin, ...]
-    system: System = field(repr=False)
-    implicit_blocks: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...] = field(repr=False)
-    level_values: Any = field(repr=False)
-    explicit: tuple[tuple[int, Any], ...] = field(repr=False)
+    system: System
+    implicit_blocks: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...]
+    level_values: Any
+    explicit: tuple[tuple[int, Any], ...]
     holds: tuple[HeldMotion, ...] = ()
     circuits: tuple[Circuit, ...] = ()
     choices: tuple[Choice, ...] = ()
@@ -142,12 +142,12 @@ def reduce(flat: FlatModel) -> ReducedDae:
     rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
     ideals = find_ideals(flat)
     kept = [one.row for one in ideals]
-    solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates, kept).run()
+    solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
     if circuits:
         residual = share_reactions(system, holds, circuits, residual)
-        solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates, kept).run()
+        solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
     own = len(counts) - sum(len(one.chains) for one in chosen.following)
     reduced = _assemble(system, counts[:own], states, unknowns, origins, solved)
     held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
@@ -197,16 +197,10 @@ def _check_input_rates(system: System) -> None:
             )
 
 
-def _volatile(system: System) -> Any:
-    return ca.vertcat(system.everything, system.model.d, system.model.time)
-
-
 def _incidence(system: System) -> list[list[int]]:
     """Level numbers in each residual."""
-    symbols = system.everything
-    function = ca.Function("residual", [symbols, system.model.p, system.model.d, system.model.time], [system.residual])
     rows: list[list[int]] = [[] for _ in range(system.residual.numel())]
-    for row, column in zip(*function.jac_sparsity(0, 0).get_triplet(), strict=True):
+    for row, column in zip(*ca.jacobian_sparsity(system.residual, system.everything).get_triplet(), strict=True):
         rows[row].append(column)
     return rows
 
@@ -215,15 +209,13 @@ def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:
     """Derivative of each fully differentiated equation by the highest level of each chain, at a generic point."""
     slopes: list[dict[int, float]] = [{} for _ in counts]
     rows = [k for k, count in enumerate(counts) if count]
-    if not rows:
-        return slopes
     # d e^(c) / d v^(d) equals d e / d v^(d - c), so the original equations are enough.
     values = system.generic(ca.jacobian(system.residual[rows], system.everything))
     for place, column, value in zip(*values.sparsity().get_triplet(), values.nonzeros(), strict=True):
         level = system.levels[column]
         row = rows[place]
         if level.order + counts[row] == len(system.chains[level.chain]) - 1:
-            slopes[row][level.chain] = slopes[row].get(level.chain, 0.0) + float(value)
+            slopes[row][level.chain] = float(value)
     return slopes
 
 
@@ -233,15 +225,13 @@ def _differentiate(system: System, counts: list[int]) -> tuple[Any, list[Origin]
     origins = list(system.origins)
     rows = list(range(len(counts)))
     current = system.residual
-    model = system.model
+    above = {n: rate for n in range(len(system.levels)) if (rate := system.derivative(n)) is not None}
     times = 1
     while keep := [k for k, row in enumerate(rows) if counts[row] >= times]:
         current, rows = current[keep], [rows[k] for k in keep]
         _check_inputs(system, current, rows)
-        moving = [n for n in range(len(system.levels)) if system.derivative(n) is not None]
-        rates = system.column([number for n in moving if (number := system.derivative(n)) is not None])
-        by_time = ca.jtimes(current, model.time, ca.SX(1))
-        current = ca.jtimes(current, system.column(moving), rates) + by_time
+        by_time = ca.jtimes(current, system.model.time, ca.SX(1))
+        current = ca.jtimes(current, system.column(above), system.column(above.values())) + by_time
         residuals.append(current)
         origins += [system.origins[row] for row in rows]
         times += 1
@@ -250,10 +240,7 @@ def _differentiate(system: System, counts: list[int]) -> tuple[Any, list[Origin]
 
 def _check_inputs(system: System, equations: Any, rows: list[int]) -> None:
     unknown_rates = [level for level in system.inputs if system.derivative(level) is None]
-    if not unknown_rates:
-        return
-    inputs = system.column(unknown_rates)
-    for place, depends in enumerate(ca.which_depends(equations, inputs, 1, True)):
+    for place, depends in enumerate(ca.which_depends(equations, system.column(unknown_rates), 1, True)):
         if depends:
             origin = system.origins[rows[place]]
             names = ", ".join(system.levels[n].name for n in unknown_rates)

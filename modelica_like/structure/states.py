@@ -28,7 +28,7 @@ def select_states(system: System, counts: list[int], slopes: list[dict[int, floa
     known = set(system.inputs)
     dummies: set[int] = set()
     stage = 1
-    candidates = [c for c, chain in enumerate(system.chains) if len(chain) > 1 and chain[0] not in known]
+    candidates = [c for c, chain in enumerate(system.chains) if chain[0] not in known]
     while rows := [e for e, count in enumerate(counts) if count >= stage]:
         columns = [c for c in candidates if len(system.chains[c]) > stage]
         columns.sort(key=lambda c: (_preference(system, c, stage), -c))
@@ -51,12 +51,10 @@ def _independent(rows: list[int], columns: list[int], slopes: list[dict[int, flo
     entries: dict[int, dict[int, float]] = {c: {} for c in columns}
     for row in rows:
         for column, slope in slopes[row].items():
-            if column in entries and slope:
+            if column in entries:
                 entries[column][row] = slope
     found, chosen = Elimination(len(rows)), dict[int, int]()
     for column in columns:
-        if found.size == len(rows):
-            break
         if found.add(entries[column]):
             chosen[column] = found.pivot
     return chosen

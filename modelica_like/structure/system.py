@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
-from modelica_like.flatten.model import FlatModel, Origin, evaluate
+from modelica_like.flatten.model import FlatModel, FlatVariable, Origin, evaluate
 from modelica_like.structure.alias import PREFERENCES, Aliases
 
 
@@ -55,31 +57,37 @@ class System:
     node_values: Any
     inputs: list[int] = field(default_factory=list)
     linear_rows: list[list[int]] = field(default_factory=list)
-    _stacked: Any = None
 
-    def column(self, levels: list[int]) -> Any:
+    def column(self, levels: Iterable[int]) -> Any:
         """Return the column of symbols of some levels."""
-        if not levels:
-            return ca.SX(0, 1)
-        if self._stacked is None or self._stacked.numel() != len(self.symbols):
-            self._stacked = ca.vertcat(*self.symbols)
-        # A vector of one entry, indexed by a list, gives a row.
-        return ca.vec(self._stacked[levels])
+        return ca.vertcat(ca.SX(0, 1), *(self.symbols[level] for level in levels))
 
     @property
     def everything(self) -> Any:
         """The column of all symbols."""
-        return self.column(list(range(len(self.symbols))))
+        return ca.vertcat(ca.SX(0, 1), *self.symbols)
+
+    @property
+    def volatile(self) -> Any:
+        """The column of all symbols that change during a run."""
+        return ca.vertcat(self.everything, self.model.d, self.model.time)
+
+    @property
+    def constants(self) -> tuple[list[float], Any]:
+        """Values of parameters, and of modes and discrete values at the start; those that are no numbers are zero."""
+        starts = np.zeros(self.model.d.numel())
+        for k, one in enumerate(self.model.discretes):
+            if isinstance(one.start, int | float):
+                starts[k] = one.start
+        return [one.value for one in self.model.parameters], starts
 
     def generic(self, expressions: Any) -> ca.DM:
         """Return numbers at a point that is not special; parameters have their values, modes their starts."""
         model = self.model
         function = ca.Function("generic", [self.everything, model.p, model.d, model.time], [expressions])
         # No two values are equal: the ends of a rod must not coincide.
-        point = [0.3 + 0.61803398875 * (k % 7 + 1) + 0.7548776662 * k % 1 / 10 for k in range(len(self.symbols))]
-        starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
-        starts += [0.0] * (model.d.numel() - len(starts))
-        return function(point, [one.value for one in model.parameters], starts, 0.0)
+        chance = np.random.default_rng(1)
+        return function(chance.random(len(self.symbols)), *self.constants, chance.random())
 
     def add_level(self, chain: int) -> int:
         """Extend a chain by one derivative."""
@@ -99,42 +107,40 @@ class System:
 
 def build_system(model: FlatModel, aliases: Aliases) -> System:
     """Replace every node by its class, and collect the equations that remain."""
-    levels, chains, place = _chains(model, aliases)
+    chains, place = _chains(aliases)
     node_level = _node_levels(aliases, place)
-    _name_levels(model, levels, node_level)
-    node_level = _turn_chains(model, levels, node_level)
-    _name_levels(model, levels, node_level)
+    # A state equals the variable after which its chain is named, with sign.
+    ranked = _ranked(model, node_level)
+    scale = {level: ranked[chain[0]][0][-1] for chain in chains for level in chain}
+    node_level = [pair and (pair[0], pair[1] / scale[pair[0]]) for pair in node_level]
+    levels = _levels(model, chains, _ranked(model, node_level))
     symbols = [ca.SX.sym(level.name) for level in levels]
-    node_values = _node_values(model, aliases, node_level, symbols)
+    node_values = _node_values(aliases, node_level, symbols)
     system = System(model, levels, chains, symbols, None, [], node_level, node_values)
     system.inputs = [place[aliases.root[node]][0] for node in model.inputs]
     _collect_residuals(system, aliases)
     return system
 
 
-def _chains(model: FlatModel, aliases: Aliases) -> tuple[list[Level], list[list[int]], dict[int, tuple[int, float]]]:
+def _chains(aliases: Aliases) -> tuple[list[list[int]], dict[int, tuple[int, float]]]:
     """Number the classes along their derivatives; `place` gives each class (level, factor)."""
     roots = dict.fromkeys(root for root in aliases.root if root not in aliases.known)
     below = {target for root, (target, _) in aliases.derivative.items() if root in roots}
-    levels: list[Level] = []
     chains: list[list[int]] = []
     place: dict[int, tuple[int, float]] = {}
     for base in roots:
         if base in below:
             continue
-        numbers: list[int] = []
-        root, factor = base, 1.0
-        while True:
+        chains.append([])
+        root: int | None = base
+        factor = 1.0
+        while root is not None:
             # The level's symbol is the exact derivative of the level above: root = symbol / factor.
-            place[root] = (len(levels), 1.0 / factor)
-            numbers.append(len(levels))
-            levels.append(Level(len(chains), len(numbers) - 1, "", 0, 1.0, 0.0))
-            if root not in aliases.derivative:
-                break
-            root, times = aliases.derivative[root]
-            factor = factor * times
-        chains.append(numbers)
-    return levels, chains, place
+            chains[-1].append(len(place))
+            place[root] = (len(place), 1.0 / factor)
+            root, times = aliases.derivative.get(root, (None, 1.0))
+            factor *= times
+    return chains, place
 
 
 def _node_levels(aliases: Aliases, place: dict[int, tuple[int, float]]) -> list[tuple[int, float] | None]:
@@ -143,69 +149,55 @@ def _node_levels(aliases: Aliases, place: dict[int, tuple[int, float]]) -> list[
     return [found and (found[0], factor * found[1]) for found, factor in pairs]
 
 
-def _turn_chains(
-    model: FlatModel, levels: list[Level], node_level: list[tuple[int, float] | None]
-) -> list[tuple[int, float] | None]:
-    """Give the variable after which a chain is named the factor one, so that a state equals its variable, with sign."""
-    scale: dict[int, float] = {}
-    for node, placed in enumerate(node_level):
-        if placed is not None and placed[1] != 1.0:
-            level = levels[placed[0]]
-            if level.order == 0 and level.name == model.node_name(node):
-                scale[level.chain] = placed[1]
-    if not scale:
-        return node_level
-    return [pair and (pair[0], pair[1] / scale.get(levels[pair[0]].chain, 1.0)) for pair in node_level]
+_Named = tuple[tuple[Any, ...], int, FlatVariable, float]
+"""Rank of a node as the name of its level, the node, its variable, and its factor."""
 
 
-def _name_levels(model: FlatModel, levels: list[Level], node_level: list[tuple[int, float] | None]) -> None:
-    best: dict[int, tuple[Any, ...]] = {}
+def _ranked(model: FlatModel, node_level: list[tuple[int, float] | None]) -> dict[int, list[_Named]]:
+    """Nodes of each level; what should name it comes first."""
+    found: dict[int, list[_Named]] = {}
     for node, placed in enumerate(node_level):
-        if placed is None:
-            continue
-        level, factor = placed
-        variable, order = model.nodes[node]
-        one = model.variables[variable]
-        preference = PREFERENCES.index(one.state)
-        rank = (order, one.kind in ("potential", "flow"), factor != 1.0, -preference, one.path.count("."), node)
-        if order == 0:
-            levels[level].preference = max(levels[level].preference, preference)
+        if placed is not None:
+            level, factor = placed
+            variable, order = model.nodes[node]
+            one = model.variables[variable]
+            connected, preference = one.kind in ("potential", "flow"), PREFERENCES.index(one.state)
+            rank = (order, connected, factor != 1.0, -preference, one.path.count("."))
+            found.setdefault(level, []).append((rank, node, one, factor))
+    return {level: sorted(nodes) for level, nodes in found.items()}
+
+
+def _levels(model: FlatModel, chains: list[list[int]], ranked: dict[int, list[_Named]]) -> list[Level]:
+    levels: list[Level] = []
+    for chain, numbers in enumerate(chains):
+        for order, number in enumerate(numbers):
+            (_, node, named, _), *_ = nodes = ranked[number]
+            own = [(one, factor) for rank, _, one, factor in nodes if rank[0] == 0]
+            preference = max((PREFERENCES.index(one.state) for one, _ in own), default=0)
             # The name says nothing about the guess: any of them that has one knows more than zero.
-            levels[level].guess = levels[level].guess or one.guess / factor
-        if level not in best or rank < best[level]:
-            best[level] = rank
-            levels[level].name = model.node_name(node)
-            levels[level].nominal = one.nominal
-            if order == 0 and one.guess:
-                levels[level].guess = one.guess / factor
+            guess = next((one.guess / factor for one, factor in own if one.guess), 0.0)
+            levels.append(Level(chain, order, model.node_name(node), preference, named.nominal, guess))
+    return levels
 
 
-def _node_values(
-    model: FlatModel, aliases: Aliases, node_level: list[tuple[int, float] | None], symbols: list[Any]
-) -> Any:
-    vector = ca.vertcat(ca.SX(0, 1), *symbols)
-    placed = [pair or (0, 0.0) for pair in node_level]
-    if symbols:
-        # A vector of one entry, indexed by a list, gives a row.
-        values = ca.vec(vector[[level for level, _ in placed]]) * ca.SX(ca.DM([factor for _, factor in placed]))
-        values = ca.densify(values)
-    else:
-        values = ca.SX.zeros(len(placed))
-    for node, pair in enumerate(node_level):
-        if pair is None:
-            values[node] = aliases.factor[node] * aliases.known[aliases.root[node]]
-    return values
+def _node_values(aliases: Aliases, node_level: list[tuple[int, float] | None], symbols: list[Any]) -> Any:
+    vector = ca.vertcat(ca.SX(0, 1), *symbols, *aliases.known.values())
+    known = {root: len(symbols) + k for k, root in enumerate(aliases.known)}
+    nodes = zip(node_level, aliases.root, aliases.factor, strict=True)
+    placed = [pair or (known[root], factor) for pair, root, factor in nodes]
+    # A vector of one entry, indexed by a list, gives a row.
+    return ca.vec(vector[[level for level, _ in placed]]) * ca.SX(ca.DM([factor for _, factor in placed]))
 
 
 def _collect_residuals(system: System, aliases: Aliases) -> None:
     model = system.model
     columns = evaluate(model, "residual", system.node_values)
-    first = dict(zip(columns, accumulate((one.numel() for one in columns.values()), initial=0), strict=False))
+    *starts, count = accumulate((one.numel() for one in columns.values()), initial=0)
+    first = dict(zip(columns, starts, strict=True))
     sums: list[Any] = []
     # Positions in all columns, then the sums; together this is cheaper than one by one.
     places = [first[instance] + row for instance, row in model.general]
     system.origins += [model.origin(instance, row) for instance, row in model.general]
-    count = sum(one.numel() for one in columns.values())
     for number in aliases.remaining:
         equation = model.linear[number]
         system.linear_rows.append(_levels_of(system, equation.terms))

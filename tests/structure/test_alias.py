@@ -2,43 +2,16 @@
 
 import itertools
 from dataclasses import replace
+from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from linear_models import ORIGIN, chains, coefficients, model
 
-from modelica_like.errors import Source
-from modelica_like.flatten.model import FlatModel, FlatVariable, LinearEquation, Origin
-from modelica_like.structure.alias import find_aliases
-from modelica_like.units import ONE
-
-ORIGIN = Origin("", "test", Source(""))
-
-
-def model(orders: list[int], rows: list[dict[int, float]], constants: list[float] | None = None) -> FlatModel:
-    """Flat model of variables of which some are differentiated, with linear equations over the nodes."""
-    variables = [FlatVariable(f"x{k}", ONE, "", "local", "default", 0.0, 1.0, None, None) for k in range(len(orders))]
-    nodes = [(k, 0) for k in range(len(orders))]
-    derivative: dict[int, int] = {}
-    for k, order in enumerate(orders):
-        node = k
-        for level in range(1, order + 1):
-            derivative[node] = len(nodes)
-            nodes.append((k, level))
-            node = derivative[node]
-    given = constants or [0.0] * len(rows)
-    linear = [LinearEquation(tuple(row.items()), c, ORIGIN) for row, c in zip(rows, given, strict=True)]
-    none = ca.SX(0, 1)
-    return FlatModel(
-        name="test", variables=variables, nodes=nodes, derivative=derivative, parameters=[], p=none, q=none, derived=[],
-        formulas=none, discretes=[], d=none, time=ca.SX.sym("t"), instances=[], linear=linear, general=[], starts=[],
-        inputs=[], components={},
-    )  # fmt: skip
-
-
-coefficients = st.sampled_from([1.0, -1.0, 2.0, -0.5, 3.0, 0.1])
+from modelica_like.flatten.model import Coefficient, FlatModel, LinearEquation
+from modelica_like.structure.alias import Aliases, find_aliases
 
 
 @st.composite
@@ -50,7 +23,7 @@ def systems(draw: st.DrawFn) -> tuple[int, list[dict[int, float]]]:
         chosen = draw(
             st.lists(st.integers(0, size - 1), min_size=1, max_size=draw(st.sampled_from([1, 2, 2, 2, 3])), unique=True)
         )
-        rows.append({k: draw(coefficients) for k in chosen})
+        rows.append({k: draw(coefficients | st.just(0.0)) for k in chosen})
     if len(rows) > 1 and draw(st.booleans()):
         first, second = rows[0], rows[1]
         rows.append({k: first.get(k, 0.0) - 0.1 * second.get(k, 0.0) for k in {**first, **second}})
@@ -84,6 +57,96 @@ def test_every_solution_of_the_equations_fulfils_the_aliases_and_none_is_lost(sy
         assert np.linalg.norm(matrix[number] @ embedding) < 1e-9
     # Nothing with one or two unknowns is left over.
     assert all(np.count_nonzero(np.abs(row) > 1e-12) > 2 for row in left)
+
+
+DERIVATIVES = 8
+
+
+def jets(made: FlatModel, rows: list[dict[int, float]], constants: list[float]) -> tuple[np.ndarray, list[int]]:
+    """All equations and their derivatives, over all derivatives and a column of ones; and the column of every node."""
+    width = 3 + DERIVATIVES
+    columns = [variable * width + order for variable, order in made.nodes]
+    matrix = np.zeros((len(rows) * DERIVATIVES, len(made.variables) * width + 1))
+    for number, (row, constant) in enumerate(zip(rows, constants, strict=True)):
+        for times in range(DERIVATIVES):
+            for node, value in row.items():
+                matrix[number * DERIVATIVES + times, columns[node] + times] += value
+        matrix[number * DERIVATIVES, -1] = constant
+    return matrix, columns
+
+
+def follows(relation: np.ndarray, matrix: np.ndarray) -> bool:
+    """Is a relation a sum of equations?"""
+    shares = np.linalg.lstsq(matrix.T, relation, rcond=None)[0]
+    return bool(np.linalg.norm(matrix.T @ shares - relation) < 1e-9 * (1 + np.linalg.norm(relation)))
+
+
+@given(chains())
+@settings(deadline=None, max_examples=80)
+def test_what_is_said_of_derivatives_follows_from_the_equations(system: tuple[FlatModel, Any, Any]) -> None:
+    made, rows, constants = system
+    found = find_aliases(made)
+    matrix, columns = jets(made, rows, constants)
+    for node, (root, factor) in enumerate(zip(found.root, found.factor, strict=True)):
+        relation = np.zeros(matrix.shape[1])
+        relation[columns[node]] += 1.0
+        if root in found.known:
+            relation[-1] = -factor * found.known[root]
+        else:
+            relation[columns[root]] -= factor
+        assert follows(relation, matrix)
+    for node, above in made.derivative.items():
+        root = found.root[node]
+        if root not in found.known:  # der(factor * root) is the node above
+            target, times = found.derivative[root]
+            assert target == found.root[above]
+            assert found.factor[node] * times == pytest.approx(found.factor[above], rel=1e-12)
+        else:
+            assert found.known[found.root[above]] == 0.0
+    assert all(found.root[node] == node and found.factor[node] == 1.0 for node in made.inputs)
+    assert not found.known.keys() & {*made.inputs}
+    assert_chains_are_lines(found)
+    assert_nothing_simple_is_left(found, made, rows, constants)
+
+
+def above(found: Aliases, root: int) -> list[int]:
+    """The derivatives of a class."""
+    reached = [root]
+    while reached[-1] in found.derivative:
+        reached.append(found.derivative[reached[-1]][0])
+        assert len(reached) <= len(found.root), "a class is not its own derivative"
+    return reached[1:]
+
+
+def assert_chains_are_lines(found: Aliases) -> None:
+    unknown = {root for root in found.root if root not in found.known}
+    targets = [found.derivative[root][0] for root in unknown & found.derivative.keys()]
+    assert len(targets) == len(set(targets)), "a class is the derivative of one class"
+    for root in unknown:
+        above(found, root)
+
+
+def assert_nothing_simple_is_left(
+    found: Aliases, made: FlatModel, rows: list[dict[int, float]], constants: list[float]
+) -> None:
+    """An equation is used, redundant, or of many unknowns, or what it says would break a chain or give an input."""
+    derivatives = {found.derivative[root][0] for root in found.derivative}
+    for number in found.remaining:
+        terms: dict[int, float] = {}
+        constant = constants[number]
+        for node, value in rows[number].items():
+            root = found.root[node]
+            if root in found.known:
+                constant += value * found.factor[node] * found.known[root]
+            else:
+                terms[root] = terms.get(root, 0.0) + value * found.factor[node]
+        roots = [root for root, value in terms.items() if abs(value) > 1e-12]
+        assert roots
+        if len(roots) == 1:
+            assert roots[0] in derivatives or roots[0] in made.inputs
+        if len(roots) == 2 and constant == 0.0:
+            own = roots[0] in above(found, roots[1]) or roots[1] in above(found, roots[0])
+            assert own or {*roots} <= {*made.inputs} or {*roots} <= derivatives
 
 
 @given(st.integers(2, 8), st.data())
@@ -125,11 +188,36 @@ def test_a_contradiction_is_found_and_what_gives_the_values(order):
     assert [{order[k] for k in causes} for causes in found.contradictions] == [{0, 1}]
 
 
-def test_terms_that_cancel_but_for_rounding_leave_no_unknown():
+@pytest.mark.parametrize("unit", [1e-15, 1.0, 1e9])
+def test_terms_that_cancel_but_for_rounding_leave_no_unknown(unit: float) -> None:
     """0.1 + 0.2 - 0.3 is not zero in floating point: taken as a coefficient, it would make x2 = 0."""
-    found = find_aliases(model([0, 0], [{0: 1.0, 1: -3.0}, {0: 0.1, 1: -0.3}, {0: 0.7, 1: -2.1}]))
+    rows = [{0: 1.0, 1: -3.0}, {0: 0.1 * unit, 1: -0.3 * unit}, {0: 0.7 * unit, 1: -2.1 * unit}]
+    found = find_aliases(model([0, 0, 0, 0], [*rows, {2: 2.0 * unit, 3: -unit}]))
     assert not found.known
-    assert len(found.contradictions) == 2
+    assert [one[0] for one in found.contradictions] == [1, 2]
+    assert found.root[2] == found.root[3]
+    assert found.factor[3] / found.factor[2] == 2.0
+
+
+def test_rounding_is_measured_by_all_terms() -> None:
+    """The last ones may be small."""
+    equal = [{0: 1.0, k: -1.0} for k in range(1, 5)]
+    found = find_aliases(model([0] * 5, [*equal, {0: 0.1, 1: 0.2, 2: -0.3, 3: 1e-5, 4: -1e-5}]))
+    assert not found.known
+    assert [one[0] for one in found.contradictions] == [4]
+
+
+def test_a_coefficient_that_parameters_determine_may_be_zero() -> None:
+    """p x0 + 2 x1 + x2 = 0 with x0 = x1 says nothing without the parameter; nor does p x0 + 2 x1 = 0."""
+    made = model([0] * 3, [{0: 1.0, 1: -1.0}])
+    terms = (0, Coefficient(0, 0)), (1, 2.0), (2, 1.0)
+    more = [LinearEquation(terms[:count], 0.0, ORIGIN) for count in (2, 3)]
+    for order in (1, -1):
+        found = find_aliases(replace(made, linear=[*made.linear, *more][::order]))
+        assert len(found.remaining) == 2
+        assert found.root[0] == found.root[1] != found.root[2]
+        assert not found.known
+        assert not found.contradictions
 
 
 def test_an_equation_between_two_derivatives_is_no_alias_of_one_node():
@@ -150,15 +238,28 @@ def test_an_unknown_is_not_its_own_derivative(order):
     assert found.remaining == [1]
 
 
-def test_an_input_that_is_the_derivative_of_one_unknown_is_not_that_of_another():
-    """der(x0) = u and der(x1) = u: the integrals differ by a constant, so the second equation stays."""
-    made = replace(model([1, 1, 0], [{3: 1.0, 2: -1.0}, {4: 1.0, 2: -1.0}]), inputs=[2])
+def test_an_input_is_not_the_derivative_of_an_unknown():
+    """der(x0) = u and der(x1) = -2 u stay equations: the input keeps its own sign and factor."""
+    made = replace(model([1, 1, 0], [{3: 1.0, 2: -1.0}, {4: 1.0, 2: 2.0}]), inputs=[2])
     found = find_aliases(made)
-    assert found.root[3] == found.root[2] == 2
-    assert found.remaining == [1]
-    assert found.root[4] != 2
-    assert found.derivative[found.root[0]][0] == 2
-    assert found.derivative[found.root[1]][0] == found.root[4]
+    assert found.root == [0, 1, 2, 3, 4]
+    assert found.remaining == [0, 1]
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+@pytest.mark.parametrize("factor", [1.0, -1.0, 2.0])
+def test_an_input_may_be_the_derivative_of_another_one(order, factor):
+    """x0 = u1, x1 = der(x0), and x1 = factor u2, in any order: der(u1) = factor u2."""
+    rows = [{0: 1.0, 2: -1.0}, {1: 1.0, 4: -1.0}, {1: 1.0, 3: -factor}]
+    found = find_aliases(replace(model([1, 0, 0, 0], [rows[k] for k in order]), inputs=[2, 3]))
+    assert found.root[0] == 2
+    if factor == 1.0:
+        assert found.root[1] == found.root[4] == 3
+        assert found.derivative[2] == (3, 1.0)
+        assert not found.remaining
+    else:
+        assert found.root[4] != 3
+        assert [order[k] for k in found.remaining] in ([1], [2])
 
 
 def test_what_represents_a_class():

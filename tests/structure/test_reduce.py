@@ -374,3 +374,18 @@ def test_the_rate_of_an_implicit_unknown_follows_from_its_equation():
     assert float(rate(x, y, [one.value for one in flat.parameters])) == pytest.approx(
         -2 * x / (1 + 3 * y**2), rel=1e-14
     )
+
+
+def test_an_input_keeps_its_sign_as_a_derivative() -> None:
+    """der(x) = -2 u with u = 3: x falls by 6 in one second."""
+
+    class Falling(Component):
+        u: Input = signal_in("1/s", "speed", default=3.0)
+        x: Variable = var("1", "place")
+
+        def equations(self) -> Equations:
+            yield der(self.x) == -2 * self.u
+
+    run = simulate(Falling(x=1.0), 1.0, points=1)
+    assert run.final["x"] == pytest.approx(-5.0, rel=1e-9)
+    assert run.final["u"] == 3.0
