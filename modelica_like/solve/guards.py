@@ -139,7 +139,7 @@ def _near(model: CompiledDae, terms: int) -> ca.Function:
     nx = len(model.states)
     shapes = {"base": (nx, 1), "data": (nx, terms), "two": (terms, 2), "relative": (1, 1), "absolute": (nx, 1)}
     base, data, two, relative, absolute = given = [ca.MX.sym(name, *shape) for name, shape in shapes.items()]
-    precise, coarse = ca.horzsplit(ca.repmat(base, 1, 2) + data @ two)
+    precise, coarse = (base + data @ one for one in ca.horzsplit(two))
     allowed = relative * ca.fabs(precise) + absolute
     doubts = ca.fabs(precise - coarse) / allowed
     doubt = ca.mmax(ca.densify(ca.vertcat(0, ca.if_else(doubts < np.inf, doubts, np.inf))))
@@ -148,9 +148,8 @@ def _near(model: CompiledDae, terms: int) -> ca.Function:
     if model.implicit:
         following = _following(model, values)
         values = ca.Function("guards", arguments := following.mx_in(), following.call(arguments)[:1])
-    everywhere = values.map("guards_near", "serial", 3, [0, 2, 3, 4, 5], [])
-    t, _, *rest = everywhere.mx_in()
-    first, second, third = ca.horzsplit(everywhere(t, ca.horzcat(precise, coarse, precise + allowed), *rest))
+    t, _, *rest = values.mx_in()
+    first, second, third = (values(t, x, *rest) for x in (precise, coarse, precise + allowed))
     return ca.Function("near", [t, *given, *rest], [doubt, ca.fabs(second - first), ca.fabs(third - first)])
 
 
@@ -204,8 +203,8 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Itera
 
 
 def _nearly(g0: float, g1: float, r0: float, r1: float) -> bool:
-    """Whether the cubic through both ends with the given slopes comes near zero, by samples."""
-    return r1 < -_NOISE and float(np.max(_CUBIC @ [g0, r0, g1, r1])) > -_NEAR * (abs(g0) + abs(g1))
+    """Whether the cubic through both ends, not above zero, with the given slopes comes near zero, by samples."""
+    return r1 < -_NOISE and float(np.max(_CUBIC @ [g0, r0, g1, r1])) > _NEAR * (g0 + g1)
 
 
 def _hermite(s: Vector) -> Vector:
@@ -252,23 +251,21 @@ def locate(trial: Trial, span: float, ends: Ends, group: list[Candidate], t: flo
     tolerance = _LOCATED * max(1.0, abs(t))
     guess = min(_cubic(*ends[one.guard], one.inside) * span for one in group)
     guess = min(high, max(guess, tolerance))
-    best: tuple[Point, list[Vector]] | None = None
     for _ in range(_MAX_TRIALS):
         now = trial(guess)
         found, slopes = now[1][0].tolist(), now[1][1].tolist()
         watched = [(found[g], slopes[g]) for g in ends]
         if any(value > 0 for value, _ in watched):
-            high, best = guess, now
+            high = guess
         else:
             low = guess
         step = _newton(watched)
-        if step is not None and abs(step) <= tolerance:
+        if abs(step) <= tolerance:
             return _event(*now, ends, tolerance)
         if high - low <= tolerance:
             break
-        target = guess + step if step is not None else -1.0
-        guess = target if low < target < high else 0.5 * (low + high)
-    return _event(*(best or trial(high)), ends, tolerance)
+        guess = guess + step if low < guess + step < high else 0.5 * (low + high)
+    return _event(*trial(high), ends, tolerance)
 
 
 def _positive_top(trial: Trial, span: float, ends: Ends, group: list[Candidate]) -> float | None:
@@ -286,25 +283,23 @@ def _positive_top(trial: Trial, span: float, ends: Ends, group: list[Candidate])
                 low, rising = guess, rate
             else:
                 high, falling = guess, rate
-            # The remaining rise cannot reach zero.
-            if value + abs(rate) * (high - low) < 0 or high - low < 1e-12:
+            # The remaining rise cannot pass zero.
+            if value + abs(rate) * (high - low) <= 0:
                 break
-            straight = low + (high - low) * rising / (rising - falling) if falling < 0 < rising else low
-            guess = straight if number % 3 and low < straight < high else 0.5 * (low + high)
+            guess = low + (high - low) * (rising / (rising - falling) if number % 3 else 0.5)
     return None
 
 
 def _event(point: Point, guards: list[Vector], watched: Ends, tolerance: float) -> Located:
     values, rates, soon = guards
-    near = [g for g in watched if values[g] > 0 or (rates[g] > 0 and -values[g] <= 10 * tolerance * rates[g])]
-    return Located(point, near, soon)
+    return Located(point, [g for g in watched if values[g] + 10 * tolerance * max(rates[g], 0) > 0], soon)
 
 
-def _newton(watched: list[tuple[float, float]]) -> float | None:
-    """Newton step to the earliest zero of the rising guards; None if one has risen before, and falls again."""
+def _newton(watched: list[tuple[float, float]]) -> float:
+    """Newton step to the earliest zero of the rising guards; infinite if one has risen before, and falls again."""
     if any(value > 0 and rate <= 0 for value, rate in watched):
-        return None
-    return min((-value / rate for value, rate in watched if rate > 0), default=None)
+        return math.inf
+    return min((-value / rate for value, rate in watched if rate > 0), default=math.inf)
 
 
 def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
@@ -312,18 +307,15 @@ def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
     a, b, c = 2 * g0 - 2 * g1 + r0 + r1, -3 * g0 + 3 * g1 - 2 * r0 - r1, r0
     if inside:
         # The slope falls from r0 > 0 to r1 < 0: one zero, in a form that also holds for a = 0.
-        down = math.sqrt(max(b * b - 3 * a * c, 0.0)) - b
-        return c / down if 0 < c < down else 0.5
+        return c / (math.sqrt(max(0.0, b * b - 3 * a * c)) - b)
     if g0 == 0 and c >= 0:
         return 0.0
-    if not g0 <= 0 < g1:
-        return 0.5
     low, high, s = 0.0, 1.0, 0.5
     for _ in range(_GUESSING):
         value, slope = ((a * s + b) * s + c) * s + g0, (3 * a * s + 2 * b) * s + c
         low, high = (low, s) if value > 0 else (s, high)
-        newton = s - value / slope if slope > 0 else -1.0
-        before, s = s, newton if low < newton < high else 0.5 * (low + high)
+        newton = s - (value / slope if slope > 0 else math.inf)
+        before, s = s, newton if low <= newton < high else 0.5 * (low + high)
         if abs(s - before) < _GUESSED:
             break
     return s

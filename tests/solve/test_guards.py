@@ -7,7 +7,19 @@ import pytest
 
 from modelica_like import build, simulate
 from modelica_like.initialize import Point
-from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, guess, param, var
+from modelica_like.language import (
+    Component,
+    Equations,
+    Events,
+    Mode,
+    Parameter,
+    Variable,
+    der,
+    guess,
+    param,
+    sqrt,
+    var,
+)
 from modelica_like.solve.guards import (
     Candidate,
     Guards,
@@ -95,9 +107,9 @@ def test_a_straight_guard_is_met_at_its_zero() -> None:
 def test_the_earliest_zero_of_straight_guards_that_rise() -> None:
     assert _newton([(-1.0, 2.0), (-1.0, 4.0), (-1.0, -9.0)]) == 0.25
     assert _newton([(1.0, 2.0)]) == -0.5
-    assert _newton([(-1.0, -1.0)]) is None
-    assert _newton([(-1.0, 2.0), (1.0, -1.0)]) is None  # it has risen before
-    assert _newton([(-1.0, 2.0), (1.0, 0.0)]) is None
+    assert _newton([(-1.0, -1.0)]) == np.inf
+    assert _newton([(-1.0, 2.0), (1.0, -1.0)]) == np.inf  # it has risen before
+    assert _newton([(-1.0, 2.0), (1.0, 0.0)]) == np.inf
 
 
 def ends(value: np.poly1d) -> tuple[float, float, float, float]:
@@ -228,3 +240,111 @@ def test_where_guards_may_become_positive() -> None:
     assert ahead.found([0, 1, 2, 3, 4]) == [(1, 1, True), (0, 2, False)]
     assert ahead.found([1, 2]) == [(1, 1, True)]
     assert ahead.found([2, 3]) == []
+
+
+class Odd(Component):
+    """Guards that are rounding, hardly true, infinite or no numbers, and one without an end."""
+
+    a: Variable = var("s", "passed")
+    b: Variable = var("1", "constant")
+    unit: Parameter = param("s", "unit", default=1.0)
+    side = Mode("left", "right")
+    other = Mode("left", "right")
+
+    def equations(self) -> Equations:
+        yield der(self.a) == 1
+        yield self.unit * der(self.b) == 0
+
+    def events(self) -> Events:
+        yield self.side.go("left", "right", when=sqrt(self.a / self.unit) > 1)
+        yield self.side.go("right", "left", when=1 / self.b > 0)
+        yield self.other.go("left", "right", when=1e-31 * self.a > 0 * self.unit)
+        yield self.other.go("right", "left", when=self.a >= 2 * self.unit)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "values", "rates"),
+    [
+        (4.0, 0.5, [1.0, 2.0, 0.0, 2.0], [0.25, 0.0, 1e-31, 1.0]),
+        (2.0, -0.5, [2**0.5 - 1, -2.0, 0.0, 1e-300], [8**-0.5, 0.0, 1e-31, 1.0]),
+        (0.0, 0.0, [-1.0, 1e300, 0.0, -2.0], [0.0, 0.0, 1e-31, 1.0]),
+        (-1.0, -1e-305, [-1.0, -1.0, 0.0, -3.0], [0.0, 0.0, 1e-31, 1.0]),
+        (-20.0, 1e-3, [-1.0, 1e3, -2e-30, -22.0], [0.0, 0.0, 1e-31, 1.0]),
+        (20.0, -1e299, [20**0.5 - 1, 0.0, 2e-30, 18.0], [80**-0.5, 0.0, 1e-31, 1.0]),
+    ],
+)
+def test_guards_are_numbers(a: float, b: float, values: list[float], rates: list[float]) -> None:
+    """What is no number is false, and rounding is zero; but a relation that is just true stays true."""
+    model = build(Odd(a=a, b=b))
+    guards = Guards(model)
+    x = np.array([{"a": a, "b": b}[one] for one in model.states])
+    for side in (0.0, 1.0):
+        d = np.zeros(model.discrete_size)
+        d[[one.path in ("side", "other") for one in model.flat_discretes]] = side
+        point = Point(7.0, x, np.zeros(0), d)
+        here, speed, soon = (one.copy() for one in guards.at(point))
+        asleep = [1 - int(side), 3 - int(side)]
+        awake = [int(side), 2 + int(side)]
+        assert guards.active(d).tolist() == awake
+        np.testing.assert_allclose(here[awake], np.array(values)[awake], rtol=1e-12)
+        np.testing.assert_allclose(speed, rates, rtol=1e-12)
+        assert here[asleep].tolist() == soon[asleep].tolist() == [-1.0, -1.0]
+        if a == 0:
+            continue
+        later = np.array(values) + 7e-10 * np.array(rates)
+        np.testing.assert_allclose(soon[awake], np.where(np.abs(later) < 1e-30, 0.0, later)[awake], rtol=1e-9)
+        wanting = [guards.positions[id(one)] for one in guards.wanting(point)]
+        assert wanting == [k for k in awake if soon[k] > 0]
+
+
+def test_guards_at_many_times_at_once() -> None:
+    """Of a·b > 7 and y < 0.3 with y + y³ = a, a' = 1, b' = a: y' = 1/(1 + 3·y²)."""
+    model = build(Two())
+    guards, random = Guards(model), np.random.default_rng(5)
+    y = random.uniform(0.1, 2.0, 5)
+    a, b = y + y**3, random.uniform(-3.0, 3.0, 5)
+    d, times = np.zeros(model.discrete_size), np.arange(5.0)
+    x = np.array([{"a": a, "b": b}[one] for one in model.states])
+    values, rates, slopes = guards.along(times, x, y[None], d)
+    np.testing.assert_allclose(values, [a * b - 7.0, 0.3 - y], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(rates, [b + a * a, -1 / (1 + 3 * y * y)], rtol=1e-12)
+    np.testing.assert_allclose(slopes, [{"a": 0 * a + 1, "b": a}[one] for one in model.states], rtol=1e-12)
+    for k in range(5):
+        point = Point(times[k], x[:, k], y[None, k] + 1e-4, d)
+        values, rates, soon, before = (one.copy() for one in guards.follow(point))
+        assert point.z == pytest.approx([y[k]], abs=1e-13)
+        assert before == pytest.approx([y[k]], abs=1e-7)
+        assert values == pytest.approx([a[k] * b[k] - 7.0, -1.0])
+        assert rates == pytest.approx([b[k] + a[k] ** 2, -1 / (1 + 3 * y[k] ** 2)])
+        assert (soon[0] > values[0]) == (rates[0] > 0)
+
+
+def test_doubt_about_states_is_relative_to_their_sizes() -> None:
+    """Negative states, and a difference below one tolerance; without a difference there is no doubt."""
+    model = build(Two())
+    base, z, d = np.array([-2.0, -4.0]), np.array([-1.0]), np.zeros(model.discrete_size)
+    data, two = np.zeros((8, 2)), np.zeros((2, 8))
+    two[1, 3] = 0.5
+    for apart in (0.0, 1e-4, -1e-4):
+        data[3] = [2 * apart, 0.0]
+        doubt, rough, moved = Guards(model).near(0.0, base, data, two, (1e-3, np.array([1e-6, 1e-3])), z, d)
+        assert doubt == pytest.approx(abs(apart) / (2e-3 + 1e-6), rel=1e-9)
+        assert rough == pytest.approx([4 * abs(apart), abs(apart) / 4], rel=1e-3, abs=1e-12)
+        assert moved[0] == pytest.approx(8 - (2 - 2e-3 - 1e-6) * (4 - 5e-3), rel=1e-9)
+
+
+class Still(Component):
+    """Nothing happens."""
+
+    x: Variable = var("1", "constant", default=1.0)
+    unit: Parameter = param("s", "unit", default=1.0)
+
+    def equations(self) -> Equations:
+        yield self.unit * der(self.x) == 0
+
+
+def test_a_model_without_events_has_no_guards() -> None:
+    guards = Guards(build(Still()))
+    point = Point(0.0, np.ones(1), np.zeros(0), np.zeros(0))
+    assert guards.wanting(point) == []
+    assert [len(one) for one in guards.at(point)] == [0, 0, 0]
