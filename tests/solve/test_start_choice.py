@@ -106,9 +106,10 @@ class Drawn:
 
 
 @pytest.mark.parametrize("structural", [True, False])
-def test_start_values_count_as_long_as_they_raise_the_rank(structural: bool) -> None:
+@pytest.mark.parametrize("first", range(0, 60, 12))
+def test_start_values_count_as_long_as_they_raise_the_rank(structural: bool, first: int) -> None:
     missing = found = 0
-    for seed in range(60):
+    for seed in range(first, first + 12):
         drawn = Drawn(seed)
         model = drawn.model
         # A default of a state counts where a start system has its row.
@@ -137,7 +138,7 @@ def test_start_values_count_as_long_as_they_raise_the_rank(structural: bool) -> 
             found += 1
             assert len(plan.columns) == len(plan.wanted)
             assert plan.own == len(plan.wanted) - len(wanted["rows"]) - len(wanted["resting"])
-    assert min(missing, found) > 9
+    assert min(missing, found) > 0
 
 
 def test_a_plan_takes_its_part_of_the_system() -> None:
