@@ -88,6 +88,18 @@ class Ring(Component):
         yield self.state.go("down", "up", when=self.x < 0)
 
 
+def test_delays_of_parts_have_their_own_numbers():
+    class Two(Component):
+        one, other = Late(u=2.0), Late(u=5.0)
+
+    model = build(Two())
+    names = [model.flat_discretes[k].path for part in model.delay_parts for k in part]
+    assert {name.partition(".")[0] for name in names} == {"one", "other"}
+    assert len({*names}) == len(names)
+    values = model.delays(0.0, [], [], model.p, model.u, np.zeros(model.discrete_size)).full().ravel()
+    assert values.tolist() == [2.0, 1.0, 5.0, 1.0]
+
+
 @pytest.mark.parametrize(("t", "x"), [(0.4, 0.02), (2.0, -0.7), (5.0, 1.5)])
 def test_what_slides_through_implicit_equations_comes_back(t, x):
     """x' = -x / 0.1 s: the share follows from the implicit unknowns of both modes, at this time and place."""
