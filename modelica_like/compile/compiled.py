@@ -246,9 +246,10 @@ class CompiledDae:
     def refuse_delays(self, error: type[ModelicaLikeError], what: str) -> None:
         """Raise an error where something is not possible with delays, because they need the past of a run."""
         if self.delay_parts:
-            owner = self.flat_discretes[self.delay_parts[0][0]].path.rpartition(".")[0] or "it"
+            (first, *_), *_ = self.delay_parts
+            owner, *_ = self.flat_discretes[first].path.rpartition(".")
             raise error(
-                f"{what}: {owner} has a delay(…), which needs the past of a run.",
+                f"{what}: {owner or 'it'} has a delay(…), which needs the past of a run.",
                 advice="Approximate the delay there, by a lag or a Padé approximation.",
             )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -119,7 +120,7 @@ def _motion_sources(flat: FlatModel) -> tuple[str, ...]:
 
 def _plain(discrete: FlatDiscrete) -> FlatDiscrete:
     """Drop a symbolic start, which the function `discrete_starts` contains."""
-    return discrete if isinstance(discrete.start, int | float) else replace(discrete, start=0.0)
+    return discrete if isinstance(discrete.start, int | float) else replace(discrete, start=math.nan)
 
 
 def _input_values(flat: FlatModel) -> Vector:

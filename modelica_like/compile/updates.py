@@ -14,6 +14,8 @@ from modelica_like.errors import Source, StructureError
 from modelica_like.flatten.model import FlatModel, evaluate
 from modelica_like.structure.reduce import ReducedDae
 
+_ALWAYS: Any = ca.SX(1)
+
 
 @dataclass(eq=False)
 class _Row:
@@ -90,7 +92,7 @@ def _rows(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> list[_Row]
     determined = {row.entry for row in found}
     for k, of in flat.pres.items():
         if k == of or of not in determined:
-            add(flat.discretes[k].path, ca.SX(1), ca.SX(0) if k == of else flat.d[of], Source(""), False)
+            add(flat.discretes[k].path, _ALWAYS, ca.SX(0) if k == of else flat.d[of], Source(""), False)
     return found
 
 

@@ -352,9 +352,27 @@ def test_where_one_mode_leads_away_it_goes_there(base, made):
     assert ways >= {UP, DOWN}
 
 
+@pytest.mark.parametrize(("way", "values"), [(1, DOWN), (-1, (None, None))])
+def test_where_both_modes_lead_on_the_border_is_passed_at_once(base, made, way, values):
+    """Or not at all, where they lead back from what is left of sliding."""
+    ones = [one for one in (Reference(base, (False, False), seed) for seed in range(30)) if _lead_on(one, way)]
+    assert ones
+    for one in ones:
+        found = entered(made, one, 0.5 * time_resolution(one.t))
+        assert tuple(found.get(name) for name in OWN) == values
+
+
+def _lead_on(one: Reference, way: int) -> bool:
+    return all(way * rate > 0.1 for rate in _rates(one))
+
+
 def _leads_back(one: Reference) -> bool:
-    """On the first border, plainly."""
+    before, after = _rates(one)
+    return before > 0.1 and after < -0.1
+
+
+def _rates(one: Reference) -> list[float]:
+    """Put it on the first border; return how fast both modes lead across."""
     one.x[0] = one.x[1] ** 2
     _, slopes, drift = one.gradients()
-    before, after = (slopes[0] @ one.at("ode", d) + drift[0] for d in (one.d, one._in(0)))
-    return before > 0.1 and after < -0.1
+    return [float(slopes[0] @ one.at("ode", d) + drift[0]) for d in (one.d, one._in(0))]
