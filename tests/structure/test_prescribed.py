@@ -7,6 +7,10 @@ import casadi as ca
 import pytest
 from linear_models import model
 
+from components import BearingFriction, ConstantSpeed, Inertia
+from modelica_like.flatten import flatten
+from modelica_like.language import Assembly
+from modelica_like.structure import reduce
 from modelica_like.structure.alias import find_aliases
 from modelica_like.structure.prescribed import Flags
 from modelica_like.structure.system import System, build_system
@@ -86,3 +90,16 @@ def test_without_flags_nothing_is_asked() -> None:
     assert Flags(made).settle(made.residual, [1, 2]) is False
     assert made.residual is residual
     assert made.model is before
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_of_a_symbol_that_is_settled_nothing_is_left(driven: bool) -> None:
+    """Until then the time takes its place, in derivatives, too; and neither drive depends on time."""
+    source = {"source": ConstantSpeed(w_fixed=3.0)} if driven else {}
+    parts = {**source, "rotor": Inertia(J=1.0), "friction": BearingFriction(tau_pos=((0, 1), (10, 2)))}
+    flat = flatten(Assembly("drive", parts=parts, series={"shaft": list(parts)}))
+    assert flat.flags
+    reduced = reduce(flat)
+    assert reduced.flat.flags == ()
+    everything = ca.vertcat(reduced.ode, reduced.alg, reduced.values)
+    assert not ca.depends_on(everything, ca.vertcat(flat.time, *(symbol for symbol, _ in flat.flags)))
