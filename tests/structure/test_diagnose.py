@@ -5,7 +5,19 @@ from pathlib import Path
 
 import pytest
 
-from components import ConstantSpeed, ConstantTorque, Fixed, IdealGear, Inertia, Speed
+from components import (
+    Capacitor,
+    ConstantSpeed,
+    ConstantTorque,
+    ConstantVoltage,
+    Fixed,
+    Ground,
+    IdealGear,
+    Inductor,
+    Inertia,
+    Resistor,
+    Speed,
+)
 from modelica_like import simulate
 from modelica_like.errors import Overdetermined, Underdetermined
 from modelica_like.flatten import flatten
@@ -139,6 +151,21 @@ def test_an_unknown_without_any_equation() -> None:
         reduce(without_terms(Term()))
     assert caught.value.what == "Term: 0 equations, 1 unknowns. x occurs in no equation."
     assert caught.value.where == ()
+
+
+def test_of_two_networks_the_one_without_a_reference_is_told_alone() -> None:
+    """All parts that connections join are in it, one behind the other; those of the other network are not."""
+    parts = {
+        "u": ConstantVoltage(V=1.0), "r": Resistor(R=1.0), "l": Inductor(L=1.0), "c": Capacitor(C=1.0),
+        "v": ConstantVoltage(V=2.0), "s": Resistor(R=1.0), "ground": Ground(),
+    }  # fmt: skip
+    wires = {
+        "a": ["u.p", "r.p"], "b": ["r.n", "l.p"], "d": ["l.n", "c.p"], "e": ["c.n", "u.n"],
+        "f": ["v.p", "s.p"], "g": ["v.n", "s.n", "ground.p"],
+    }  # fmt: skip
+    with pytest.raises(Overdetermined) as caught:
+        reduce(flatten(Assembly("drive", parts=parts, connect=wires)))
+    assert caught.value.what == "The network of u, r, l, c has no Ground."
 
 
 def line_of(text: str) -> int:
