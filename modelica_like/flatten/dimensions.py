@@ -83,28 +83,28 @@ class Dimensions:
             if math.isnan(float(node)):
                 raise _NotANumber
             return ANY if float(node) == 0.0 else ONE
-        operation = node.op()
+        operation, left, right = node.op(), units[0], units[-1]
         if operation == ca.OP_ADD and all(map(_is_choice, parts)):
-            return _MIXED if _MIXED in units or not same_dimension(*units) else _common(*units, "")
+            return _MIXED if _MIXED in units or not same_dimension(left, right) else _common(left, right, "")
         if operation in _SUMS:
-            return _common(*units, "the terms of a sum")
+            return _common(left, right, "the terms of a sum")
         if operation in _COMPARED:
-            _common(*units, _COMPARED[operation])
+            _common(left, right, _COMPARED[operation])
             return ONE
         if operation in _PLAIN:
             return ONE
         if operation in _SAME:
-            return units[0]
+            return left
         if operation == ca.OP_MUL:
-            return _times(*units)
+            return _times(left, right)
         if operation == ca.OP_DIV:
-            return _times(*units, -1)
+            return _times(left, right, -1)
         if operation in _POWERS:
-            return _times(ONE, *units, _POWERS[operation])
+            return _times(ONE, left, _POWERS[operation])
         if operation == ca.OP_IF_ELSE_ZERO:
-            return units[1]
+            return right
         if operation in (ca.OP_POW, ca.OP_CONSTPOW):
-            return _power(*units, parts[1])
+            return _power(left, right, parts[1])
         for unit in units:
             _common(unit, ONE, "the argument of a function and a number")
         return ONE
