@@ -206,10 +206,10 @@ def test_states_meet_the_conditions_of_the_modes(
 
     e0 is not replaced, e1 not by a derivative, e2 is met without an impulse, e3 has one.
     """
-    model, ideal = elements(0, 1, 2, 3)
+    model, ideal = elements(3, 2, 1, 0)
     rows = np.zeros((4, ideal.width))
     rows[1:, 0], rows[1, HEAD - 1], rows[1, 1], rows[3, 1] = 1.0, 1.0, 5.0, -7.0
-    rows[3, [HEAD + 2, HEAD + 3]] = -2.0, 1.0
+    rows[3, [HEAD + 1, HEAD]] = -2.0, 1.0
     point = Point(0.0, np.array([1.0, 2.0, 3.0]), np.zeros(5), np.array([0.0, 0.0, 1.0, 0.0, *rows.ravel()]))
     values = np.zeros(30)
     values[[0, 22, 13]] = -1e3, 5.0, value
