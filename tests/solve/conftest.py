@@ -1,6 +1,8 @@
-"""A model at its start."""
+"""A model at its start; parts of several files of tests are modules beside them."""
 
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +10,8 @@ import pytest
 from modelica_like import build
 from modelica_like.initialize import Point, initialize
 from modelica_like.language import Component
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 @pytest.fixture
