@@ -49,4 +49,7 @@ def chains(draw: st.DrawFn) -> tuple[FlatModel, list[dict[int, float]], list[flo
         rows.append({k: draw(coefficients) for k in chosen})
         constants.append(draw(st.sampled_from([0.0, 0.0, 0.0, 1.0, -2.0])))
     inputs = [k for k, order in enumerate(orders) if not order and draw(st.integers(0, 3)) == 0]
-    return replace(model(orders, rows, constants), inputs=inputs), rows, constants
+    made = model(orders, rows, constants)
+    wishes = st.sampled_from(["avoid", "default", "prefer", "always"])
+    variables = [replace(one, state=draw(wishes)) for one in made.variables]
+    return replace(made, inputs=inputs, variables=variables), rows, constants
