@@ -63,7 +63,7 @@ class BufferedFunction:
         for k, part in zip((0, 1, 2, 5), points, strict=True):
             self._arguments[k][: len(part)] = part
         for k, part in ((3, p), (4, u)):
-            if not np.array_equal(self._everywhere.get(k), part):
+            if not np.array_equal(self._everywhere.get(k, ()), part):
                 self._arguments[k][:] = np.resize(part, self._arguments[k].shape)
                 self._everywhere[k] = part.copy()
         self._evaluate()

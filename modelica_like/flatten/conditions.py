@@ -27,7 +27,7 @@ def guard_of(condition: Any, source: Source, *, negated: bool = False) -> Any:
     """
     operation = condition.op() if isinstance(condition, ca.SX) else None
     if operation == ca.OP_NOT:
-        return guard_of(operands(condition)[0], source, negated=not negated)
+        return guard_of(*operands(condition), source=source, negated=not negated)
     if operation in (ca.OP_AND, ca.OP_OR):
         join = ca.fmin if (operation == ca.OP_AND) != negated else ca.fmax
         return join(*(guard_of(one, source, negated=negated) for one in operands(condition)))

@@ -83,30 +83,30 @@ class Dimensions:
             if math.isnan(float(node)):
                 raise _NotANumber
             return ANY if float(node) == 0.0 else ONE
-        operation, left, right = node.op(), units[0], units[-1]
+        operation = node.op()
         if operation == ca.OP_ADD and all(map(_is_choice, parts)):
-            return _MIXED if _MIXED in units or not same_dimension(left, right) else _common(left, right, "")
+            return _MIXED if _MIXED in units or not same_dimension(*units) else _common(*units, what="")
         if operation in _SUMS:
-            return _common(left, right, "the terms of a sum")
+            return _common(*units, what="the terms of a sum")
         if operation in _COMPARED:
-            _common(left, right, _COMPARED[operation])
+            _common(*units, what=_COMPARED[operation])
             return ONE
         if operation in _PLAIN:
             return ONE
         if operation in _SAME:
-            return left
+            return units[0]
         if operation == ca.OP_MUL:
-            return _times(left, right)
+            return _times(*units)
         if operation == ca.OP_DIV:
-            return _times(left, right, -1)
+            return _times(*units, power=-1)
         if operation in _POWERS:
-            return _times(ONE, left, _POWERS[operation])
+            return _times(ONE, *units, power=_POWERS[operation])
         if operation == ca.OP_IF_ELSE_ZERO:
-            return right
+            return units[1]
         if operation in (ca.OP_POW, ca.OP_CONSTPOW):
-            return _power(left, right, parts[1])
+            return _power(*units, exponent=parts[1])
         for unit in units:
-            _common(unit, ONE, "the argument of a function and a number")
+            _common(unit, ONE, what="the argument of a function and a number")
         return ONE
 
 
@@ -117,23 +117,23 @@ def _is_choice(node: Any) -> bool:
     return node.op() == ca.OP_IF_ELSE_ZERO
 
 
-def _common(left: Unit, right: Unit, what: str) -> Unit:
+def _common(left: Unit, right: Unit, *, what: str) -> Unit:
     if (_MIXED in (left, right) and ANY not in (left, right)) or not same_dimension(left, right):
         raise _Clash(left, right, what)
     return right if left == ANY else left
 
 
-def _times(left: Unit, right: Unit, power: float | Fraction = 1) -> Unit:
+def _times(left: Unit, right: Unit, *, power: float | Fraction = 1) -> Unit:
     if _MIXED in (left, right):
         raise _Clash(left, right, "the factors of a product")
     return left * right**power
 
 
-def _power(base: Unit, exponent_unit: Unit, exponent: Any) -> Unit:
-    _common(exponent_unit, ONE, "an exponent and a number")
+def _power(base: Unit, exponent_unit: Unit, *, exponent: Any) -> Unit:
+    _common(exponent_unit, ONE, what="an exponent and a number")
     if exponent.is_constant():
-        return _times(ONE, base, Fraction(float(exponent)).limit_denominator(_FINEST))
-    return _common(base, ONE, "the base of a variable power and a number")
+        return _times(ONE, base, power=Fraction(float(exponent)).limit_denominator(_FINEST))
+    return _common(base, ONE, what="the base of a variable power and a number")
 
 
 def check_equation(left: Expr, right: Expr, dimensions: Dimensions, component: str, source: Source) -> None:

@@ -55,9 +55,9 @@ class Wiring:
                 # Their missing connection is a consequence, not another error.
                 self.freed.update(id(one) for one in ends)
                 return
-        keys = [self._key(scope, end, source) for end in ends]
-        for key in keys:
-            self.parent[self._root(key)] = self._root(keys[0])
+        first, *others = (self._key(scope, end, source) for end in ends)
+        for key in others:
+            self.parent[self._root(key)] = self._root(first)
 
     def _refuse(self, what: str, where: Source | tuple[Source, ...], advice: str) -> None:
         self.errors.append(WrongConnection(what, where=where, advice=advice))

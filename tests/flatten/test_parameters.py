@@ -126,3 +126,14 @@ def test_units_of_formulas_count_only_where_they_are_checked():
         units_checked = False
 
     assert numbers(flatten(Loose(b="2 * T")))["b"] == pytest.approx(2 * 298.15)
+
+
+def test_constants_that_formulas_follow_from_have_a_unit():
+    """T is 298.15 K by numbers alone."""
+
+    class Twice(Part):
+        hot: Parameter = param("K", "twice as hot", default="2 * T")
+
+    assert numbers(flatten(Twice()))["hot"] == pytest.approx(2 * 298.15)
+    with pytest.raises(UnitMismatch, match="expects K; the expression is"):
+        flatten(Twice(hot="T * T"))

@@ -110,6 +110,8 @@ def test_right_equations(equation):
         ),
         (lambda c: c.w == der(c.x), "left rad/s, right m/s."),
         (lambda c: c.phi == cos(c.phi) * c.time, "left rad, right s."),
+        (lambda c: c.k == c.x / where(c.x > 0, c.x, c.f), "the factors of a product differ: m and different units"),
+        (lambda c: c.k == sqrt(where(c.x > 0, c.x, c.f)), "the factors of a product differ: 1 and different units"),
     ],
 )
 def test_wrong_equations(equation, message):
