@@ -317,7 +317,8 @@ case(
     "the derivative of an input",
     lambda: reduce(flatten(Follower())),
     """\
-der(rotor.w) is the derivative of the input w_ref, which is not known.
+drive: the derivative of an input (w_ref) would be needed.
+  in sources.py:127 `yield self.w == self.w_ref if self.exact else der(self.w) == filtered`
 Give the derivative as a separate input, or filter the input before it prescribes a motion.""",
 )
 
