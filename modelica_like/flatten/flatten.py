@@ -169,7 +169,7 @@ class _Flattener:
     def _declare_variable(self, owner: Declared, name: str, path: str, kind: str, field: Variable) -> None:
         self.variable_of[id(owner), name] = len(self.variables)
         unit = coherent(self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name))
-        limits = field.nominal, field.min, field.max, field.driving, field.difference
+        limits = field.nominal, *field.bounds, field.driving, field.difference
         self.variables.append(FlatVariable(path, unit, field.description, kind, field.state, field.guess, *limits))
 
     def _declare_initial(self, component: Component, name: str, text: str) -> None:

@@ -73,7 +73,7 @@ class Parameters:
         unit = coherent(unit_of_field(component, name))
         read = read_quantity(value.given) if field.unit_text == "*" and isinstance(value.given, str) else None
         tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
-        number, bounds, written = cast(float, value.number), (field.min, field.max), read[1] if read else None
+        number, bounds, written = cast(float, value.number), field.bounds, read[1] if read else None
         self.flat.append(FlatParameter(path, unit, field.description, number, *bounds, tunable, above, written))
         self._symbols.append(symbol)
         return symbol
@@ -91,7 +91,7 @@ class Parameters:
         self._open.pop()
         field = component.fields[name]
         unit = coherent(value.unit)
-        self.derived.append(FlatParameter(path, unit, field.description, math.nan, field.min, field.max, False))
+        self.derived.append(FlatParameter(path, unit, field.description, math.nan, *field.bounds, False))
         self._formulas.append(expression)
         return expression
 

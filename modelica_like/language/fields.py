@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self, overload
 
 from modelica_like.errors import LanguageError, UnitError, ValueOutOfRange
 from modelica_like.language.expr import Expr, symbol_of
 from modelica_like.language.formula import Arithmetic, Formula, as_formula, parse_formula
-from modelica_like.units import ANY, Unit, parse_unit, read_quantity, to_si
+from modelica_like.units import ANY, Unit, coherent, parse_unit, read_quantity, to_si
 
 _CALCULATES = re.compile(r"\s[-+*/]\s")
 """A number continues as a formula instead of a unit."""
@@ -80,6 +81,12 @@ class Field:
         """Declared unit; parsed on first use."""
         return parse_unit(self.unit_text)
 
+    @cached_property
+    def bounds(self) -> tuple[float | None, float | None]:
+        """Smallest and largest value in SI units, or None."""
+        low, high = (None if one is None else to_si(one, self.unit, self.label) for one in (self.min, self.max))
+        return low, high
+
     @property
     def label(self) -> str:
         """Name for messages: `Inertia.J`."""
@@ -114,7 +121,7 @@ class Field:
             raise UnitError(f"{self.label} = '{text}': {error.what}", advice=error.advice) from None
 
     def _checked(self, number: float, given: Any) -> float:
-        return in_range(number, given, self.label, self.unit_text, (self.min, self.max))
+        return in_range(number, given, self.label, str(coherent(self.unit)), self.bounds)
 
 
 def in_range(number: float, given: object, label: str, unit: str, bounds: tuple[float | None, float | None]) -> float:

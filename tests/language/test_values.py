@@ -6,6 +6,7 @@ import numpy as np
 import pint
 import pytest
 
+from modelica_like import build
 from modelica_like.errors import LanguageError, UnitError, UnknownName, ValueOutOfRange
 from modelica_like.language import (
     Component,
@@ -104,6 +105,30 @@ def test_values_outside_their_range_are_refused(name, given, message):
     with pytest.raises(ValueOutOfRange) as caught:
         Rotor(**{name: given})
     assert caught.value.what == message
+
+
+class Press(Component):
+    force: Parameter = param("kN", "force", min=1, max=5)
+
+    def equations(self) -> Equations:
+        yield from ()
+
+
+@pytest.mark.parametrize(("given", "number"), [(1, 1000.0), ("1 kN", 1000.0), (5.0, 5000.0), ("1000 N", 1000.0)])
+def test_limits_are_in_the_declared_unit(given, number):
+    assert build(Press(force=given)).p == [number]
+    assert build(Press(force=2)).flat_parameters[0].checked(number, given) == number
+
+
+@pytest.mark.parametrize(
+    ("given", "bound"), [(0.9, "least 1000 N"), ("999 N", "least 1000 N"), ("5.1 kN", "most 5000 N")]
+)
+def test_values_outside_limits_in_the_declared_unit_are_refused(given, bound):
+    with pytest.raises(ValueOutOfRange) as caught:
+        Press(force=given)
+    assert caught.value.what == f"Press.force = {given} is out of range: it must be at {bound}."
+    with pytest.raises(ValueOutOfRange, match=f"it must be at {bound}"):
+        build(Press(force=2)).flat_parameters[0].checked({0.9: 900.0, "999 N": 999.0, "5.1 kN": 5100.0}[given], given)
 
 
 def test_start_values_are_fixed_or_guessed():
