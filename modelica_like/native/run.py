@@ -85,19 +85,20 @@ class NativeLoop:
         """Copy the written results into the record."""
         record, model, written = self.record, self.model, self._buffers
         times, states = written["times"][:, 0], np.ascontiguousarray(written["states"].T)
-        firsts, events = written["firsts"][:, 0].astype(int), written["events"]
+        firsts, modes, events = written["firsts"][:, 0].astype(int), written["modes"], written["events"]
+        # Events before a segment, in order; the last ones follow it.
+        before = np.split(events, np.searchsorted(events[:, -1], np.arange(1, len(firsts) + 1)))
         for k, (first, last) in enumerate(pairwise([*firsts, len(times)])):
-            self._note(events, k)
-            x, z = np.split(states[:, first:last], [len(model.states)])
-            record.segments.append(Segment(times[first:last], x, z, written["modes"][k].copy()))
+            self._note(before[k])
+            x, z = states[: len(model.states), first:last], states[len(model.states) :, first:last]
+            record.segments.append(Segment(times[first:last], x, z, modes[k].copy()))
             if model.circuits:
                 note_sharing(record, model, record.segments[-1].start)
-        self._note(events, len(firsts))
+        self._note(before[-1])
         for time, held, energy in written["impacts"].tolist():
             record.impacts.append(Impact(time, model.holds[int(held)].component, energy))
 
-    def _note(self, events: Vector, segment: int) -> None:
-        """Record the events before a segment."""
-        for row in events[events[:, -1] == segment].tolist():
+    def _note(self, events: Vector) -> None:
+        for row in events.tolist():
             transition, mode, before, after, number = (int(one) for one in row[1:6])
             self.record.note(self.model, row[0], mode, (before, after), transition, number)

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
-_MISSING = "No browser was found: install Chromium (apt-get install chromium), or name one by $BROWSER_FOR_TESTS."
+_MISSING = "No browser was found: install Chromium (make browser), or name one by $BROWSER_FOR_TESTS."
 # Chromium reads file 3 and writes file 4; either number may be taken where this begins.
 _LAUNCH = """
 import os, sys
