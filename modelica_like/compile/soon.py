@@ -15,6 +15,11 @@ TIME_RESOLUTION = 1e-10
 Guards are evaluated this much later, so that for a guard that just left zero the direction decides.
 """
 
+_LARGE = 1e300
+_STEEP = frozenset({
+    ca.OP_SQRT, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_LOG, ca.OP_LOG1P, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ACOSH, ca.OP_ATANH,
+})  # fmt: skip
+"""Operations whose derivative may be infinite where they are not."""
 _JOINS: dict[int, Callable[[Any, Any], Any]] = {ca.OP_FMIN: ca.fmin, ca.OP_FMAX: ca.fmax}
 
 
@@ -43,8 +48,17 @@ def guards_soon(t: Any, rate: Callable[[Any], Any], guards: Any) -> Any:
     relations: list[Any] = []
     joined(guards, lambda relation: relations.append(relation) or relation)
     stacked = ca.vertcat(*relations)
-    later = iter(ca.vertsplit(stacked + ahead(t) * rate(stacked)))
+    rates = rate(stacked)
+    if _may_be_steep(stacked):
+        rates = ca.if_else(ca.fabs(rates) <= _LARGE, rates, ca.sign(rates))
+    later = iter(ca.vertsplit(stacked + ahead(t) * rates))
     return joined(guards, lambda _: next(later))
+
+
+def _may_be_steep(relations: Any) -> bool:
+    """Tell whether a rate may be infinite, as of a root at zero: it tells the direction only, not how far."""
+    function = ca.Function("relations", ca.symvar(relations), [relations])
+    return any(function.instruction_id(k) in _STEEP for k in range(function.n_instructions()))
 
 
 def joined(guards: Any, relation: Callable[[Any], Any]) -> Any:

@@ -1,6 +1,6 @@
 """Guards: which may fire in which mode, and where they are looked for."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -289,9 +289,9 @@ def test_guards_are_numbers(a: float, b: float, values: list[float], rates: list
         np.testing.assert_allclose(here[awake], np.array(values)[awake], rtol=1e-12)
         np.testing.assert_allclose(speed, rates, rtol=1e-12)
         assert here[asleep].tolist() == soon[asleep].tolist() == [-1.0, -1.0]
-        if a == 0:
-            continue
-        later = np.array(values) + 7e-10 * np.array(rates)
+        # An infinite rate is no number to go by; its sign tells the direction.
+        finite = np.where((a == 0) & (np.arange(4) == 0), 1.0, rates)
+        later = np.array(values) + 7e-10 * finite
         np.testing.assert_allclose(soon[awake], np.where(np.abs(later) < 1e-30, 0.0, later)[awake], rtol=1e-9)
         wanting = [guards.positions[id(one)] for one in guards.wanting(point)]
         assert wanting == [k for k in awake if soon[k] > 0]
@@ -348,3 +348,10 @@ def test_a_model_without_events_has_no_guards() -> None:
     point = Point(0.0, np.ones(1), np.zeros(0), np.zeros(0))
     assert guards.wanting(point) == []
     assert [len(one) for one in guards.at(point)] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_guard_with_an_infinite_rate_waits_until_it_is_true(solver: Literal["idas", "native"]) -> None:
+    """The root of a leaves zero infinitely fast; it passes one when a does, at 1 s."""
+    run = simulate(build(Odd(a=0.0, b=-1.0)), 3.0, solver=solver)
+    assert [(one.mode, one.time) for one in run.events] == [("side", pytest.approx(1.0, abs=1e-9))]
