@@ -239,7 +239,8 @@ def energy_balance(
     rows = tuple(map(EnergyRow, model.components, *(column.tolist() for column in columns)))
     exchanged = (inflow, source + work, lost + impact)
     throughput = max([powers.stored, powers.cancelled, *(float(np.sum(np.abs(part))) for part in exchanged)])
-    reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
+    resets = {number for number, one in enumerate(model.transitions) if one.resets}
+    reset = [event.time for event in events if event.transition in resets]
     told = [(one.time, one.energy - float(np.sum(work))) for one, work in zip(impacts, given, strict=True)]
     at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, told)
     return EnergyBalance(rows, throughput, at_events, options.rtol)

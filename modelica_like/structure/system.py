@@ -212,7 +212,7 @@ def _collect_residuals(system: System, aliases: Aliases) -> None:
         system.origins.append(equation.origin)
     stacked = ca.vertcat(ca.SX(0, 1), *columns.values(), *sums)
     # A vector of one entry, indexed by a list, gives a row.
-    system.residual = ca.vec(stacked[places]) if places else ca.SX(0, 1)
+    system.residual = ca.vec(stacked[places])
 
 
 def _levels_of(system: System, terms: tuple[tuple[int, Any], ...]) -> list[int]:

@@ -137,6 +137,7 @@ CAPACITY = ((0.0, 2e-3), (0.8, 1.5e-3), (1.0, 0.0))
         (((0.0, 2.0), (0.85, 1.2)), "1", "1.2"),  # it holds up to the speed ratio 1
         (((0.0, 2.5), (1.0, 1.0)), "0.8333", "1.25"),  # the top of x·(2.5 - 1.5 x)
         (((0.0, 1.5), (0.5, 2.2), (1.0, 0.0)), "0.5", "2.2"),
+        (((0.0, 1.9), (0.5, 1.9), (0.9, 1.1), (1.0, 1.0)), "0.725", "1.45"),  # the top of x·(2.9 - 2 x)
     ],
 )
 def test_no_converter_gives_more_than_it_takes(ratio: tuple[tuple[float, float], ...], at: str, worst: str) -> None:

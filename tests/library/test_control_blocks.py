@@ -34,8 +34,9 @@ from components import (
     VariableLimiter,
     ZeroOrderHold,
 )
+from components.sampled import Noise
 from modelica_like import Assembly, Component, ModelicaLikeError, Solution, simulate
-from modelica_like.errors import LimitPassed
+from modelica_like.errors import LanguageError, LimitPassed
 
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-11}
 
@@ -281,3 +282,8 @@ def test_limits_may_cross_later() -> None:
             limit1=Ramp(offset=2.0, height=-4.0, duration=4.0),
             limit2=Constant(k=-1.0),
         )
+
+
+def test_noise_without_a_distribution_is_no_part() -> None:
+    with pytest.raises(LanguageError, match="partial"):
+        Noise(period=0.1)

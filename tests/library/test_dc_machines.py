@@ -21,6 +21,7 @@ from components import (
     Inductor,
     Inertia,
     PermanentMagnetDCMachine,
+    Ramp,
     Resistor,
     SeparatelyExcitedDCMachine,
     SeriesDCMachine,
@@ -129,6 +130,25 @@ def test_switch_and_current_sources() -> None:
     assert run.at(0.25)["R.v"] == pytest.approx(1.5 * 5.0, rel=1e-4)
     assert run.at(0.75)["R.v"] == pytest.approx(0.0, abs=1e-4)
     assert run.energy().closure <= 1e-8
+
+
+def test_a_switch_is_closed_above_one_half() -> None:
+    """A ramp of 1/s from 0.75 falls below one half after 0.25 s; one from 0.25 rises above it."""
+    for start, slope, closed in ((0.75, -1.0, True), (0.25, 1.0, False)):
+        parts: dict[str, Component] = {
+            "source": ConstantCurrent(I=-2.0), "R": Resistor(R=5.0), "switch": Switch(),
+            "signal": Ramp(height=slope, duration=1.0, offset=start),
+        }  # fmt: skip
+        drive = Assembly(
+            "circuit", parts={**parts, "ground": Ground()},
+            connect={
+                "plus": ["source.p", "R.p", "switch.p"], "minus": ["source.n", "R.n", "switch.n", "ground.p"],
+                "on": ["signal.y", "switch.closed"],
+            },
+        )  # fmt: skip
+        run = simulate(drive, 0.5)
+        assert run["switch.contacts"][0] == closed
+        assert [one.time for one in run.events] == [pytest.approx(0.25, abs=1e-9)]
 
 
 # -- machines ----------------------------------------------------------------------------------------------------------

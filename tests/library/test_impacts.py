@@ -155,6 +155,15 @@ def test_flanks_part_with_what_restitution_leaves(e: float) -> None:
     assert drive.energy().lost == pytest.approx(0.5 * (2 / 3) * 9 * (1 - e ** (2 * len(meetings))), abs=1e-9)
 
 
+@pytest.mark.parametrize("away", [-1.0, 1.0])
+def test_flanks_do_not_pull(away: float) -> None:
+    """0.5 N.m part 1 kg.m2 from another one that rests against it: phi = 0.25·t², and the other one stays."""
+    parts = {"torque": ConstantTorque(tau_constant=0.5 * away), "a": Inertia(J=1.0, w=0.0)}
+    drive = run({**parts, "play": RigidBacklash(b=8.0, phi_rel=4.0 * away), "b": Inertia(J=1.0, phi=0.0, w=0.0)}, 1.0)
+    assert drive.final["a.phi"] == pytest.approx((0.25 - 4.0) * away, rel=1e-9)
+    assert drive.final["b.w"] == 0.0
+
+
 def test_a_mass_bounces_at_its_stop_until_it_rests() -> None:
     """3 N push 2 kg with 4 m/s against a stop 1 m ahead: v² = 16 + 3; then e times as fast, 2·v·m/F each time."""
     mass = MassWithStopAndFriction(m=2.0, smin=-100.0, smax=1.0, s=0.0, v=4.0, e=0.5)

@@ -17,7 +17,9 @@ from components import (
     ElastoBacklash2,
     Fixed,
     Inertia,
+    LinearSpeedDependentForce,
     Mass,
+    QuadraticSpeedDependentForce,
     Spring,
     SpringDamper,
     TranslationalDamper,
@@ -44,6 +46,14 @@ def test_mass_under_constant_force() -> None:
     run = simulate(shaft(force=ConstantForce(f_constant=-3.0), mass=Mass(m=2.0, s=0.5, v=1.0)), "2 s", **TIGHT)
     np.testing.assert_allclose(run["mass.v"], 1.0 - 1.5 * run.time, atol=1e-9)
     np.testing.assert_allclose(run["mass.s"], 0.5 + run.time - 0.75 * run.time**2, atol=1e-9)
+
+
+@pytest.mark.parametrize(("law", "brakes"), [(LinearSpeedDependentForce, 1.5), (QuadraticSpeedDependentForce, 2.25)])
+def test_a_drag_brakes_in_both_directions(law: Any, brakes: float) -> None:
+    """10 N at 2 m/s on 4 kg at ±3 m/s: 1.5 or 1.5² times as much, against the motion."""
+    for v in (-3.0, 3.0):
+        run = simulate(shaft(drag=law(f_nominal=-10.0, v_nominal=2.0), mass=Mass(m=4.0, s=0.0, v=v)), 0.1)
+        assert run["der(mass.v)"][0] == pytest.approx(-np.sign(v) * brakes * 10.0 / 4.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("at", [0.0, 0.7])

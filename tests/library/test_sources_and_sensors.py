@@ -7,6 +7,7 @@ import pytest
 
 from components import (
     AngleSensor,
+    Constant,
     ConstantForce,
     ConstantSpeed,
     ConstantTorque,
@@ -14,6 +15,7 @@ from components import (
     Fixed,
     Force,
     ForceSensor,
+    ForceToPositionAdaptor,
     Inertia,
     Mass,
     MultiSensor,
@@ -196,3 +198,16 @@ def test_sensors_of_a_slide() -> None:
     run = simulate(drive({"s": ["force", "gauge", "mass"]}, {"p": ("place.flange", "mass.flange_b")}, **parts), 1.0)
     np.testing.assert_allclose(run["gauge.f"], 4.0, rtol=1e-12)
     np.testing.assert_allclose(run["place.s"], run.time**2, atol=1e-8)
+
+
+@pytest.mark.parametrize(("v", "a"), [(True, True), (True, False), (False, False)])
+def test_an_adaptor_tells_zero_for_what_it_does_not_tell(v: bool, a: bool) -> None:
+    """6 N move 2 kg by 1.5·t²."""
+    end, force = ForceToPositionAdaptor(use_v=v, use_a=a), Constant(k=6.0)
+    drive = Assembly(
+        "slide", parts={"force": force, "end": end, "mass": Mass(m=2.0, s=0.0, v=0.0)},
+        series={"way": ["end", "mass"]}, connect={"f": ["force.y", "end.f"]},
+    )  # fmt: skip
+    run = simulate(drive, 2.0)
+    told = [run.final[f"end.{one}"] for one in "sva"]
+    assert told == pytest.approx([6.0, 6.0 if v else 0.0, 3.0 if a else 0.0], rel=1e-7)

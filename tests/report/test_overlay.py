@@ -63,6 +63,7 @@ def test_a_family_has_a_panel_per_signal_and_says_what_is_not_drawn(run: Solutio
         ("time,spindle.w [1/min]\n0,0\n", UnitError, "does not say whether it counts turns or radians."),
         ("t,spindle.w\n0,0\n", NetlistError, "the first column of a table of trajectories is `time`."),
         ("time,spindle.w\n", NetlistError, "it needs a line of names, and lines of numbers."),
+        ("time,spindle.w\ns,rpm\n", NetlistError, "it needs a line of names, and lines of numbers."),
     ],
 )
 def test_wrong_tables_are_told(

@@ -62,6 +62,7 @@ def test_number(value: float, published: float | None, recomputed: float, deviat
 def test_sign_of_the_law_of_cosines() -> None:
     """With half a turn both strands pull in one direction; with the other sign there would be 25.4 N."""
     assert strand_resultant(32.9, 7.9, math.pi) == pytest.approx(40.8)
+    assert strand_resultant(0.2, 0.1, math.pi) == pytest.approx(0.3)
     wrong = strand_resultant(LOAD.tight_strand, LOAD.slack_strand, math.pi - BELT.wrap_angle)
     assert wrong == pytest.approx(25.42145, rel=1e-6)
 

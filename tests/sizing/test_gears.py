@@ -18,6 +18,7 @@ from components.sizing import (
     tooth_form,
 )
 from components.sizing.gear_life import damage_per_cycle
+from components.sizing.gear_strength import single_contact
 
 ALPHA = pi / 9
 STEEL = GearMaterial(1500e6, 500e6)
@@ -184,3 +185,18 @@ def test_a_steady_load_amounts_to_itself() -> None:
     strength = gear_strength(GearPair(20, 30, 4e-3, 0.04), 200.0, STEEL)
     life = gear_life(strength, [LoadStage(0.8, 1e5), LoadStage(0.8, 1e6)])
     assert (life.pitting_application, life.root_application) == pytest.approx((0.8, 0.8))
+
+
+def test_the_inner_point_of_either_gear_may_decide() -> None:
+    """Z_B of a pair is Z_D of the pair with its gears exchanged; both are above one here."""
+    there, back = (single_contact(GearPair(*teeth, 4e-3, 0.04), 1.6, 0.0) for teeth in ((14, 60), (60, 14)))
+    assert there == pytest.approx(back, rel=1e-12)
+    assert there > 1.01
+
+
+def test_a_tip_inside_its_base_circle() -> None:
+    """20 teeth of 1 mm: the base circle has 18.79 mm; a shift of -1.7 leaves 18.6 mm."""
+    pair = GearPair(20, 30, 1e-3, 0.01)
+    assert pair.tip_over_base(20, -1.5) == pytest.approx(sqrt((19 / (20 * cos(ALPHA))) ** 2 - 1))
+    with pytest.raises(ValueError, match="A tip circle lies inside its base circle"):
+        pair.tip_over_base(20, -1.7)

@@ -20,6 +20,7 @@ from components.sizing import (
     Section,
     ShaftMaterial,
 )
+from components.sizing.maths import settled
 
 LINES = MotorLines(24.0, 496.0, 364.0, 1.06, 20.0)
 TEETH = RavigneauxTeeth(21, 39, 13, 10, 60)
@@ -179,3 +180,9 @@ def test_position_of_a_load_as_expression() -> None:
                                       statics.largest_bending])  # fmt: skip
     force, slope, bending = (float(item) for item in rate(0.2))
     assert (force, slope, bending) == pytest.approx((400.0, 2000.0, 120.0))
+
+
+def test_rounding_in_a_difference_is_zero_without_a_sign() -> None:
+    """Values larger than rounding of their scale stay, whatever their sign."""
+    assert [settled(one, -10.0) for one in (-5.0, 5.0)] == [-5.0, 5.0]
+    assert [str(float(settled(one, -10.0))) for one in (-1e-20, 1e-20)] == ["0.0", "0.0"]

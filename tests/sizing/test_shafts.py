@@ -175,3 +175,9 @@ def test_no_shoulder() -> None:
 def test_load_beyond_the_end() -> None:
     with pytest.raises(ValueError, match="beyond the last section"):
         stepped_shaft([Load(0.2, y=1.0)], [0.0, 0.1], [Section(0.15, 0.01)], YIELD)
+
+
+def test_an_axial_force_pulls_at_the_whole_section() -> None:
+    """1 kN at 4 mm: F/A = 79.577 MPa, without a factor of the notch."""
+    made = shaft_stress(0.0, 0.0, 4e-3, YIELD, bending_factor=2.0, axial_force=-1000.0)
+    assert made.equivalent_stress == pytest.approx(1000.0 / (math.pi * 4e-6), rel=1e-12)

@@ -33,6 +33,7 @@ from modelica_like.language import (
     var,
     when,
 )
+from modelica_like.solve.delays import Delays
 
 Run = Callable[..., Solution]
 
@@ -241,3 +242,19 @@ def test_a_delayed_rate(run: Run):
     first = 1 / 3 + 2 / 3 * np.exp(-1.0)
     exact = np.where(early, (1 + 2 * np.exp(-found.time)) / 3, np.exp(-late) * (first + late / 3))
     assert found["y"] == pytest.approx(exact, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("roughs", "halves"),
+    [
+        ([0.9], 0), ([5.0, 0.9], 1), ([5.0, 3.1], 0), ([5.0, 2.9, 0.5], 2), ([200.0, 190.0, 80.0, 0.1], 3),
+        ([100.0, 99.0, 1.0], 2),
+    ],
+)  # fmt: skip
+def test_a_series_is_halved_while_that_helps(roughs: list[float], halves: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Errors of the run itself do not fall with the length; above 100 tolerances they are always taken for bends."""
+    delays, lengths = object.__new__(Delays), list[float]()
+    monkeypatch.setattr(delays, "_series", lambda t, half: lengths.append(half) or len(lengths) - 1)
+    monkeypatch.setattr(delays, "_rough", lambda series: roughs[series])
+    half, series = delays._resolved(0.0, 1.0)
+    assert (half, series) == (0.5**halves, halves)

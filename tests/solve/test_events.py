@@ -1,6 +1,8 @@
 """Events against closed forms: located, ordered, iterated, and never missed."""
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +27,7 @@ from modelica_like.language import (
     sin,
     var,
 )
+from modelica_like.solve.events import EventLoop
 from modelica_like.solve.instants import just_after
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
@@ -395,3 +398,34 @@ def test_a_blow_up_before_an_event_that_never_comes():
 
     with pytest.raises(SolveError):
         simulate(Blow(x=0.0, y=1.0), 2.0)
+
+
+class Thrown(Component):
+    """A throw of 1 m/s under 2 m/s²: 0.25 m high after 0.5 s."""
+
+    x: Variable = var("m", "height")
+    v: Variable = var("m/s", "speed")
+    g: Parameter = param("m/s2", "fall", default=2.0)
+    level: Parameter = param("m", "level", default=0.25 - 1e-6)
+    state = Mode("below", "above")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.v
+        yield der(self.v) == -self.g
+
+    def events(self) -> Events:
+        yield self.state.go("below", "above", when=self.x > self.level)
+
+
+def test_a_top_that_is_not_found_again_is_passed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The top is above the level for 2 ms. If rounding hides that where the event is located, the run goes on."""
+    thrown, locate = Thrown(x=0.0, v=1.0), EventLoop._locate
+    assert times(simulate(thrown, 1.0, points=1, **TIGHT)) == pytest.approx([0.499], abs=1e-8)
+
+    def hidden(*arguments: Any) -> Any:
+        cell, located = locate(*arguments)
+        return cell, located and replace(located, guards=[])
+
+    monkeypatch.setattr(EventLoop, "_locate", hidden)
+    run = simulate(thrown, 1.0, points=1)
+    assert (run.events, run.time[-1]) == ([], 1.0)

@@ -197,3 +197,11 @@ def test_discrete_values_at_the_start_follow_from_modes_and_their_own_starts(mon
     model.update_rows = []
     assert started(model, point).tolist() == [5.0, 8.0, 30.0, 40.0, 50.0, 60.0]
     assert point.d.tolist() == d
+
+
+@pytest.mark.parametrize("speed", [-1000.0, 1000.0])
+@pytest.mark.parametrize(("slip", "stuck"), [(0.9e-7, True), (1.2e-7, False)])
+def test_a_slip_within_rounding_of_the_speeds_holds(start, speed: float, slip: float, stuck: bool) -> None:
+    """1e-10 of 1000 rad/s are 1e-7 rad/s, whichever way the drive turns."""
+    found = start(Coupled(), a__w=speed, b__w=speed + slip)
+    assert (found["clutch.mode"] == "stuck") == stuck

@@ -135,3 +135,23 @@ def test_what_rests_rests_exactly_and_beginnings_keep_their_relative_precision()
     fall = looks(1e3 * (TIMES - 2) ** 2, 2e3 * (TIMES - 2))
     (cell, *_) = fall.cells(0, 8)
     assert cell.states(2 + 1e-6)[0] == pytest.approx(1e-9, rel=1e-6)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_doubt_is_what_the_next_power_tells(scheme: Scheme) -> None:
+    """Both polynomials keep what the coarse one can have; the next power they tell apart by its error in the middle.
+
+    The coarse one uses the looks around the cell, as far as there are any: its error is the product of the distances
+    from its looks, squared where it has slopes.
+    """
+    fewer = scheme.nodes - (1 if scheme.slopes else 2)
+    per = 2 if scheme.slopes else 1
+    looks = np.arange(scheme.nodes, dtype=float)
+    for cell in range(scheme.nodes - 1):
+        first = min(max(cell - (fewer - 1) // 2, 0), scheme.nodes - fewer)
+        for power in range(per * fewer + 1):
+            u = looks - cell
+            data = u**power if per == 1 else np.concatenate([u**power, power * u ** max(power - 1, 0)])
+            error = 0.0 if power < per * fewer else np.prod((0.5 - u[first : first + fewer]) ** per)
+            assert scheme.doubt[cell] @ data == pytest.approx(error, abs=1e-9 * 8.0**power)
+            assert scheme.middle[cell, 0] @ data == pytest.approx(0.5**power, abs=1e-9 * 8.0**power)

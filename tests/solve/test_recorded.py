@@ -82,7 +82,8 @@ def test_energies_are_integrals_of_columns() -> None:
     assert {row.component: row.inflow for row in balance} == {"motor": -28.0, "brake": 16.0, "wheel": 4.0}
     assert balance.throughput == 48.0
     assert balance.closure == pytest.approx(8 / 48)
-    assert {(row.at_events, row.residual, row.drift, row.impact) for row in balance} == {(0.0, 0.0, 0.0, 0.0)}
+    assert {(row.at_events, row.residual, row.drift, row.impact) for row in balance} == {(0.0,) * 4}
+    assert {(row.imbalance, row.imbalance_time, row.gain, row.gain_time) for row in balance} == {(0.0,) * 4}
     assert recorded("wheel.stored_energy").energy().throughput == 4.0
     # Work that is taken away, and a loss of the wrong sign, are exchanged, too.
     variables = (RecordedVariable("motor.source_power"), RecordedVariable("motor.loss_power"))
