@@ -4,13 +4,15 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from components import ConstantTorque, Damper, Fixed, Inertia, Spring, SpringDamper
-from modelica_like import build, simulate
+from modelica_like import Assembly, build, simulate
 from modelica_like.errors import StepFailed
+from modelica_like.initialize import Point
 from modelica_like.language import (
     Component,
     Equations,
@@ -26,6 +28,7 @@ from modelica_like.language import (
     var,
 )
 from modelica_like.report.run import notices
+from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
 from modelica_like.solve.pace import Pace
 
@@ -189,6 +192,7 @@ import os, signal, threading
 import numpy as np
 from components import Fixed, Inertia, Spring
 from modelica_like import Assembly, build, simulate
+from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
 
 parts = {"wall": Fixed(), "spring": Spring(c=1e6), "rotor": Inertia(J=1.0, phi=1.0, w=0.0)}
@@ -260,3 +264,23 @@ def test_a_time_event_is_not_lost_where_looks_became_closer_just_before_it() -> 
     for at in np.linspace(0.452, 0.49, 40):
         run = simulate(model, 1.0, points=10, parameters={"at": at})
         assert [event.time for event in run.events] == pytest.approx([at], rel=1e-12)
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_failures_at_one_place_do_not_count_at_the_next(more: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Six failures at the start and six behind 0.5 s leave the tolerance as it is; one more relaxes it."""
+    left, integrate = [6, 6 + more], Integrator.run
+
+    def failing(self: Integrator, start: Point, *asked: Any, **options: Any) -> Any:
+        place = int(start.t >= 0.5)
+        if left[place]:
+            left[place] -= 1
+            raise StepFailed("Not today.")
+        return integrate(self, start, *asked, **options)
+
+    monkeypatch.setattr(Integrator, "run", failing)
+    parts: dict[str, Component] = {"torque": ConstantTorque(tau_constant=1.0), "a": Inertia(J=1.0, phi=0.0, w=0.0)}
+    run = simulate(Assembly("d", parts=parts, series={"s": [*parts]}), 1.0, points=20_000)
+    assert left == [0, 0]
+    assert len(run.notices) == more
+    assert run.final["a.w"] == pytest.approx(1.0, rel=1e-6)
