@@ -10,9 +10,11 @@ from pkgutil import walk_packages
 
 import components
 from modelica_like import Component
+from modelica_like.language.tables import Rows
 from modelica_like.netlist import library_types
 
 LIST = Path(__file__).with_name("declarations.txt")
+COLUMNS = ("unit", "scale", "rising", "text", "min", "max")
 SHOWN = ("unit_text", "default", "min", "max", "above", "nominal", "guess", "state", "tunable")
 
 
@@ -24,11 +26,17 @@ def declarations() -> Iterator[str]:
             about = (f"{what} {getattr(field, what)}" for what in SHOWN if getattr(field, what, None) is not None)
             yield f"  {field.name}: {type(field).__name__}, {', '.join(about)}"
         yield from (f"  {field} = {_told(default)}" for field, default in kind._structural.items())
+        yield from (f"  {field}: {_table(table)}" for field, table in kind._tables.items())
         yield from (f"  {mode}: {' '.join(one.names)}" for mode, one in kind._class_modes.items())
 
 
 def _told(default: object) -> str:
     return "required" if type(default) is object else repr(default)
+
+
+def _table(table: Rows) -> str:
+    columns = (", ".join(f"{what} {getattr(one, what)}" for what in COLUMNS) for one in table.columns)
+    return f"{'flat' if table.flat else 'rows'}{' with more' if table.more else ''}; {'; '.join(columns)}"
 
 
 def test_declarations_are_what_netlists_rely_on() -> None:

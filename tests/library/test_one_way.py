@@ -111,6 +111,16 @@ def test_pressed_one_way_clutch_brakes_overrunning() -> None:
     assert run.energy().closure <= 1e-8
 
 
+def test_a_one_way_clutch_that_is_pushed_from_rest_holds_from_the_start() -> None:
+    parts: dict[str, Component] = {
+        "push": ConstantTorque(tau_constant=3.0), "engine": Inertia(J=1.0, phi=0.0, w=0.0),
+        "coupling": OneWayClutch(fn_max=1.0), "load": Inertia(J=2.0, w=0.0),
+    }  # fmt: skip
+    run = simulate(Assembly("drive", parts=parts, series={"shaft": list(parts)}), "1 s")
+    assert [(one.time, one.after) for one in run.events] == []
+    assert run.final["load.w"] == pytest.approx(1.0, rel=1e-9)
+
+
 def test_torque_limiter_slips_at_its_torque() -> None:
     parts: dict[str, Component] = {
         "engine": ConstantTorque(tau_constant=30.0), "motor": Inertia(J=1.0, phi=0.0, w=0.0),

@@ -484,7 +484,10 @@ def test_an_assertion_ends_the_run(solver):
         run(drive, 2.0, solver)
     with pytest.raises(LimitPassed, match="0 s"):
         run(Assembly("way", parts={"sledge": Asserting(end=-1.0)}), 1.0, solver)
-    assert run(drive, 1.4, solver).final["sledge.x"] == pytest.approx(2.8)
+    before = run(drive, 1.4, solver)
+    assert before.final["sledge.x"] == pytest.approx(2.8)
+    # The mode that breaks has the number of the assertion among the events of the class.
+    assert [one.path for one in before.model.flat_discretes if "assertion" in one.path] == ["sledge.assertion[2]"]
 
 
 class Sledge(Component):

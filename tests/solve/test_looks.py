@@ -40,7 +40,7 @@ def looks(values: np.ndarray, slopes: np.ndarray) -> Looks:
 
 def between(seen: Looks) -> tuple[np.ndarray, set[int]]:
     """States between looks, and the intervals in which they are not precise."""
-    piece = Piece(seen, BETWEEN, 8, np.zeros((1, len(BETWEEN))), np.zeros((0, len(BETWEEN))))
+    piece = Piece(seen, BETWEEN, seen.count, np.zeros((1, len(BETWEEN))), np.zeros((0, len(BETWEEN))))
     unknown = interpolate(seen.integrator, [piece])
     return piece.x, {interval for _, interval in unknown}
 
@@ -76,6 +76,15 @@ def test_degree_seven_is_exact_but_not_known_to_be() -> None:
     x, unknown = between(looks(TIMES**7, 7 * TIMES**6))
     np.testing.assert_allclose(x[0], BETWEEN**7, rtol=1e-12)
     assert unknown == {0, 1, 3, 5, 7}
+
+
+def test_between_too_few_looks_states_are_straight_lines_that_are_not_precise() -> None:
+    seen = looks(TIMES, np.ones(9))
+    few = Looks(seen.integrator, seen.guards, TIMES[::4], np.array([[1.0, 3.0, -1.0]]), seen.z[:, ::4], seen.d)
+    few.seen = np.zeros((0, 3)), np.zeros((0, 3)), np.full((1, 3), 7.0)
+    x, unknown = between(few)
+    np.testing.assert_allclose(x[0], np.interp(BETWEEN, TIMES[::4], few.x[0]))
+    assert unknown == {0, 1}
 
 
 def test_slopes_that_are_nothing_but_rounding_are_left_out() -> None:
