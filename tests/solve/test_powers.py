@@ -157,6 +157,8 @@ def test_what_is_stored_and_moved() -> None:
     assert (work.stored, work.moved) == (4.0, 20.0)
     work._move(stored[:, :1], np.ones((3, 1)), steps[:0])
     assert work.moved == 20.0
+    work._move(stored[:, :1], np.array([[0.0, -3.0, 0.0, 5.0]]), np.array([4.0, 4.0, 2.0]))
+    assert work.moved == 3.0 * 4 + 5.0 * 2
 
 
 def test_the_largest_rounding_counts() -> None:
