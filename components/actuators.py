@@ -19,6 +19,7 @@ from modelica_like.language import (
     Variable,
     absolute,
     all_of,
+    any_of,
     der,
     log,
     maximum,
@@ -97,9 +98,8 @@ class Actuator(Component, partial=True):
         stop, pull, s, v, travel = self.stop, self.f_stop, self.s, self.v, self.travel
         # It leaves a stop exactly there, at rest and without force: rounding must not make it meet the stop again.
         rest, end = {self.s: 0.0, self.v: 0.0}, {self.s: self.travel, self.v: 0.0}
-        yield stop.initially("driven", when=all_of(self.s >= self.travel, self.v >= 0))
-        yield stop.initially("moving", when=self.s > 0)
-        yield stop.initially("moving", when=self.v > 0)
+        yield stop.initially("driven", when=self.s >= self.travel)
+        yield stop.initially("moving", when=any_of(self.s > 0, self.v > 0, self.v < 0))
         yield stop.go("resting", "leaving", when=pull > self.faint, reset=rest, because="the drive exceeds the spring")
         yield stop.go("driven", "leaving", when=pull < -self.faint, reset=end, because="the spring exceeds the drive")
         away = all_of(s > _AWAY * travel, s < (1 - _AWAY) * travel)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import casadi as ca
@@ -13,8 +13,9 @@ from modelica_like.errors import LanguageError
 from modelica_like.language.component import Component
 from modelica_like.language.expr import Symbol, flagged_motion, symbol_of, symbols_in
 from modelica_like.language.fields import Variable
+from modelica_like.language.functions import all_of, any_of
 from modelica_like.language.holding import UNLIMITED, Hold
-from modelica_like.language.mode import Mode
+from modelica_like.language.mode import Mode, StartMode
 
 TERMS = 4
 """Rows of the hold terms: gain, capacity forward, capacity backward, restitution."""
@@ -99,13 +100,32 @@ def hold_forms(component: Component, residuals: list[Any]) -> tuple[tuple[HoldFo
             motion = _variable(component, mode, hold.motion, "motion")
             reaction = _variable(component, mode, hold.reaction, "reaction") if hold.reaction else None
             row, gain, rigid = _equation(component, mode, name, motion, residuals)
-            loose = next((k for k, other in enumerate(mode.names) if other not in mode.holds), -1)
             named = "" if reaction is None else reaction.name
-            forms.append(HoldForm(mode.name, mode.number(name), loose, motion.name, named, row, rigid))
+            forms.append(HoldForm(mode.name, mode.number(name), _loose(mode), motion.name, named, row, rigid))
             forward, backward = _capacities(component, hold)
             restitution = _value(component, hold.restitution) if hold.restitution else 0.0
             terms += [gain, forward, backward, restitution]
     return tuple(forms), terms
+
+
+def starts_at_rest(component: Component, declared: Iterable[StartMode]) -> Iterator[StartMode]:
+    """Yield the start modes, which hold a motion only if it is at rest: what moves is met in an impact."""
+    for one in declared:
+        mode = one.mode.mode
+        if hold := mode.holds.get(one.target):
+            motion = cast(Any, _variable(component, mode, hold.motion, "motion"))
+            one = replace(one, when=all_of(one.when, motion <= 0, motion >= 0))
+        yield one
+    for mode in component.modes.values():
+        loose = _loose(mode)
+        if loose >= 0 and (hold := mode.holds.get(mode.start)):
+            motion = cast(Any, _variable(component, mode, hold.motion, "motion"))
+            yield getattr(component, mode.name).initially(mode.names[loose], when=any_of(motion < 0, motion > 0))
+
+
+def _loose(mode: Mode) -> int:
+    """Return the first value of a mode that holds nothing, or -1."""
+    return next((k for k, other in enumerate(mode.names) if other not in mode.holds), -1)
 
 
 def _value(component: Component, name: str) -> Any:

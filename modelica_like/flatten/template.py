@@ -12,7 +12,7 @@ from modelica_like.errors import LanguageError, Source
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
 from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, between_events, is_discrete
-from modelica_like.flatten.holds import HoldForm, IdealForm, hold_forms, ideal_forms
+from modelica_like.flatten.holds import HoldForm, IdealForm, hold_forms, ideal_forms, starts_at_rest
 from modelica_like.flatten.reasons import reason
 from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
@@ -306,7 +306,8 @@ class _Changes:
     def __init__(self, component: Component, discrete: DiscreteEquations) -> None:
         self.component = component
         self.transitions = [e for e in discrete.events if isinstance(e, Transition)]
-        self.starts = [e for e in discrete.events if isinstance(e, StartMode)]
+        declared = (e for e in discrete.events if isinstance(e, StartMode))
+        self.starts = list(starts_at_rest(component, declared))
         self.updates = [part for one in discrete.updates for part in (one.active, one.value)]
         self.targets = [one.target for one in discrete.updates]
         self.guards = [ca.SX(0) if t.when is None else guard_of(t.when, t.source) for t in self.transitions]

@@ -9,13 +9,19 @@ from components import (
     BearingFriction,
     Brake,
     Clutch,
+    ConstantForce,
     ConstantSpeed,
     ConstantTorque,
+    ConstantVoltage,
+    Ground,
     Inertia,
     LossyGear,
+    MappedDrive,
+    Mass,
     SupportFriction,
     Table,
     TorqueConverter,
+    TranslationalBrake,
 )
 from modelica_like import Assembly, Component, ModelicaLikeError, Solution, simulate
 from modelica_like.errors import LimitPassed
@@ -92,6 +98,42 @@ def test_the_run_ends_where_it_is_asked_for() -> None:
     run: Solution = caught.value.run
     assert run.time[-1] == pytest.approx(5.0, rel=1e-9)
     assert run.final["rotor.w"] == pytest.approx(10.0, rel=1e-9)
+
+
+ROWS = {"w_scale": 0.5, "extrapolate": "error"}
+SLIDING = {"v_scale": 0.5, "extrapolate": "error"}
+ENDS: dict[str, Component] = {
+    "bearing": BearingFriction(tau_pos=((0, 1), (10, 2)), **ROWS),
+    "brake": Brake(fn_max=1.0, mu_pos=((0, 0.3), (10, 0.4)), **ROWS),
+    "gear": LossyGear(ratio=1.0, loss_table=((0, 1, 1, 1, 1), (10, 1, 1, 2, 2)), **ROWS),
+    "drive": MappedDrive(limit=((0, 1), (10, 2)), Jr=0.0, tau_ref=0.0, **ROWS),
+    "slideway": SupportFriction(f_pos=((0, 1), (10, 2)), **SLIDING),
+    "slide brake": TranslationalBrake(fn_max=1.0, mu_pos=((0, 0.3), (10, 0.4)), **SLIDING),
+}
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("name", ENDS)
+def test_the_last_row_counts_in_its_scale_and_in_both_directions(name: str, sign: int) -> None:
+    """The last row is 10, which is 5 rad/s or 5 m/s."""
+    turns = "slide" not in name
+    push: Component = ConstantTorque(tau_constant=40.0 * sign) if turns else ConstantForce(f_constant=40.0 * sign)
+    body: Component = Inertia(J=1.0, phi=0.0, w=0.0) if turns else Mass(m=1.0, s=0.0, v=0.0)
+    parts = {"push": push, "body": body, "part": ENDS[name]}
+    if name == "gear":
+        parts["load"] = Inertia(J=1.0)
+    series, wires = {"s": list(parts)}, dict[str, list[str]]()
+    if name == "drive":
+        parts |= {"supply": ConstantVoltage(V=100.0), "ground": Ground()}
+        wires = {
+            "plus": ["supply.p", "part.p_dc"],
+            "minus": ["supply.n", "part.n_dc", "ground.p"],
+            "shaft": ["body.flange_b", "part.flange"],
+        }
+        series = {"s": ["push", "body"]}
+    with pytest.raises(LimitPassed, match="part leaves the rows") as caught:
+        simulate(Assembly("d", parts=parts, series=series, connect=wires), 5.0)
+    assert caught.value.run.final["body.w" if turns else "body.v"] == pytest.approx(5.0 * sign, rel=1e-8)
 
 
 @pytest.mark.parametrize(("how", "expected"), [("linear", 4.0), ("hold", 2.0)])

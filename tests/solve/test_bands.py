@@ -42,6 +42,12 @@ def test_of_many_modes_those_that_hold_a_motion_have_bands(others: int, shown: i
     assert not left
 
 
+def test_what_is_short_is_measured_by_the_length_of_the_run() -> None:
+    """It begins at 10 s: 0.1 ms of its second can be seen."""
+    (band,), _ = bands_of(simulate(Blink(first=10.8, long=1e-4, second=10.9), 11.0, t0=10.0, points=2))
+    assert [name for *_, name in band.spans] == ["low", "high", "again", "last"]
+
+
 def test_a_mode_that_lasts_too_short_to_be_seen_has_no_band() -> None:
     for long, seen in ((5e-6, ["low", "again", "last"]), (0.05, ["low", "high", "again", "last"])):
         (band,), left = bands_of(simulate(Blink(long=long), 1.0, points=2))

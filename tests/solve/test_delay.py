@@ -66,6 +66,19 @@ def test_polynomials_of_the_method_of_steps(run: Run, rtol: float):
     assert found.at(3.5)["y"] == pytest.approx(np.interp(3.5, found.time, found["y"]), abs=1e-4)
 
 
+def test_kinks_become_smoother_with_every_delay_until_none_counts(monkeypatch: pytest.MonkeyPatch):
+    """At 1 s the slope jumps, at 2 s the second derivative, and so on: steps begin anew at the first eight."""
+    noted, plainly = list[tuple[float, int]](), Delays.broken
+
+    def broken(self: Delays, t: float, before: int = -1) -> None:
+        noted.append((t, before))
+        plainly(self, t, before)
+
+    monkeypatch.setattr(Delays, "broken", broken)
+    simulate(Feedback(y=1.0), 12.0)
+    assert noted == [(pytest.approx(k), k - 1) for k in range(1, 9)]
+
+
 class Fast(Component):
     """The past has sixteen periods in one delay."""
 

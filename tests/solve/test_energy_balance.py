@@ -13,7 +13,7 @@ from modelica_like import Assembly, Component, build, load, simulate
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.language import Equations, Events, Expr, Mode, Parameter, Variable, der, param, sin, var
 from modelica_like.solve import powers
-from modelica_like.solve.energy import _unexplained
+from modelica_like.solve.energy import _SAME_TIME, _unexplained
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -241,3 +241,5 @@ def test_energy_at_events_that_nothing_explains() -> None:
     assert _unexplained(times, jumps, [], [(near, 5.0)]) == 3.0
     assert _unexplained(times, jumps, [2.1, 0.9], [(1.5, 7.0), (9.0, 7.0)]) == 5.0
     assert _unexplained(times[:0], jumps[:0], [1.0], [(1.0, 1.0)]) == 0.0
+    start, apart = np.zeros(1), (0.9 * _SAME_TIME, 1.1 * _SAME_TIME)
+    assert [_unexplained(start, jumps[:1], [time], []) for time in apart] == [0.0, 1.0]

@@ -389,3 +389,21 @@ def test_an_input_keeps_its_sign_as_a_derivative() -> None:
     run = simulate(Falling(x=1.0), 1.0, points=1)
     assert run.final["x"] == pytest.approx(-5.0, rel=1e-9)
     assert run.final["u"] == 3.0
+
+
+@pytest.mark.parametrize("factor", [2.0, -0.5])
+def test_a_chain_of_derivatives_keeps_its_factors(factor: float) -> None:
+    """der(x) = k v and der(v) = 3 from rest: v = 3 t, x = 1 + 1.5 k t²."""
+
+    class Moving(Component):
+        x: Variable = var("m", "place", default=1.0)
+        v: Variable = var("m/s", "speed, in other units", default=0.0)
+        a: Parameter = param("m/s2", "acceleration, in other units", default=3.0)
+
+        def equations(self) -> Equations:
+            yield der(self.x) == factor * self.v
+            yield der(self.v) == self.a
+
+    run = simulate(Moving(), 2.0, points=4)
+    np.testing.assert_allclose(run["v"], 3.0 * run.time, rtol=1e-9)
+    np.testing.assert_allclose(run["x"], 1.0 + 1.5 * factor * run.time**2, rtol=1e-7)
