@@ -64,12 +64,10 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
     point = Point(t0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
     point.d = call(model, model.discrete_starts, point)
     share(model, point)
-    problem = StartProblem(model, point)
     if start == "steady":
-        problem.apply(point)
-        point.d = started(model, point)
-        share(model, point)
-    _settle(model, point, problem, start)
+        point = _settled_steady(model, point)
+    else:
+        _settle(model, point, StartProblem(model, point), start)
     rest(model, point)
     replace_dependent(model, point)
     solve_implicit(model, point)
@@ -77,6 +75,34 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
     if start == "steady":
         check_modes_hold(model, point)
     return point
+
+
+def _settled_steady(model: CompiledDae, declared: Point) -> Point:
+    """Find a steady state from the modes that the guesses choose, and else from the declared ones.
+
+    Guesses may drive a controller into its limits, and from there no steady state, or only the other limit, is found.
+    Which way surfaces slide nothing but the guesses can tell.
+    """
+    failed: InitializationError | None = None
+    for chosen in (True, False):
+        point = declared.copy()
+        problem = StartProblem(model, point)
+        problem.apply(point)
+        modes = started(model, point)
+        holding = {one.mode for one in model.holds}
+        free = [mode for mode, *_ in model.start_modes if mode not in holding]
+        if not chosen:
+            modes[free] = declared.d[free]
+        point.d = modes
+        share(model, point)
+        try:
+            _settle(model, point, problem, "steady")
+        except InitializationError as error:
+            failed = failed or error
+        else:
+            return point
+    assert failed is not None
+    raise failed
 
 
 def _settle(model: CompiledDae, point: Point, problem: StartProblem, start: StartKind) -> None:
@@ -103,13 +129,15 @@ def _settle(model: CompiledDae, point: Point, problem: StartProblem, start: Star
 
 
 def chosen_modes(model: CompiledDae, point: Point) -> Vector:
-    """Choose modes by their start conditions: the first true one wins."""
-    d = point.d.copy()
-    decided: set[int] = set()
+    """Choose modes by their start conditions: the first true one wins; without one, it is the declared start."""
+    d, decided = point.d.copy(), dict[int, int]()
     for holds, (mode, target, _) in zip(call(model, model.start_conditions, point), model.start_modes, strict=True):
-        if holds and mode not in decided:
-            decided.add(mode)
-            d[mode] = target
+        if holds:
+            decided.setdefault(mode, target)
+    left = list({mode for mode, *_ in model.start_modes} - decided.keys())
+    if left:
+        d[left] = call(model, model.discrete_starts, point)[left]
+    d[list(decided)] = list(decided.values())
     return d
 
 

@@ -35,6 +35,8 @@ def solve_steady(model: CompiledDae, point: Point) -> None:
         InitializationError: there is no steady state near it.
     """
     moving = moving_states(model)
+    if not moving and not model.implicit:
+        return
     function = _steady_function(model)
     for _ in range(_MAX_NEWTON):
         value, jacobian = (np.asarray(part.full()) for part in function(*_arguments(model, point)))

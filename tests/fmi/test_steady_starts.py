@@ -2,10 +2,24 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from components import BearingFriction, Clutch, ConstantTorque, Inertia
+from components import (
+    PI,
+    BearingFriction,
+    Clutch,
+    Constant,
+    ConstantSpeed,
+    ConstantTorque,
+    Damper,
+    Fixed,
+    Inertia,
+    SpeedSensor,
+    Torque,
+)
+from modelica_like import simulate
 from modelica_like.initialize import initialize
 from modelica_like.language import Assembly, guess
 from modelica_like.netlist import load
@@ -70,6 +84,51 @@ def test_a_gearbox_starts_in_the_steady_state_of_python(exported):
     assert fmu.getInteger([one.reference for one in modes]) == [int(point.d[one.slot[1]]) for one in modes]
     named = [x for name, x in zip(case.model.states, point.x, strict=True) if name in case.face.by_name]
     assert case.states(fmu) == pytest.approx(named, rel=1e-9, abs=1e-9)
+
+
+def controlled(d):
+    """A rotor with damping d whose speed is controlled: 10 rad/s, or what 6 N.m reach."""
+    parts = {
+        "wish": Constant(k=10.0), "control": PI(k=1.0, Ti=0.1, y_max=6.0), "torque": Torque(), "rotor": Inertia(J=1.0),
+        "oil": Damper(d=d), "wall": Fixed(), "tacho": SpeedSensor(),
+    }  # fmt: skip
+    wires = {"wish": ["wish.y", "control.u_s"], "speed": ["tacho.w", "control.u_m"], "u": ["control.y", "torque.tau"],
+             "end": ["rotor.flange_b", "tacho.flange"]}  # fmt: skip
+    drive = Assembly("controlled", parts=parts, series={"shaft": ["torque", "rotor", "oil", "wall"]}, connect=wires)
+    drive.simulate.update(start="steady", until=1.0)
+    return drive
+
+
+@pytest.mark.parametrize(("d", "speed"), [(0.06, 10.0), (0.2, 10.0), (1.0, 6.0)])
+def test_a_controller_begins_where_it_settles(exported, d, speed):
+    """At rest it is at its limit; from there each limit leads to the other one."""
+    run = simulate(controlled(d))
+    assert run["rotor.w"] == pytest.approx(np.full(len(run.time), speed), rel=1e-6)
+    assert run.final["control.y"] == pytest.approx(d * speed, rel=1e-6)
+    assert run.events == ()
+    case = exported(controlled(d))
+    fmu = case.started("me")
+    assert fmu.getReal([case.ref("rotor.w"), case.ref("control.y")]) == pytest.approx([speed, d * speed], rel=1e-9)
+
+
+def test_a_cascade_of_controllers_begins_where_it_settles(exported):
+    drive = load(EXAMPLES / "components" / "servo.toml")
+    drive.simulate.update(start="steady")
+    case = exported(drive)
+    names, settled = ["spindle.motor.w", "spindle.motor.ia", "axis.motor.w", "table.phi"], [100.0, 0.0, 0.0, 3.0]
+    final = simulate(drive, 0.1).final
+    assert [final[one] for one in names] == pytest.approx(settled, abs=1e-9)
+    assert case.started("me").getReal([case.ref(one) for one in names]) == pytest.approx(settled, abs=1e-9)
+
+
+def test_where_nothing_can_settle_the_start_is_as_given(exported):
+    """A prescribed speed: only an angle moves, on which nothing depends."""
+    drive = Assembly("turning", parts={"motor": ConstantSpeed(w_fixed=3.0, phi=0.5), "rotor": Inertia(J=1.0)},
+                     series={"shaft": ["motor", "rotor"]})  # fmt: skip
+    drive.simulate.update(start="steady", until=1.0)
+    assert simulate(drive).final["rotor.phi"] == pytest.approx(3.5)
+    case = exported(drive)
+    assert case.started("me").getReal([case.ref("rotor.phi"), case.ref("rotor.w")]) == [0.5, 3.0]
 
 
 def test_a_steady_start_that_no_mode_allows_is_refused(exported):

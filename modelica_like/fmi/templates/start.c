@@ -82,7 +82,8 @@ static Result check_dependent(Instance *c) {
     return RESULT_OK;
 }
 
-/* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. */
+/* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. An error
+ * is told by who calls this, because other modes may be tried. */
 static Result solve_steady(Instance *c) {
     const Model *m = c->model;
     int n = m->n_steady;
@@ -111,8 +112,7 @@ static Result solve_steady(Instance *c) {
         }
         if (change < 1e-13) break;
     }
-    if (n == 0 || residual <= 1e-6) return RESULT_OK;
-    return fail(c, "No steady state was found at t = %.9g s.", c->state.t);
+    return n == 0 || residual <= 1e-6 ? RESULT_OK : RESULT_ERROR;
 }
 
 /* Equations of discrete variables, whose values before the start are their start values. */
@@ -140,12 +140,17 @@ void choose_modes(Instance *c) {
 }
 
 /* What slides one way where it began the other way (`begun`, if there is a steady state before) is held: equilibrium
- * lies in between, where it stands still. Tells whether a mode changed. */
-static int choose_start_modes(Instance *c, const double *begun) {
+ * lies in between, where it stands still. Others may be asked to be as `declared`. Tells whether a mode changed. */
+static int choose_start_modes(Instance *c, const double *begun, int declared) {
     const Model *m = c->model;
     memcpy(c->decided, c->mode_given, (size_t)m->n_d);
     memcpy(c->d_before, c->d, (size_t)m->n_d * sizeof(double));
     choose_modes(c);
+    if (declared) memcpy(c->decided, c->mode_given, (size_t)m->n_d);
+    for (int k = 0; k < m->n_holds && declared; k++) c->decided[m->holds[k].mode] = 1;
+    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
+    for (int k = 0; k < m->n_start_modes; k++)
+        if (!c->decided[m->start_modes[k].mode]) c->d[m->start_modes[k].mode] = c->guards[m->start_modes[k].mode];
     if (begun) variables_now(c);
     for (int k = 0; k < m->n_holds && begun; k++) {
         const Held *one = &m->holds[k];
@@ -186,10 +191,9 @@ static Result check_modes_hold(Instance *c) {
     return RESULT_OK;
 }
 
-static Result pass_start(Instance *c) {
+/* States and modes. A steady state is sought from the modes that guesses choose, or from those that are declared. */
+static Result start_settled(Instance *c, double *begun, int declared) {
     const Model *m = c->model;
-    double *begun = m->settings->steady ? c->begun : NULL;
-    if (!check_tables(c)) return RESULT_ERROR;
     memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
     evaluate_now(c, &m->tapes.discrete_starts, c->guards);
@@ -201,18 +205,25 @@ static Result pass_start(Instance *c) {
     if (begun) {
         apply(c, m->start_default, m->n_start_default);
         if (!apply_direct(c)) return RESULT_ERROR;
-        choose_start_modes(c, NULL);
+        choose_start_modes(c, NULL, declared);
         share(c);
     }
-    for (int round = 0;; round++) {
-        if (round == MODE_ROUNDS)
-            return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
+    for (int round = 0; round < MODE_ROUNDS; round++) {
         if (!(begun ? find_steady(c, begun)
                     : apply_direct(c) && solve_start_system(c) && solve_now(c, 0) && check_dependent(c)))
             return RESULT_ERROR;
-        if (!choose_start_modes(c, begun)) break;
+        if (!choose_start_modes(c, begun, 0)) return RESULT_OK;
         share(c);
     }
+    if (begun) return RESULT_ERROR;
+    return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
+}
+
+static Result pass_start(Instance *c) {
+    double *begun = c->model->settings->steady ? c->begun : NULL;
+    if (!check_tables(c)) return RESULT_ERROR;
+    if (!start_settled(c, begun, 0) && !(begun && start_settled(c, begun, 1)))
+        return begun ? fail(c, "No steady state was found at t = %.9g s.", c->state.t) : RESULT_ERROR;
     rest(c);
     replace_dependent(c);
     if (!solve_now(c, 0) || !check_singular(c) || !check_modes_hold(c)) return RESULT_ERROR;
