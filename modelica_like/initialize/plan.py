@@ -17,6 +17,7 @@ from modelica_like.structure.matching import Elimination, Matching
 
 _DENSE = 100
 _WELL_CONDITIONED = 1e9
+_KNOWN = 16
 
 
 @dataclass(frozen=True)
@@ -99,19 +100,25 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
 
 
 def _is_regular(model: CompiledDae, plan: StartPlan, point: Point) -> bool:
-    """Return whether the plan's matrix is far from singular, without motion from rest; a positive answer is cached."""
+    """Return whether the plan's matrix is far from singular, without motion from rest.
+
+    The last positive answer of each combination of modes is kept: a start often looks at two of them in turn.
+    """
     function = plan.system.function
     fast = model.fast(("start matrix", plan.kind), lambda: function, (1,))
     x, y = point.x.copy(), np.zeros(function.size1_out(0))
     x[[k for k in plan.system.rates if k < len(x)]] = 0.0
     entries = fast(point.t, x, y, point.z, model.p, model.u, point.d)[0]
     entries = plan.entries(entries)
-    known: dict[str, Any] = model.once(("regular start", plan.kind), dict)
-    if np.array_equal(known.get("entries", ()), entries):
+    known: dict[bytes, Vector] = model.once(("regular start", plan.kind), dict)
+    modes = point.d.tobytes()
+    if np.array_equal(known.get(modes, ()), entries):
         return True
     regular = _regular(plan.matrix(entries), entries)
     if regular:
-        known["entries"] = entries
+        if len(known) >= _KNOWN:
+            known.clear()
+        known[modes] = entries
     return regular
 
 

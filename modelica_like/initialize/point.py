@@ -114,8 +114,8 @@ def newton_at(model: CompiledDae, *, look: bool) -> ca.Function:
 
 def is_linear(model: CompiledDae) -> bool:
     """Whether the implicit equations are linear in z: then one step of Newton's method solves them."""
-    at = model.alg_jacobian.index_in("z")
-    return model.once("linear", lambda: not model.alg_jacobian.jac_sparsity(0, at).nnz())
+    slopes = model.alg_jacobian
+    return model.once("linear", lambda: not slopes.jac_sparsity(0, slopes.index_in("z")).nnz())
 
 
 def _check_regular(model: CompiledDae, point: Point) -> None:
