@@ -202,7 +202,7 @@ def _contents(
         "parameter_min": [-math.inf if one.min is None else one.min for one in model.flat_parameters],
         "parameter_max": [math.inf if one.max is None else one.max for one in model.flat_parameters],
         "inputs": model.u,
-        "guesses": [*model.guesses, *model.z_guesses],
+        "guesses": tables.start.guesses,
         "nominals": model.nominals,
         "state_names": [text(name) for name in model.states],
         "implicit_names": [text(name) for name in model.implicit],

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.initialize import Point, call, share, start_plan
+from modelica_like.initialize import Point, call, settled_guess, share, start_plan
 from modelica_like.initialize.plan import is_near, start_name
 from modelica_like.initialize.start import StartProblem
 from modelica_like.initialize.steady import moving_states
@@ -36,6 +36,8 @@ class StartTables:
         columns: unknowns of the start system among (x, y, z).
         wanted: its rows.
         steady: states whose derivatives are zero in the steady start; None for another start.
+        guesses: of the states and the implicit unknowns. A steady start that is not found near those of the model
+            begins where the drive settles; then other guesses and defaults do not count.
     """
 
     direct: tuple[tuple[int, int, float], ...]
@@ -49,6 +51,7 @@ class StartTables:
     columns: tuple[int, ...]
     wanted: tuple[int, ...]
     steady: tuple[int, ...] | None
+    guesses: tuple[float, ...]
 
 
 def start_tables(model: CompiledDae) -> StartTables:
@@ -60,12 +63,16 @@ def start_tables(model: CompiledDae) -> StartTables:
     point = Point(0.0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
     point.d = call(model, model.discrete_starts, point)
     share(model, point)
+    kind = model.settings.get("start", "given")
+    settled = settled_guess(model, point) if kind == "steady" else None
     StartProblem(model, point).fix(point)
-    plan = start_plan(model, model.settings.get("start", "given"), point)
+    plan = start_plan(model, kind, point)
     own = plan.system.function.size1_out(0) + len(model.implicit)
     row_of = {node: own + k for k, node in enumerate(plan.system.nodes)}
 
     def of_states(strength: str) -> tuple[tuple[int, int, float], ...]:
+        if settled is not None and strength != "fixed":
+            return ()
         chosen = [(e.state, k) for k, e in enumerate(model.starts) if e.strength == strength and e.state is not None]
         return tuple((state[0], k, state[1]) for state, k in chosen)
 
@@ -75,11 +82,12 @@ def start_tables(model: CompiledDae) -> StartTables:
     resting = ((AT_REST, node, row_of[node]) for node in plan.resting)
     names = {name: k for k, name in enumerate(model.implicit)}
     near = [(names.get(start_name(model, e)), k) for k, e in enumerate(model.starts) if is_near(model, e)]
+    begin = settled or Point(0.0, model.guesses, model.z_guesses, point.d)
     return StartTables(
         direct=of_states("fixed"),
         defaults=of_states("default"),
         x_guesses=of_states("guess"),
-        z_guesses=tuple((position, k, 1.0) for position, k in near if position is not None),
+        z_guesses=tuple((position, k, 1.0) for position, k in near if position is not None and settled is None),
         rows=(*((AT_REST, 0, row) for row in plan.wanted[: plan.own]), *as_rows(plan.rows), *resting),
         dependent=tuple(as_rows(plan.dependent)),
         system=plan.system.function,
@@ -87,4 +95,5 @@ def start_tables(model: CompiledDae) -> StartTables:
         columns=plan.columns,
         wanted=plan.wanted,
         steady=tuple(moving_states(model)) if plan.kind == "steady" else None,
+        guesses=(*begin.x.tolist(), *begin.z.tolist()),
     )

@@ -37,17 +37,16 @@ def solve_steady(model: CompiledDae, point: Point) -> None:
     moving = moving_states(model)
     if not moving and not model.implicit:
         return
-    function = _steady_function(model)
     for _ in range(_MAX_NEWTON):
-        value, jacobian = (np.asarray(part.full()) for part in function(*_arguments(model, point)))
-        if not np.isfinite(np.hstack([value, jacobian])).all():
+        value, jacobian = rates_and_slopes(model, point)
+        if not (np.isfinite(value).all() and np.isfinite(jacobian).all()):
             break
-        step = _step(model, point, moving, -value.ravel(), jacobian)
+        step = _step(model, point, moving, -value, jacobian)
         point.x[moving] += step[: len(moving)]
         point.z += step[len(moving) :]
         if np.abs(step).max(initial=0.0) <= 1e-13:
             break
-    residual = np.asarray(function(*_arguments(model, point))[0].full()).ravel()
+    residual, _ = rates_and_slopes(model, point)
     if not np.abs(residual).max(initial=0.0) <= _STEADY:
         worst = int(np.argmax(np.abs(residual)))
         name = model.states[moving[worst]] if worst < len(moving) else model.implicit[worst - len(moving)]
@@ -65,8 +64,11 @@ def _step(model: CompiledDae, point: Point, moving: list[int], right: Vector, ja
     return solve_kept(kept, jacobian, right, kept.missing)
 
 
-def _arguments(model: CompiledDae, point: Point) -> tuple[Any, ...]:
-    return point.t, point.x, point.z, model.p, model.u, point.d
+def rates_and_slopes(model: CompiledDae, point: Point) -> tuple[Vector, Matrix]:
+    """Return rates of the moving states and residuals, and their derivatives by these states and implicit unknowns."""
+    found = _steady_function(model)(point.t, point.x, point.z, model.p, model.u, point.d)
+    value, slopes = (np.asarray(part.full()) for part in found)
+    return value.ravel(), slopes
 
 
 def _steady_function(model: CompiledDae) -> ca.Function:

@@ -14,8 +14,11 @@ from components import (
     ConstantSpeed,
     ConstantTorque,
     Damper,
+    ElastoBacklash,
     Fixed,
     Inertia,
+    LossyGear,
+    QuadraticSpeedDependentTorque,
     SpeedSensor,
     Torque,
 )
@@ -119,6 +122,66 @@ def test_a_cascade_of_controllers_begins_where_it_settles(exported):
     final = simulate(drive, 0.1).final
     assert [final[one] for one in names] == pytest.approx(settled, abs=1e-9)
     assert case.started("me").getReal([case.ref(one) for one in names]) == pytest.approx(settled, abs=1e-9)
+
+
+def driven(*parts, **wires):
+    """5 N.m drive a shaft."""
+    named = {f"part{k}": one for k, one in enumerate(parts)}
+    drive = Assembly("driven", parts={"push": ConstantTorque(tau_constant=5.0), **named},
+                     series={"shaft": ["push", *named]}, connect=wires)  # fmt: skip
+    drive.simulate.update(start="steady", until=1.0)
+    return drive
+
+
+SETTLED = {
+    # 5 = 1 + w: at rest the bearing sticks, and does not hold
+    "bearing": (lambda: driven(Inertia(J=1.0), BearingFriction(tau_pos=((0, 1), (9, 10)))), {"part0.w": 4.0}),
+    # 5 = 0.2·w²: at rest nothing depends on the speed
+    "fan": (
+        lambda: driven(Inertia(J=1.0), QuadraticSpeedDependentTorque(tau_nominal=-20.0, w_nominal=10.0)),
+        {"part0.w": 5.0},
+    ),
+    # In the middle of its play nothing turns the second wheel; b/2 + 5/c
+    "play": (
+        lambda: driven(Inertia(J=1.0), ElastoBacklash(c=1e3, d=1.0, b=0.02), Inertia(J=2.0), Damper(d=0.5), Fixed()),
+        {"part2.w": 10.0, "part1.phi_rel": -0.015},
+    ),
+    # Three times the torque, less a tenth, behind a clutch that first sticks
+    "gear": (
+        lambda: driven(
+            Inertia(J=1.0), LossyGear(ratio=3.0, loss_table=((0, 0.9, 0.9, 0, 0),)), Clutch(capacity=100.0),
+            Inertia(J=1.0), BearingFriction(tau_pos=((0, 3), (20, 23)))
+        ),
+        {"part3.w": 10.5, "part0.w": 31.5},
+    ),
+    # A clutch that cannot bear the torque slips: 5 - 2 on one side, 2 on the other
+    "slip": (
+        lambda: driven(
+            Inertia(J=1.0), BearingFriction(tau_pos=((0, 0), (9, 9))), Clutch(capacity=2.0), Inertia(J=1.0),
+            Damper(d=1.0), Fixed()
+        ),
+        {"part0.w": 3.0, "part3.w": 2.0},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SETTLED)
+def test_a_drive_that_is_not_steady_near_rest_begins_where_it_settles(exported, name):
+    make, wanted = SETTLED[name]
+    run = simulate(make())
+    for path, value in wanted.items():
+        assert run[path] == pytest.approx(np.full(len(run.time), value), rel=1e-7), path
+    assert run.events == ()
+    case = exported(make())
+    assert case.started("me").getReal([case.ref(path) for path in wanted]) == pytest.approx(
+        [*wanted.values()], rel=1e-9
+    )
+
+
+def test_an_fmu_that_begins_where_the_drive_settles_follows_its_parameters(exported):
+    case = exported(SETTLED["bearing"][0]())
+    faster = case.started("me", **{"push.tau_constant": 7.0})
+    assert faster.getReal([case.ref("part0.w")]) == pytest.approx([6.0], rel=1e-12)
 
 
 def test_where_nothing_can_settle_the_start_is_as_given(exported):
