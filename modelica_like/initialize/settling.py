@@ -26,7 +26,7 @@ _SETTLED = 1e-9
 def settle(model: CompiledDae, point: Point) -> bool:
     """Let a drive run until nothing changes, by Euler's implicit method; transitions fire at the ends of steps.
 
-    It is no simulation: only the end counts, as a guess.
+    It is no simulation: only the end counts, as a guess. States on which no rate depends stay.
 
     Args:
         model: the compiled model.
@@ -38,6 +38,10 @@ def settle(model: CompiledDae, point: Point) -> bool:
     if len(point.x) + len(point.z) > _LARGEST:
         return False
     moving, step, growth = moving_states(model), _FIRST, _GROWTH
+    try:
+        solve_implicit(model, point)
+    except InitializationError:
+        return False
     for _ in range(_STEPS):
         try:
             trial = _after(model, point, moving, step)
