@@ -68,7 +68,7 @@ class RigidBacklash(CompliantWithRelativeStates):
         for name, sign in (("forward", 1), ("backward", -1)):
             side = sign * (self.phi_rel - self.phi_rel0) - 0.5 * self.b
             end = {self.phi_rel: self.phi_rel0 + sign * 0.5 * self.b}
-            yield contact.initially(name, when=all_of(side >= 0, sign * w >= 0))
+            yield contact.initially(name, when=side >= 0)
             yield contact.go("gap", name, when=all_of(side > 0, sign * w > 0), reset=end, because="flanks meet")
             yield contact.go(name, "gap", when=sign * self.tau < -self.faint, because="the flanks would pull")
 
@@ -94,6 +94,6 @@ class DogClutch(CompliantWithRelativeStates):
 
     def events(self) -> Events:
         wanted = all_of(self.engage > 0.5, absolute(self.w_rel) < self.w_max)
-        yield self.dogs.initially("in", when=all_of(self.engage > 0.5, self.w_rel >= 0, self.w_rel <= 0))
+        yield self.dogs.initially("in", when=self.engage > 0.5)
         yield self.dogs.go("out", "in", when=wanted)
         yield self.dogs.go("in", "out", when=self.engage < 0.5)

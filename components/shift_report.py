@@ -96,7 +96,7 @@ def _slip(run: Run, path: str, window: slice) -> tuple[float, float]:
     largest = float(inside[k])
     # The maximum may be between two results: at the vertex of the parabola through three of them.
     if 0 < k < len(inside) - 1 and slips[k - 1] and slips[k + 1] and time[k - 1] < time[k] < time[k + 1]:
-        bend, slope, _ = np.polyfit(time[k - 1 : k + 2] - time[k], inside[k - 1 : k + 2] - largest, 2)
+        bend, slope, _ = np.polyfit(time[k - 1 : k + 2] - time[k], inside[k - 1 : k + 2], 2)
         if bend < 0:
             largest = max(largest, abs(run.at(float(time[k] - 0.5 * slope / bend))[f"{path}.tau"]))
     return float(np.sum(np.diff(time)[slips[1:] | slips[:-1]])), largest

@@ -119,6 +119,9 @@ def test_a_strand_cannot_push(torque: float, slack: bool) -> None:
     assert run.energy()["belt"].gain == 0
     told = [one for one in notices(run) if "slack strand" in one]
     assert len(told) == slack
+    for event in (one for one in run.events if one.after == "slack"):
+        then = run.at(event.time)
+        assert abs(2e4 * then["belt.x"] + 50 * 0.05 * then["wheel.w"]) == pytest.approx(100, rel=1e-6)
 
 
 def test_a_strand_that_is_damped_is_slack_before_it_is_stretched() -> None:

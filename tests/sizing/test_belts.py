@@ -85,6 +85,7 @@ def test_exact_distance_fits_the_belt() -> None:
 
 
 def test_equal_pulleys() -> None:
+    assert BELT.ratio == 3.0
     belt = belt_geometry(20.0, 20.0, 5e-3, 0.5)
     assert belt.exact_distance == pytest.approx(0.2)
     assert belt.wrap_angle == pytest.approx(math.pi)

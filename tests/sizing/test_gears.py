@@ -162,6 +162,7 @@ def test_life_factors() -> None:
     for curve, factor in ((HARDENED_ROOT, 1.7), (HARDENED_FLANK, 0.9)):
         assert life_factor(1 / damage_per_cycle(factor, curve), curve) == pytest.approx(factor)
     assert [damage_per_cycle(u, HARDENED_ROOT) for u in (0.84, 2.51)] == [0, inf]
+    assert damage_per_cycle(2.5, HARDENED_ROOT) == pytest.approx(1e-3)  # the static factor itself
 
 
 def test_miner() -> None:

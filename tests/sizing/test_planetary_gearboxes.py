@@ -220,3 +220,9 @@ def test_rolling_powers_that_cancel_but_for_rounding_lose_nothing_at_the_ring() 
     for left in (-1e-14, 1e-14):
         small, large = lossy_ratios(3.0, -2.0, (1.0, -1.0 + left), 0.9)
         assert (small, large) == (pytest.approx(3.0 * 0.9**2, rel=1e-12), pytest.approx(-2.0 / 0.9, rel=1e-12))
+
+
+def test_a_sun_whose_rolling_power_is_rounding_loses_nothing() -> None:
+    for left in (-1e-14, 1e-14):
+        assert lossy_ratios(3.0, -2.0, (1.0, left), 0.9) == pytest.approx((3.0 * 0.9**3, -2.0 * 0.9), rel=1e-12)
+        assert lossy_ratios(3.0, -2.0, (left, 1.0), 0.9) == pytest.approx((3.0 * 0.9, -2.0 * 0.9**2), rel=1e-12)

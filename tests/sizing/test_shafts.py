@@ -128,6 +128,8 @@ def test_couple_of_an_axial_force() -> None:
     left, right = (cut.bending_y for cut in statics.diagram if cut.at == 0.4)
     assert (left, right) == pytest.approx((-20.0, 30.0))
     assert statics.largest_bending == pytest.approx(30.0)
+    at_end = shaft_statics([Load(0.0, bend_y=50.0)], [0.0, 1.0])
+    assert (at_end.largest_bending, at_end.place) == (pytest.approx(50.0), 0.0)
     assert statics.diagram[-1].bending_y == pytest.approx(0.0, abs=1e-12)
 
 

@@ -79,6 +79,19 @@ def test_kinks_become_smoother_with_every_delay_until_none_counts(monkeypatch: p
     assert noted == [(pytest.approx(k), k - 1) for k in range(1, 9)]
 
 
+def test_jumps_come_again_as_jumps(monkeypatch: pytest.MonkeyPatch):
+    """0.3 s after each jump of a wave, a count and what has come back: steps begin anew as after the first one."""
+    noted, plainly = list[tuple[float, int]](), Delays.broken
+
+    def broken(self: Delays, t: float, before: int = -1) -> None:
+        noted.append((round(t, 9), before))
+        plainly(self, t, before)
+
+    monkeypatch.setattr(Delays, "broken", broken)
+    simulate(Square(), 1.2)
+    assert [t for t in (0.8, 1.1) if (t, -1) not in noted] == []
+
+
 class Fast(Component):
     """The past has sixteen periods in one delay."""
 

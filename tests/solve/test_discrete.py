@@ -461,6 +461,29 @@ def test_clocks_of_several_rates(solver):
     assert [final[name] for name in ("fast", "slow", "seen")] == [2, 2, 2]
 
 
+class Emptied(Component):
+    """Two vessels fill by 1/s and 3/s; after a second both together are to hold 1, with the least change."""
+
+    a: Variable = var("1", "first", default=0.0)
+    b: Variable = var("1", "second", default=0.0)
+    both: Variable = var("1", "sum")
+    T: Parameter = param("s", "time", default=1.0)
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.a) == 1
+        yield self.T * der(self.b) == 3
+        yield self.both == self.a + self.b
+
+    def events(self) -> Events:
+        yield when(self.a > 1, {self.both: 1.0})
+
+
+def test_a_when_resets_what_depends_on_states(solver):
+    """4 become 1: both lose 1.5, so after 1 s they are -0.5 and 1.5, and 1 and 3 more after 2 s."""
+    found = run(Emptied(), 2.0, solver)
+    assert (found.final["a"], found.final["b"]) == (pytest.approx(0.5, abs=1e-8), pytest.approx(4.5, abs=1e-8))
+
+
 class Asserting(Component):
     """Ends where it moves too far."""
 

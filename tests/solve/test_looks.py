@@ -59,6 +59,10 @@ def test_in_every_interval_one_polynomial_is_of_degree_seven_and_one_of_five(sch
         np.testing.assert_allclose(precise, exactly, rtol=0, atol=rounding)
         assert np.allclose(coarse, exactly, rtol=0, atol=rounding) == (degree <= 5)
         assert scheme.doubt[cell] @ data == pytest.approx(exactly[1] - coarse[1], abs=rounding)
+    between, ends = np.random.default_rng(degree).normal(size=len(data)), np.array([0.0, 1.0])[:, None] ** np.arange(8)
+    for cell in range(scheme.nodes - 1):  # both pass through the values at both ends
+        for one in (scheme.precise, scheme.coarse):
+            np.testing.assert_allclose(ends @ one[cell] @ between, between[cell : cell + 2], atol=1e-9)
     last = scheme.nodes + 4
     firsts = [int(scheme.first(k, last)) for k in range(last)]
     assert all(0 <= first <= k < first + scheme.nodes - 1 <= last for k, first in enumerate(firsts))

@@ -155,6 +155,9 @@ def test_what_is_stored_and_moved() -> None:
     # Where one of both ends is always zero, the power behind each interval has to do.
     work._move(stored, np.array([[9.0, 0.0, -5.0], [0.0, 7.0, 0.0]]), steps)
     assert (work.stored, work.moved) == (4.0, 20.0)
+    little = bare(stored=0.0, moved=0.0)
+    little._move(1e-6 * stored, 1e-6 * np.array([[1.0, -2.0, 3.0]]), steps)
+    assert little.moved == pytest.approx(1e-6 * (1.0 * 2 + 2.0 * 4))
     work._move(stored[:, :1], np.ones((3, 1)), steps[:0])
     assert work.moved == 20.0
     work._move(stored[:, :1], np.array([[0.0, -3.0, 0.0, 5.0]]), np.array([4.0, 4.0, 2.0]))
