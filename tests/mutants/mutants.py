@@ -39,8 +39,10 @@ FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
 )))  # fmt: skip
 PICTURES = ("icons.py", "panels.py", "plot.py", "sankey.py", "style.py")
 """They draw; what they draw is looked at."""
-DECLARED = "tests/library/test_declarations.py::test_declarations_are_what_netlists_rely_on"
-"""They tell defaults and limits."""
+DECLARED = dict.fromkeys((f"tests/library/test_declarations.py::test_{name}" for name in (
+    "declarations_are_what_netlists_rely_on", "what_netlists_cannot_name_is_only_a_base",
+)), 1.0)  # fmt: skip
+"""They tell defaults and limits, and which classes are bases."""
 _RECORD = "lines.pickle"
 _ANY_LINE = re.compile(r":\d+ ")
 
@@ -134,7 +136,7 @@ def tried(change: Change, longest: float) -> Tried:
         return Tried(change, "equivalent", "")
     if at_import(change, text):
         users = recorded().users(change)
-        orders = [Order({DECLARED: 1.0, **users}, change, longest, anew=True)]
+        orders = [Order({**DECLARED, **users}, change, longest, anew=True)]
     else:
         run, imported = recorded().tests(change, text)
         orders = [Order(run, change, longest), Order(imported, change, longest, anew=True)]
