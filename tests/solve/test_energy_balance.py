@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,10 @@ import pytest
 from components import ConstantTorque, Damper, Fixed, Inertia, RigidBacklash, SpringDamper
 from modelica_like import Assembly, Component, build, load, simulate
 from modelica_like.errors import ValueOutOfRange
+from modelica_like.initialize import Point
 from modelica_like.language import Equations, Events, Expr, Mode, Parameter, Variable, der, param, sin, var
-from modelica_like.solve import powers
-from modelica_like.solve.energy import _SAME_TIME, _unexplained
+from modelica_like.solve import energy, powers
+from modelica_like.solve.energy import _SAME_TIME, _is_rounding, _unexplained
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -243,3 +245,21 @@ def test_energy_at_events_that_nothing_explains() -> None:
     assert _unexplained(times[:0], jumps[:0], [1.0], [(1.0, 1.0)]) == 0.0
     start, apart = np.zeros(1), (0.9 * _SAME_TIME, 1.1 * _SAME_TIME)
     assert [_unexplained(start, jumps[:1], [time], []) for time in apart] == [0.0, 1.0]
+
+
+@pytest.mark.parametrize(("wrong", "rounding"), [(0.0, True), (1.0, False)])
+def test_an_imbalance_is_rounding_if_it_follows_the_last_digits(
+    monkeypatch: pytest.MonkeyPatch, wrong: float, rounding: bool
+) -> None:
+    """Of 3 W in and 2 W from a source 7 W are lost and -2 W stored, each but for its last digits, or 1 W besides."""
+
+    def call(twin: Any, _function: Any, _point: Any) -> np.ndarray:
+        last = 1e3 * (twin.p - 1.0)
+        return np.array([0.0, 7.0 + last[0], 2.0 + last[1], 3.0 + last[2], -2.0 + last[3] + wrong, 0.0])
+
+    monkeypatch.setattr(energy, "call", call)
+    monkeypatch.setattr(energy, "solve_implicit", lambda *_: None)
+    model: Any = SimpleNamespace(p=np.ones(4), components=["a"])
+    model.twin = lambda p: SimpleNamespace(p=p, energy=None)
+    point = Point(0.0, np.zeros(1), np.zeros(0), np.zeros(0))
+    assert _is_rounding(model, point, 0) == rounding
