@@ -44,3 +44,12 @@ def test_a_motor_that_ripples() -> None:
         assert motor.final["machine.w"] == pytest.approx(end + (300 - end) * exp(-rate / 0.01 * 0.5), rel=2e-4)
     assert run.energy().closure < 1e-8
     assert run.final["machine.loop"] == pytest.approx(run.final["machine.phi"] * 2 * 3 / pi, abs=0.5)
+
+
+@pytest.mark.parametrize("w", [-300.0, 300.0])
+def test_the_loop_that_is_connected_is_the_one_at_the_flux_in_both_directions(w: float) -> None:
+    motor = Rippling()
+    motor.machine.give("w", w)
+    run = simulate(motor, 0.05)
+    assert run.final["machine.phi"] * w > 0
+    assert run["machine.loop"] == pytest.approx(run["machine.phi"] * 2 * 3 / pi, abs=0.5 + 1e-6)

@@ -111,13 +111,15 @@ def test_what_a_guard_takes_of_states_is_judged_by_its_size(
     seen = looks(TIMES**2, 2 * TIMES)
     size = 0.25 + 0.75
     near = [1.0, [rough * size, 9.0], [moved * size, 9.0]]
-    monkeypatch.setattr(Known, "near", lambda *_: near, raising=False)
+    times = list[float]()
+    monkeypatch.setattr(Known, "near", lambda _self, t, *_: times.append(t) or near, raising=False)
     (cell, *_) = seen.cells(3, 8)
     ends = {0: (-0.25 * sign, 0.75 * sign, 1.0, 1.0)}
     assert seen.is_sharp(cell, ends, fresh=False) == sharp
     assert seen.is_sharp(cell, ends, fresh=True) == fresh
     near[0] = 1.001
     assert not seen.is_sharp(cell, ends, fresh=True)
+    assert times == [0.5 * (TIMES[3] + TIMES[4])] * 3
 
 
 def test_looks_may_be_left_out() -> None:
