@@ -224,3 +224,10 @@ def test_a_driver_follows_a_profile() -> None:
         )
     assert {event.after for event in run.events if event.mode == "driver.foot"} == {"accelerator", "brake"}
     assert min(*run["driver.brake"], *run["driver.accelerator"]) >= -1e-9
+
+
+@pytest.mark.parametrize(("v", "accelerator", "brake"), [(0.0, 1.0, 0.0), (100.0, 0.0, 1.0)])
+def test_a_driver_presses_no_pedal_farther_than_it_goes(v: float, accelerator: float, brake: float) -> None:
+    parts = {"car": Constant(k=v), "driver": Driver(profile=((0.0, 50.0), (10.0, 50.0)))}
+    run = simulate(Assembly("d", parts=parts, connect={"v": ["car.y", "driver.v"]}), 5.0)
+    assert (run.final["driver.accelerator"], run.final["driver.brake"]) == (accelerator, brake)
