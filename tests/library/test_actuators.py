@@ -12,6 +12,7 @@ from components import (
     Constant,
     ConstantSpeed,
     ConstantVoltage,
+    Contactor,
     ElectromagneticActuator,
     Fixed,
     Ground,
@@ -23,6 +24,7 @@ from components import (
     ThermalClutch,
 )
 from modelica_like import Assembly, Component, Solution, simulate
+from modelica_like.errors import LimitPassed
 from modelica_like.report.run import notices
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
@@ -145,3 +147,13 @@ def test_air_into_a_vacuum() -> None:
     run = simulate(Assembly("d", parts={"piston": piston}), 0.5, **TIGHT)
     assert run.final["piston.p"] == pytest.approx(1e5 * exp(-5.0), rel=1e-6)
     assert run.energy().closure <= 1e-8
+
+
+@pytest.mark.parametrize("i_off", [1.0, 1.5])
+def test_a_contactor_that_opens_where_it_closes_is_refused(i_off: float) -> None:
+    parts = {"battery": ConstantVoltage(V=24.0), "earth": Ground(), "lamp": Resistor(R=1.0),
+             "main": Contactor(R_coil=10.0, L_coil=0.1, i_on=1.0, i_off=i_off)}  # fmt: skip
+    connect = {"plus": ["battery.p", "main.cp", "main.p"], "lamp": ["main.n", "lamp.p"],
+               "minus": ["battery.n", "earth.p", "main.cn", "lamp.n"]}  # fmt: skip
+    with pytest.raises(LimitPassed, match=r"main cannot hold: its i_off is not below its i_on\."):
+        simulate(Assembly("d", parts=parts, connect=connect), 0.1)

@@ -177,6 +177,20 @@ def test_a_drive_by_its_map(wanted: float, tau: float) -> None:
     assert np.min(run["m.loss_power"]) >= 0
 
 
+def test_only_the_voltage_between_its_terminals_counts() -> None:
+    """Two sources of 200 V, with earth between them, are one of 400 V."""
+    parts = {
+        "upper": ConstantVoltage(V=200.0), "lower": ConstantVoltage(V=200.0), "earth": Ground(),
+        "m": MappedDrive(**MAP, tau_ref=80.0), "load": speed(450.0),
+    }  # fmt: skip
+    connect = {"p": ["upper.p", "m.p_dc"], "middle": ["upper.n", "earth.p", "lower.p"], "n": ["lower.n", "m.n_dc"],
+               "s": ["m.flange", "load.flange"]}  # fmt: skip
+    run = simulate(Assembly("d", parts=parts, connect=connect), 0.1, **TIGHT)
+    whole = supplied(MappedDrive(**MAP, tau_ref=80.0), speed(450.0), 0.1)
+    assert run.final["m.v_dc"] == pytest.approx(400.0, rel=1e-12)
+    assert run.final["m.i_dc"] == pytest.approx(whole.final["m.i_dc"], rel=1e-9)
+
+
 def test_a_drive_on_a_battery() -> None:
     """v = E - R·i and v·i = P: the smaller of both currents."""
     cells = Battery(ocv=((0.0, 400.0), (1.0, 400.0)), Q="50 A.h", R_i=0.2)
