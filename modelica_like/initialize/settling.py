@@ -18,7 +18,7 @@ _FIRST, _LAST, _LEAST = 1e-4, 1e6, 1e-12
 _AFTER_EVENT = 1e-3
 _GROWTH, _LEAST_GROWTH, _CAUTION, _SHRINKAGE = 3.0, 1.2, 0.8, 10.0
 _STEPS, _ITERATIONS, _ROUNDS = 1000, 8, 10
-_LARGEST = 300
+_LARGEST = 200
 """Number of unknowns from which the steps, with dense matrices, would take minutes."""
 _SETTLED = 1e-9
 
