@@ -125,8 +125,9 @@ def lossy_ratios(small: Ratio, large: Ratio, rolling: tuple[Power, Power], mesh:
         rolling: rolling powers of both suns without losses, for their directions.
         mesh: efficiency of a mesh.
     """
-    total = sign_of(rolling[0] + rolling[1], absolute(rolling[0]) + absolute(rolling[1]))
-    first, second = (sign_of(power, absolute(rolling[0]) + absolute(rolling[1])) for power in rolling)
+    scale = absolute(rolling[0]) + absolute(rolling[1])
+    total = sign_of(rolling[0] + rolling[1], scale)
+    first, second = (sign_of(power, scale) for power in rolling)
     return small * mesh ** (2 * first + total), large * mesh ** (second + total)
 
 

@@ -1,4 +1,4 @@
-"""Names, units, defaults and limits of all components are what users' netlists rely on; a change of one is a decision.
+"""Names, connectors, units, defaults and limits of all components are what netlists rely on; each change is a decision.
 
 `python tests/library/test_declarations.py` writes the list anew.
 """
@@ -10,6 +10,7 @@ from pkgutil import walk_packages
 
 import components
 from modelica_like import Component
+from modelica_like.language.declared import Connector
 from modelica_like.language.tables import Rows
 from modelica_like.netlist import library_types
 
@@ -22,6 +23,7 @@ def declarations() -> Iterator[str]:
     """One line for each declaration of each component, inherited ones included."""
     for name, kind in sorted(library_types().items()):
         yield name
+        yield from (f"  {key}: {_connector(one)}" for key, one in kind._class_connectors.items())
         for field in kind._class_fields.values():
             about = (f"{what} {getattr(field, what)}" for what in SHOWN if getattr(field, what, None) is not None)
             yield f"  {field.name}: {type(field).__name__}, {', '.join(about)}"
@@ -32,6 +34,10 @@ def declarations() -> Iterator[str]:
 
 def _told(default: object) -> str:
     return "required" if type(default) is object else repr(default)
+
+
+def _connector(one: Connector) -> str:
+    return " ".join([type(one).__name__, *(what for what in ("may_be_free", "optional") if getattr(one, what))])
 
 
 def _table(table: Rows) -> str:

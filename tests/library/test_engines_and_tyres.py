@@ -169,14 +169,25 @@ def test_the_largest_acceleration_of_a_car(driven: str, lag: float | None) -> No
     assert notices(run) == []
 
 
-def test_a_motorcycle_lifts_its_wheel() -> None:
-    """It lifts at g·(L - l_front)/h = 0.7·g/0.7."""
-    parts = {"pull": Force(), "bike": Mass(m=200.0, s=0.0, v=0.0), "f": Constant(k="2000 N"),
+@pytest.mark.parametrize(("force", "lifted", "front"), [(2000.0, "front", 0.0), (-2000.0, "rear", 200.0 * G)])
+def test_a_motorcycle_lifts_a_wheel(force: float, lifted: str, front: float) -> None:
+    """It lifts at g·(L - l_front)/h = 0.7·g/0.7, and backwards at g·l_front/h."""
+    parts = {"pull": Force(), "bike": Mass(m=200.0, s=0.0, v=0.0), "f": Constant(k=force),
              "axles": AxleLoads(m=200.0, wheelbase=1.4, l_front=0.7, h=0.7)}  # fmt: skip
     connect = {"f": ["f.y", "pull.f"], "a": ["pull.flange", "bike.flange_a"], "b": ["bike.flange_b", "axles.flange"]}
     run = simulate(Assembly("d", parts=parts, connect=connect), 1.0, **TIGHT)
-    assert notices(run) == ["At 0 s axles lifts its front axle."]
-    assert run.final["axles.F_front"] == 0.0
+    assert notices(run) == [f"At 0 s axles lifts its {lifted} axle."]
+    assert run.final["axles.F_front"] == pytest.approx(front, abs=1e-9)
+
+
+def test_a_slope_loads_the_rear_axle() -> None:
+    """Moments about the front contact at rest: F_rear·L = m·g·(l_front·cos + h·sin)."""
+    parts = {"car": Mass(m=1000.0, s=0.0, v=0.0), "hold": ConstantVelocity(v_fixed=0.0), "rise": Constant(k=0.75),
+             "axles": AxleLoads(m=1000.0, wheelbase=2.5, l_front=1.0, h=0.5)}  # fmt: skip
+    connect = {"a": ["hold.flange", "car.flange_a"], "b": ["car.flange_b", "axles.flange"],
+               "i": ["rise.y", "axles.inclination"]}  # fmt: skip
+    run = simulate(Assembly("d", parts=parts, connect=connect), 0.1, **TIGHT)
+    assert run.final["axles.F_rear"] == pytest.approx(1000.0 * G * (1.0 * 0.8 + 0.5 * 0.6) / 2.5, rel=1e-9)
 
 
 # -- roads and drivers -------------------------------------------------------------------------------------------------

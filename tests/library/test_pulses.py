@@ -6,12 +6,13 @@ import pytest
 
 from components import ConstantSpeed, Inertia, PulseCounter, PulseSensor, Sine, Speed
 from modelica_like import simulate
-from modelica_like.language import Component, Equations, connect
+from modelica_like.language import Component, Equations, Parameter, connect, param
 
 
 class Turning(Component):
+    begin: Parameter = param("rad", "angle at the start", default=1000.0)
     motor = ConstantSpeed(w_fixed="61 rpm")
-    disc = Inertia(J=1.0, phi=1000.0)
+    disc = Inertia(J=1.0, phi=begin)
     sensor = PulseSensor(n=4)
     counter = PulseCounter(u_high=0.0)
 
@@ -37,11 +38,12 @@ class Swinging(Component):
         yield connect(self.sensor.y, self.counter.u)
 
 
+@pytest.mark.parametrize("begin", [1000.0, 1001.0, -1000.0])
 @pytest.mark.parametrize("speed", [61.0, -61.0, 4567.0])
-def test_pulses_of_a_shaft_that_turns(speed: float) -> None:
+def test_pulses_of_a_shaft_that_turns(speed: float, begin: float) -> None:
     """Forward an edge rises where a tooth begins, backward where it ends."""
-    run = simulate(Turning(), 1.0, parameters={"motor.w_fixed": speed * pi / 30})
-    before, after = (4 * (1000 + speed * pi / 30 * t) / (2 * pi) for t in (0.0, 1.0))
+    run = simulate(Turning(), 1.0, parameters={"motor.w_fixed": speed * pi / 30, "begin": begin})
+    before, after = (4 * (begin + speed * pi / 30 * t) / (2 * pi) for t in (0.0, 1.0))
     count = floor(after) - floor(before) if speed > 0 else floor(before + 0.5) - floor(after + 0.5)
     assert run.final["counter.y"] == count
     assert run.final["sensor.y"] == (1 if after % 1 < 0.5 else -1)

@@ -26,6 +26,7 @@ def test_the_constant_is_that_of_the_conductors() -> None:
     assert made.constant * 100.0 == pytest.approx(branch)
     assert made.speed_factor * flux * 100.0 / (2 * math.pi) == pytest.approx(branch)
     assert machine_constant(conductors, pairs, flux, pairs).constant == pytest.approx(made.constant / 2)
+    assert (made.torque_factor, made.speed_factor) == pytest.approx((conductors * pairs / (2 * math.pi), 400.0))
 
 
 def test_a_conductor_along_the_field_feels_nothing() -> None:

@@ -49,6 +49,14 @@ def test_an_interrupt_before_foreign_code_is_raised_once() -> None:
         pass
 
 
+def test_the_handler_returns_after_each_call_alone() -> None:
+    interrupts, before = Interrupts(), signal.getsignal(signal.SIGINT)
+    for _ in range(2):
+        with interrupts:
+            assert signal.getsignal(signal.SIGINT) is not before
+        assert signal.getsignal(signal.SIGINT) is before
+
+
 def test_there_are_no_signals_in_other_threads() -> None:
     found = []
 

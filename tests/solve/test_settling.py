@@ -78,6 +78,22 @@ def test_what_has_no_number_does_not_settle() -> None:
     assert not run_down(Tank(x=guess(-1.0)))[0]
 
 
+class Rootless(Component):
+    """No number has this square."""
+
+    x: Variable = var("1", "level", default=1.0)
+    z: Variable = var("1", "root", guess=1.0)
+    T: Parameter = param("s", "time", default=1.0)
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == self.z - self.x
+        yield self.z**4 + self.z + 1 == 0
+
+
+def test_without_a_solution_at_its_begin_nothing_settles() -> None:
+    assert not run_down(Rootless())[0]
+
+
 class Relay(Component):
     """Goes up below 1, and down above 2, for ever; or rests at 3 if it may go on."""
 
