@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from modelica_like.draw import save_schematic as save_schematic
     from modelica_like.draw import schematic as schematic
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
-    from modelica_like.explore import explore as explore
+    from modelica_like.explorer import explore as explore
     from modelica_like.fmi.export import export_fmu as export_fmu
     from modelica_like.fmi.run import run_fmu as run_fmu
     from modelica_like.fmi.validate import validate_fmu as validate_fmu
@@ -73,7 +73,7 @@ _HOME = {
     "compare": "modelica_like.report.compare",
     "cosim": "modelica_like.cosimulation.run",
     "duty": "modelica_like.analyse.after.spectra",
-    "explore": "modelica_like.explore",
+    "explore": "modelica_like.explorer",
     "export_fmu": "modelica_like.fmi.export",
     "export_html": "modelica_like.native.page",
     "importance": "modelica_like.analyse.sweeps.importance",

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from modelica_like import load, save_report, sensitivities, simulate
-from modelica_like.explore import Explorer
+from modelica_like.explorer import Explorer
 from modelica_like.solve.plot import save_plot
 
 HERE = Path(__file__).parent

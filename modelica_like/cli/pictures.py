@@ -75,7 +75,7 @@ def explore(
     """Open a page with sliders and curves that runs the drive on this machine."""
     with told(debug):
         drive = load_netlist(netlist, assignments)
-        from modelica_like.explore import Explorer
+        from modelica_like.explorer import Explorer
 
         with Explorer(drive, until, show=show or (), folder=output) as explorer:
             say(f"{explorer.address}\nCtrl-C ends it.")

@@ -5,6 +5,7 @@
 
 from collections.abc import Iterator
 from importlib import import_module
+from importlib.util import find_spec
 from inspect import isclass, isfunction, signature
 from pathlib import Path
 from pkgutil import walk_packages
@@ -35,6 +36,11 @@ def _told(name: str, one: Any) -> Iterator[str]:
 
 def test_defaults_are_what_users_rely_on() -> None:
     assert list(defaults()) == LIST.read_text(encoding="utf-8").splitlines()
+
+
+def test_what_is_exported_has_no_name_of_a_module() -> None:
+    """Python replaces the function by the module as soon as anything in the module is imported."""
+    assert [name for name in modelica_like.__all__ if find_spec(f"modelica_like.{name}")] == []
 
 
 if __name__ == "__main__":

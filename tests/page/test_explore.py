@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from modelica_like import load, run_fmu, sensitivities, simulate
-from modelica_like.explore import Explorer
+from modelica_like.explorer import Explorer
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRIVES = {"machine_table_direct": "table_mass", "machine_tool_startup": "J2.J"}

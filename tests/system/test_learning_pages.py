@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from modelica_like.cli import app
-from modelica_like.explore import Explorer
+from modelica_like.explorer import Explorer
 from modelica_like.netlist import library_types
 
 DOCS = Path(__file__).parents[2] / "docs"

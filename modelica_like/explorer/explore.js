@@ -1,5 +1,5 @@
 "use strict";
-/* The drive runs in the process that has opened this page; see explore/server.py. */
+/* The drive runs in the process that has opened this page; see explorer/server.py. */
 const QUIET = 300; // ms without a change after which sensitivities are asked for
 let requests = 0;
 

@@ -1,5 +1,5 @@
 """Explore a drive in the browser: sliders, curves, sensitivities, and the changed drive as files."""
 
-from modelica_like.explore.server import Explorer, explore
+from modelica_like.explorer.server import Explorer, explore
 
 __all__ = ["Explorer", "explore"]

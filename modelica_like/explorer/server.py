@@ -17,7 +17,7 @@ import numpy as np
 
 from modelica_like.draw import schematic
 from modelica_like.errors import ModelicaLikeError
-from modelica_like.explore.runs import FILES, Runs, pairs
+from modelica_like.explorer.runs import FILES, Runs, pairs
 from modelica_like.language import Assembly
 from modelica_like.native.page import page, page_content
 from modelica_like.netlist import load
