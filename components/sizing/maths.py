@@ -74,8 +74,10 @@ def solve(rows: Sequence[Sequence[Number]], right: Sequence[Number]) -> list[Num
     count = len(rows)
     matrix = np.stack(same_shape[: count * count], axis=-1).reshape(*same_shape[0].shape, count, count)
     vector = np.stack(same_shape[count * count :], axis=-1)[..., None]
-    require(_NO_SOLUTION, np.isfinite(matrix))  # or the condition number fails
-    require(_NO_SOLUTION, np.linalg.cond(matrix) < 1 / _ROUNDING)
+    size = np.max(np.abs(matrix), axis=-1, keepdims=True)
+    require(_NO_SOLUTION, np.isfinite(size), size > 0)
+    # Equations in different units are none the worse for it.
+    require(_NO_SOLUTION, np.linalg.cond(matrix / size) < 1 / _ROUNDING)
     solution = np.linalg.solve(matrix, vector)[..., 0]
     return [solution[..., k] if same_shape[0].ndim else float(solution[k]) for k in range(count)]
 

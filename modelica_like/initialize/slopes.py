@@ -115,7 +115,7 @@ def slopes(
         # Linear equations are solved in numbers.
         symbols = [*model.arguments.values()] if made.is_a("SXFunction") else made.mx_in()
         value = made(*symbols)
-        return symbols, value if rows is None else value[list(rows)]
+        return symbols, value if rows is None else value[list(rows), :]
 
     key = name, None if rows is None else tuple(rows)
     value, x, t, theta = _total(model, point, key, make, _ALL, *constants)

@@ -35,7 +35,7 @@ def solve_steady(model: CompiledDae, point: Point) -> None:
         InitializationError: there is no steady state near it.
     """
     moving = moving_states(model)
-    if not moving:
+    if not moving and not model.implicit:
         return
     for _ in range(_MAX_NEWTON):
         value, jacobian = rates_and_slopes(model, point)

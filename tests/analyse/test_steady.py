@@ -222,3 +222,20 @@ def test_powers_are_in_balance(drive):
     brought = sum(source for source, _ in powers)
     assert brought > 0.1
     assert sum(loss for _, loss in powers) == pytest.approx(brought, rel=1e-9)
+
+
+class Stateless(Component):
+    """Its unknown has the closed form p = z + z³."""
+
+    p: Parameter = param("1", "load", default=10.0)
+    z: Variable = var("1", "unknown", guess=1.0)
+
+    def equations(self) -> Equations:
+        yield self.z + self.z**3 == self.p
+
+
+def test_a_model_without_states_is_steady():
+    found = steady(Stateless())
+    assert found["z"] == pytest.approx(2.0)
+    assert steady(Stateless(), near=found, parameters={"p": 68.0})["z"] == pytest.approx(4.0)
+    assert steady(Stateless(), hold={"z": 3.0}, by=["p"])["p"] == pytest.approx(30.0)

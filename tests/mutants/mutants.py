@@ -39,9 +39,11 @@ FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
 )))  # fmt: skip
 PICTURES = ("icons.py", "panels.py", "plot.py", "sankey.py", "style.py")
 """They draw; what they draw is looked at."""
-DECLARED = dict.fromkeys((f"tests/library/test_declarations.py::test_{name}" for name in (
-    "declarations_are_what_netlists_rely_on", "what_netlists_cannot_name_is_only_a_base",
-)), 1.0) | {"tests/library/test_defaults.py::test_defaults_are_what_users_rely_on": 2.0}  # fmt: skip
+DECLARED = dict.fromkeys((f"tests/library/test_{name}" for name in (
+    "declarations.py::test_declarations_are_what_netlists_rely_on",
+    "declarations.py::test_what_netlists_cannot_name_is_only_a_base",
+    "defaults.py::test_defaults_are_what_users_rely_on",
+)), 1.0)  # fmt: skip
 """They tell defaults and limits, and which classes are bases, and import all they tell about."""
 _RECORD = "lines.pickle"
 _ANY_LINE = re.compile(r":\d+ ")

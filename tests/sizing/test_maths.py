@@ -7,10 +7,12 @@ import pytest
 from components.sizing.maths import solve
 
 
-@pytest.mark.parametrize("size", [1e-150, 1.0, 1e150])
-def test_sizes_of_the_numbers_do_not_matter(size: float) -> None:
-    """2·x + y = 5, x - y = 1, times any size."""
-    assert solve([[2 * size, size], [size, -size]], [5 * size, size]) == pytest.approx([2.0, 1.0])
+@pytest.mark.parametrize("other", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("size", [1e-150, 1e-9, 1.0, 1e150])
+def test_units_of_the_equations_do_not_matter(size: float, other: float) -> None:
+    """2·x + y = 5, x - y = 1, each times any size."""
+    second = size * other
+    assert solve([[2 * size, size], [second, -second]], [5 * size, second]) == pytest.approx([2.0, 1.0])
 
 
 @pytest.mark.parametrize("rows", [

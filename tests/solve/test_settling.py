@@ -79,7 +79,7 @@ def test_what_has_no_number_does_not_settle() -> None:
 
 
 class Rootless(Component):
-    """No number has this square."""
+    """z⁴ + z + 1 is positive for every number."""
 
     x: Variable = var("1", "level", default=1.0)
     z: Variable = var("1", "root", guess=1.0)
