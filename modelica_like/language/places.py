@@ -6,6 +6,7 @@ import ast
 import inspect
 import linecache
 from collections.abc import Iterable, Iterator
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from textwrap import dedent
@@ -148,12 +149,20 @@ def texts_of_fields(kind: type) -> dict[str, str]:
     found: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         if not (base is object or base.__module__.startswith("modelica_like.language")):
-            body = ast.parse(dedent(inspect.getsource(base))).body[0]
-            assert isinstance(body, ast.ClassDef)
-            for field, below in zip(body.body, body.body[1:], strict=False):
-                if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
-                    found[field.target.id] = _text_of(below)
+            found |= _own_texts(base)
     return found
+
+
+@cache
+def _own_texts(kind: type) -> dict[str, str]:
+    """Return the texts in the body of one class, once: many classes share their bases."""
+    body = ast.parse(dedent(inspect.getsource(kind))).body[0]
+    assert isinstance(body, ast.ClassDef)
+    return {
+        field.target.id: _text_of(below)
+        for field, below in zip(body.body, body.body[1:], strict=False)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+    }
 
 
 def _text_of(statement: ast.stmt) -> str:

@@ -30,6 +30,8 @@ _CLOSER = 8
 _DEEPEST = 10
 _MAX_FAILURES = 40
 _FEW_FAILURES = 6
+_SAME = 1e-3
+"""Distance of two places at which the integrator gave up, relative to the panel, below which they are one."""
 
 Progress = Callable[[float], None]
 
@@ -54,6 +56,7 @@ class EventLoop:
         self.end = end
         self._failures = 0
         self._failed_before = start.t
+        self._gave_up_at = -np.inf
         self._since = start.t
         self.progress = progress
         self.guards = Guards(model)
@@ -191,8 +194,10 @@ class EventLoop:
         """
         return self._integrate(looks.point(k), float(looks.times[k + 1] - looks.times[k]), _CLOSER).every(1)
 
-    def _integrate(self, start: Point, span: float, looks: int, *, patient: bool = True) -> Looks:
-        x, z = self.integrator.run(start, span, looks, patient=patient, polish=False)
+    def _integrate(
+        self, start: Point, span: float, looks: int, *, patient: bool = True, partial: bool = False
+    ) -> Looks:
+        x, z = self.integrator.run(start, span, looks, patient=patient, partial=partial, polish=False)
         times = start.t + span * np.arange(x.shape[1] + 1) / looks
         # Row by row, in the order of IDAS.
         x = np.concatenate([start.x[None], x.T]).T
@@ -209,7 +214,7 @@ class EventLoop:
             span, count = self.pace.panel(self.now.t, stop)
             before = self.integrator.steps
             try:
-                looks = self._integrate(self.now, span, count, patient=not self.guards.count)
+                looks = self._integrate(self.now, span, count, patient=not self.guards.count, partial=True)
             except StepFailed:
                 if not self._go_on(self.now.t + span):
                     raise
@@ -242,7 +247,10 @@ class EventLoop:
 
         Shorter panels start closer to it. The last resort is a relaxed tolerance.
         """
-        self._failures += 1
+        # Without events, nothing but a tolerance can help across the same place.
+        same = not self.guards.count and abs(self.integrator.reached - self._gave_up_at) <= _SAME * (end - self.now.t)
+        self._gave_up_at = self.integrator.reached
+        self._failures += _FEW_FAILURES if same else 1
         self._failed_before = max(self._failed_before, end)
         allowed = _MAX_FAILURES if self.guards.count else _FEW_FAILURES
         if self._failures <= allowed and end > just_after(self.now.t):

@@ -91,6 +91,7 @@ class Integrator:
 
     Attributes:
         tolerances: present relative one, and absolute ones of the states.
+        reached: time in s at which IDAS gave up last.
     """
 
     def __init__(self, model: CompiledDae, options: Options, *, whole: bool = False, counted: bool = True) -> None:
@@ -101,6 +102,7 @@ class Integrator:
         self.steps = 0
         self.evaluations = 0
         self.gave_up: StepFailed
+        self.reached = -np.inf
         self.interrupts = Interrupts()
         self._relax(1.0)
         self._gentle_from = np.inf
@@ -168,16 +170,17 @@ class Integrator:
         }
 
     def run(
-        self, start: Point, span: float, outputs: int = 1, *, patient: bool = True, polish: bool = True
-    ) -> tuple[Vector, Vector]:
+        self, start: Point, span: float, outputs: int = 1, *, patient: bool = True, partial: bool = False,
+        polish: bool = True,
+    ) -> tuple[Vector, Vector]:  # fmt: skip
         """Integrate from `start` over `span` seconds.
 
         Args:
             start: consistent start.
             span: length of the interval in s.
             outputs: number of equidistant results.
-            patient: allow all steps between two results, not only the usual number. If false, fewer results are
-                valid, too: those before IDAS gave up.
+            patient: allow all steps between two results, not only the usual number.
+            partial: fewer results are valid, too: those before IDAS gave up.
             polish: whether to solve for the implicit unknowns precisely.
 
         Returns:
@@ -201,7 +204,7 @@ class Integrator:
             x, z, why = self._call(start, p, outputs, steps, gentle)
         if why or not np.isfinite(x[:, -1]).all():
             finite = np.isfinite(x).all(axis=0)
-            done = 0 if patient else int(np.argmin(finite))
+            done = int(np.argmin(finite)) if partial else 0
             self.gave_up = self._failed(start, span, why or "IDA_REP_RES_ERR", gentle)
             if not done:
                 raise self.gave_up
@@ -291,7 +294,7 @@ class Integrator:
         flag = next((name for name in _FLAGS if name in text), "")
         reason = _FLAGS.get(flag, "it stopped without a known reason")
         reached = _reached(text) ** 2 if gentle else _reached(text) / (self._seconds or 1.0)
-        moment = start.t + span * reached
+        self.reached = moment = start.t + span * reached
         speed = np.abs(call(self.model, self.model.ode, start)) / self.weights(start.x)
         worst = self.model.states[int(np.argmax(np.nan_to_num(speed)))]
         return StepFailed(

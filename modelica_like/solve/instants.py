@@ -155,7 +155,11 @@ class Instants:
             raise self._endless(now, alone, changes=changes)
         note_sharing(self.record, self.model, now)
         if len(self.record.events) > noted:
-            self._instants.append(now.t)
+            self._limit(now)
+
+    def _limit(self, now: Point) -> None:
+        """Note an instant with events; too many, or too many in a short time, end the run."""
+        self._instants.append(now.t)
         if len(self._instants) == _CHATTER_INSTANTS and now.t - self._instants[0] < _CHATTER_WINDOW * self.span:
             if self._resting or self.options.on_chattering != "rest":
                 raise self._chattering("Events follow each other ever faster")

@@ -136,7 +136,7 @@ def test_capabilities(exported: Callable[[str], Export], version: str) -> None:
     assert float(description.defaultExperiment.stopTime) == 2.0
 
 
-@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("version", [pytest.param("2.0", marks=pytest.mark.slow), "3.0"])
 def test_sources_make_the_same_fmu(exported: Callable[[str], Export], version: str, tmp_path: Path) -> None:
     path = tmp_path / "copy.fmu"
     shutil.copy(exported(version).path, path)

@@ -371,7 +371,7 @@ case(
     "the integrator gave up",
     lambda: simulate(Blow(x=1.0), 2.0),
     """\
-IDAS gave up at about t = 0.999997 s: it took too many steps (IDA_TOO_MUCH_WORK).
+IDAS gave up at about t = 0.999999 s: it took too many steps (IDA_TOO_MUCH_WORK).
 x changes fastest relative to its tolerance.
 Look for a stiff spring, a vanishing mass or a speed without bound; then try other tolerances.""",
 )

@@ -82,13 +82,13 @@ def test_where_it_gives_up_is_told(t: float) -> None:
 
 def test_what_it_reached_is_an_answer_to_who_is_not_patient() -> None:
     integrator, start = started(BlowUp(), Options(rtol=1e-9))
-    x, _ = integrator.run(start, 4.0, 40, patient=False)
+    x, _ = integrator.run(start, 4.0, 40, patient=False, partial=True)
     times = 0.1 * np.arange(1, x.shape[1] + 1)
     assert 8 <= len(times) <= 9
     np.testing.assert_allclose(x[1], 1 / (1 - times), rtol=1e-6)
     assert integrator.gave_up.what.startswith("IDAS gave up at about t = ")
     with pytest.raises(StepFailed):
-        integrator.run(start, 4.0, 3, patient=False)
+        integrator.run(start, 4.0, 3, patient=False, partial=True)
 
 
 def test_what_is_not_finite_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,7 +97,7 @@ def test_what_is_not_finite_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(integrator, "_call", lambda *_: (states, np.zeros((1, 3)), ""))
     with pytest.raises(StepFailed, match="not finite"):
         integrator.run(start, 1.0, 3)
-    x, z = integrator.run(start, 1.0, 3, patient=False)
+    x, z = integrator.run(start, 1.0, 3, patient=False, partial=True)
     np.testing.assert_array_equal(x, states[:, :2])
     assert z.shape == (1, 2)
 
