@@ -28,11 +28,12 @@ def select_states(system: System, counts: list[int], slopes: list[dict[int, floa
     known = set(system.inputs)
     dummies: set[int] = set()
     stage = 1
-    candidates = [c for c, chain in enumerate(system.chains) if chain[0] not in known]
+    candidates = everything = [c for c, chain in enumerate(system.chains) if chain[0] not in known]
     while rows := [e for e, count in enumerate(counts) if count >= stage]:
-        columns = [c for c in candidates if len(system.chains[c]) > stage]
-        columns.sort(key=lambda c: (_preference(system, c, stage), -c))
-        chosen = _independent(rows, columns, slopes)
+        # As a rule a position is a state if its speed is one. A relative angle between two shafts with friction, whose
+        # speeds are wanted more than the relative one, is a state all the same: absolute angles grow without bound.
+        choices = [_least(system, rows, some, stage, slopes) for some in (candidates, everything)]
+        chosen = min(choices, key=lambda one: (-len(one), sum(_preference(system, c, stage) for c in one)))
         if len(chosen) < len(rows):
             raise _dependent(system, [e for e in rows if e not in chosen.values()])
         dummies.update(system.chains[c][-1 - stage] for c in chosen)
@@ -40,6 +41,15 @@ def select_states(system: System, counts: list[int], slopes: list[dict[int, floa
         stage += 1
     highest = {chain[-1] for chain in system.chains}
     return [n for n in range(len(system.levels)) if n not in dummies and n not in highest and n not in known]
+
+
+def _least(
+    system: System, rows: list[int], chains: list[int], stage: int, slopes: list[dict[int, float]]
+) -> dict[int, int]:
+    """Choose the chains that least want to be states; return chain -> row that determines it."""
+    columns = [c for c in chains if len(system.chains[c]) > stage]
+    columns.sort(key=lambda c: (_preference(system, c, stage), -c))
+    return _independent(rows, columns, slopes)
 
 
 def _preference(system: System, chain: int, stage: int) -> int:

@@ -11,9 +11,11 @@ from components import (
     ConstantTorque,
     Freewheel,
     Inertia,
+    LossyGear,
     SpeedDependentLoad,
+    SpringDamper,
 )
-from modelica_like import build, simulate
+from modelica_like import Assembly, build, simulate
 from modelica_like.analyse.operating.curves import characteristic
 from modelica_like.analyse.operating.steady import steady
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange
@@ -239,3 +241,16 @@ def test_a_model_without_states_is_steady():
     assert found["z"] == pytest.approx(2.0)
     assert steady(Stateless(), near=found, parameters={"p": 68.0})["z"] == pytest.approx(4.0)
     assert steady(Stateless(), hold={"z": 3.0}, by=["p"])["p"] == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize("line", [["rotor", "gear", "shaft", "table"], ["rotor", "shaft", "gear", "table"]])
+def test_drives_with_friction_at_both_ends_turn_steadily(line):
+    """In either order: gear and load have speeds that are states, but a drive has one absolute angle."""
+    parts = {
+        "motor": ConstantTorque(tau_constant=10.0), "rotor": Inertia(J=0.1),
+        "gear": LossyGear(ratio=2.0, loss_table=[(0.0, 0.9, 0.8, 0.1, 0.1)]), "shaft": SpringDamper(c=400.0, d=0.2),
+        "table": Inertia(J=0.8), "load": SpeedDependentLoad(a=0.0, b=10.0, w_ref=10.0, p=1.0),
+    }  # fmt: skip
+    found = steady(Assembly("drive", parts=parts, series={"line": ("motor", *line, "load")}))
+    assert found["table.w"] == pytest.approx(2.0 * (0.9 * 10.0 - 0.1))
+    assert found["rotor.w"] == pytest.approx(2.0 * found["table.w"])

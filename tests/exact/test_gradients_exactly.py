@@ -24,7 +24,7 @@ STEP = Fraction(1, 2**70)
 PRECISE = 1e-9
 """Errors relative to the largest speed per relative change of a parameter."""
 SMOOTH = (0, 1, 2, 3, 4, 5, 7, 8, 9, 11, 12, 13, 14, 16, 17, 18, 19, 20, 21, 22)
-TIES = (10, 37, 55, 253, 295, 306, 317)
+TIES = (10, 37, 55, 253, 295, 306)
 """Drives in ties that later friction makes up for, or with two events at one instant in whatever order."""
 EDGES = {6: 0.25, 10: 2.0, 15: 2.0, 55: 1.0, 57: 0.25, 101: 0.5, 112: 0.25, 178: 0.5, 202: 0.5, 210: 0.5, 285: 1.0}
 """Drives on an edge, and a time by which it shows.

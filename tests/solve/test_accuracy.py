@@ -5,8 +5,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from components import ConstantTorque, Fixed, IdealGear, Inertia, SpringDamper
-from modelica_like import build, simulate
+from components import (
+    BearingFriction,
+    ConstantTorque,
+    Fixed,
+    IdealGear,
+    Inertia,
+    SpeedDependentLoad,
+    SpringDamper,
+)
+from modelica_like import Assembly, build, simulate
 from modelica_like.language import Component, Equations, Input, Parameter, Variable, der, param, series, signal_in, var
 
 
@@ -54,6 +62,21 @@ def test_tighter_tolerances_come_nearer():
         errors.append(np.max(np.abs(found["rotor.phi"] - exact)))
     assert errors[-1] < 1e-8
     assert all(later < 0.3 * earlier for earlier, later in pairwise(errors))
+
+
+def test_a_shaft_between_bearings_twists_as_precisely_after_an_hour() -> None:
+    """The speeds of both bearings are states. Their angles grow to 360,000 rad, and the errors of angles with them."""
+    parts = {
+        "motor": ConstantTorque(tau_constant=20.0), "bearing": BearingFriction(tau_pos=[(0, 1.0)]),
+        "rotor": Inertia(J=0.1), "shaft": SpringDamper(c=1e5, d=10.0), "table": Inertia(J=0.8),
+        "slide": BearingFriction(tau_pos=[(0, 1.0)]), "load": SpeedDependentLoad(a=0.0, b=18.0, w_ref=100.0, p=1.0),
+    }  # fmt: skip
+    model = build(Assembly("drive", parts=parts, series={"line": tuple(parts)}))
+    assert "shaft.phi_rel" in model.states
+    run = simulate(model, 3600.0, start="rest")
+    late = run.time > 100.0
+    np.testing.assert_allclose(run["shaft.tau"][late], -19.0, rtol=1e-7)
+    assert run.final["rotor.w"] == pytest.approx(100.0, rel=1e-7)
 
 
 def test_time_derivative_of_an_implicit_unknown() -> None:
