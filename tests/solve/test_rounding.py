@@ -113,9 +113,8 @@ def test_the_examples_have_modes_and_events(plain: dict[str, Told]) -> None:
     assert plain["steady"]["modes"] == ["box.clutch_a", "box.brake_d"]
 
 
-@pytest.mark.parametrize(
-    "kernel", ["Prescott", *(pytest.param(one, marks=SLOW) for one in ("Haswell", "SkylakeX", "Zen"))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kernel", NEEDS)
 def test_every_blas_kernel_gives_the_same_modes_and_events(plain: dict[str, Told], kernel: str) -> None:
     flags = Path("/proc/cpuinfo")
     if not flags.exists() or NEEDS[kernel] not in flags.read_text().split():
