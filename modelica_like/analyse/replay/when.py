@@ -76,6 +76,7 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
         if trigger is None:
             return When(None, _grazing(event))
         found.append((event, trigger))
+    found = _give_way_together(model, before, found)
     first, trigger = found[0]
     theta = np.concatenate([model.p, model.u, before.d])
     weights = np.concatenate([np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)])
@@ -88,6 +89,33 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
         if np.any(np.abs(by) * weights > size):
             apart.append(Coincidence(by, size, _together(first, other)))
     return When(trigger, None, tuple(apart))
+
+
+def _give_way_together(
+    model: CompiledDae, before: Point, found: list[tuple[Event, Trigger]]
+) -> list[tuple[Event, Trigger]]:
+    """Give elements that share a reaction one time at which all of them give way: when no split can be borne.
+
+    Each limit moves with the split, and what they bear together does not.
+    """
+    for circuit in model.circuits:
+        modes = {model.holds[k].mode for k in circuit.members if before.d[model.holds[k].mode] == model.holds[k].number}
+        fired = [model.transitions[one.transition] for one, _ in found]
+        those = [k for k, one in enumerate(fired) if not one.timed and one.mode in modes]
+        shared = circuit.shares(before.d).any(axis=1)
+        if len(those) < 2 or not shared.any():
+            continue
+        part = slopes(model, before, "guards", [fired[k].index for k in those])
+        by_split = np.array([circuit.shares(one)[shared].ravel() for one in part.theta[:, -len(before.d) :]])
+        left, sizes, _ = np.linalg.svd(by_split)
+        weights, rank = left[:, -1], int(np.sum(sizes > SAME * sizes.max(initial=0.0)))
+        if rank != len(those) - 1 or not (np.all(weights > 0.0) or np.all(weights < 0.0)):
+            continue
+        rate = float(weights @ part.rate)
+        together = Trigger(-float(weights @ part.value) / rate, -(weights @ part.by) / rate)
+        for k in those:
+            found[k] = found[k][0], together
+    return found
 
 
 def _difference(model: CompiledDae, before: Point, by: Vector) -> Vector:

@@ -1,10 +1,10 @@
-"""Trains of gears, bearings and shafts in any order turn steadily as they do in the end of a long run."""
+"""Trains of gears, bearings and shafts in any order: steady turns and gradients, against long runs and differences."""
 
 import numpy as np
 import pytest
 
 from components import BearingFriction, ConstantTorque, IdealGear, Inertia, LossyGear, SpeedDependentLoad, SpringDamper
-from modelica_like import Assembly, build, simulate, steady
+from modelica_like import Assembly, Options, build, sensitivities, simulate, steady
 from modelica_like.language import Component
 
 
@@ -32,3 +32,24 @@ def test_a_train_turns_as_it_does_in_the_end(number: int) -> None:
     for path in model.units:
         if path.endswith((".w", ".phi_rel", ".tau")):
             assert found[path] == pytest.approx(end[path], rel=1e-6, abs=1e-6), path
+
+
+@pytest.mark.parametrize("number", [101, 105, 107, *(pytest.param(n, marks=pytest.mark.slow) for n in range(108, 130))])
+def test_a_gradient_passes_where_several_parts_that_hold_a_shaft_give_way(number: int) -> None:
+    """How they split what they hold changes with the load, because a gear bears more under load: no matter."""
+    drive, step, asked = train(number), 1e-4, ("J0.w", "J1.w")
+    names = [f"{name}.{field}" for name, field in (
+        ("J1", "J"), ("motor", "tau_constant"), ("shaft1", "c"), ("lossy1", "ratio"), ("gear1", "ratio"), ("load", "a"),
+    ) if name in drive.parts]  # fmt: skip
+    found = sensitivities(drive, asked, names, until=0.5, start="rest", options=Options(rtol=1e-9))
+    values, model = [one.value for one in found.parameters], build(drive, free=names)
+
+    def end(name: str, value: float) -> list[float]:
+        run = simulate(model, 0.5, start="rest", parameters={name: value}, rtol=1e-11)
+        return [run.final[path] for path in asked]
+
+    moved = [
+        [end(name, value * (1 + sign * step)) for sign in (1, -1)] for name, value in zip(names, values, strict=True)
+    ]
+    differences = np.array([np.subtract(*pair) for pair in moved]).T / (2 * step)
+    assert found.derivatives * values == pytest.approx(differences, abs=3e-5 * np.abs(differences).max())
