@@ -136,6 +136,12 @@ def test_the_last_row_counts_in_its_scale_and_in_both_directions(name: str, sign
     assert caught.value.run.final["body.w" if turns else "body.v"] == pytest.approx(5.0 * sign, rel=1e-8)
 
 
+def test_an_open_brake_does_not_slide_beyond_its_rows() -> None:
+    brake = TranslationalBrake(fn_max=1.0, mu_pos=((0, 0.3), (10, 0.4)), f_normalized=0.0, **SLIDING)
+    parts: dict[str, Component] = {"body": Mass(m=1.0, s=0.0, v=50.0), "brake": brake}
+    assert simulate(Assembly("d", parts=parts, series={"s": list(parts)}), 1.0).final["body.v"] == 50.0
+
+
 @pytest.mark.parametrize(("how", "expected"), [("linear", 4.0), ("hold", 2.0)])
 @pytest.mark.parametrize("smooth", [False, True])
 def test_a_signal_beyond_its_table(how: str, expected: float, smooth: bool) -> None:
@@ -180,6 +186,7 @@ CAPACITY = ((0.0, 2e-3), (0.8, 1.5e-3), (1.0, 0.0))
         (((0.0, 2.5), (1.0, 1.0)), "0.8333", "1.25"),  # the top of x·(2.5 - 1.5 x)
         (((0.0, 1.5), (0.5, 2.2), (1.0, 0.0)), "0.5", "2.2"),
         (((0.0, 1.9), (0.5, 1.9), (0.9, 1.1), (1.0, 1.0)), "0.725", "1.45"),  # the top of x·(2.9 - 2 x)
+        (((0.0, 1.0), (0.5, 1.5), (1.5, 1.0)), "1", "1.25"),  # of rows beyond, only what they say of 1 counts
     ],
 )
 def test_no_converter_gives_more_than_it_takes(ratio: tuple[tuple[float, float], ...], at: str, worst: str) -> None:

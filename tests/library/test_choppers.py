@@ -73,6 +73,19 @@ def test_bridge_without_switching_gives_the_mean() -> None:
     assert run.energy().closure <= 1e-8
 
 
+def test_the_outputs_of_a_bridge_lie_around_the_middle_of_its_supply() -> None:
+    parts: dict[str, Component] = {
+        "U": ConstantVoltage(V=24.0), "part": HBridge(switching=False, u=0.5), "R": Resistor(R=2.0), "below": Ground(),
+        "V": ConstantVoltage(V=6.0),
+    }  # fmt: skip
+    connect = {
+        "p": ["U.p", "part.p"], "n": ["U.n", "part.n", "V.p"], "g": ["V.n", "below.p"], "1": ["part.p_out", "R.p"],
+        "2": ["R.n", "part.n_out"],
+    }  # fmt: skip
+    run = simulate(Assembly("d", parts=parts, connect=connect), 0.1)
+    assert (run.final["part.p_out.v"], run.final["part.n_out.v"]) == pytest.approx((18.0 + 6.0, 18.0 - 6.0))
+
+
 def test_fast_switching_drives_a_motor_like_the_mean() -> None:
     """The ripple of the current shakes the speed by no more than the theory of small ripples: V·k/(32·f²·L·J)."""
     finals = []

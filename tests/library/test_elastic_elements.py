@@ -15,6 +15,7 @@ from components import (
     FixedTemperature,
     HystereticCoupling,
     Inertia,
+    Mass,
     OldhamCoupling,
     Position,
     Rope,
@@ -196,3 +197,12 @@ def test_rope_pulls_with_spring_and_damper_and_slackens_faster_than_it_can_follo
     run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 0.002, **TIGHT)
     assert np.max(run["rope.tension"]) == 0  # 500·2 N.s/m·m/s are more than the 200 N of its stretch
     assert run.energy()["rope"].lost == pytest.approx(0.5 * 2e4 * (0.01**2 - 0.006**2), rel=1e-6)
+
+
+def test_a_rope_that_just_hangs_straight_is_slack() -> None:
+    parts: dict[str, Component] = {
+        "beam": TranslationalFixed(),
+        "rope": Rope(c=2e4),
+        "slide": Mass(m=1.0, s=0.0, v=0.0),
+    }
+    assert not simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 0.1)["rope.rope"].any()

@@ -149,6 +149,7 @@ def test_workpiece_resists_forward_motion_only() -> None:
     [
         (SliderCrank(r=0.1, l=0.12, e=0.03), "its rod l is shorter than the crank r and the offset e together"),
         (Cam(h=0.01, rise=4.0, fall=4.0), "rise, dwell and fall are more than 360° together"),
+        (Cam(h=0.01, rise=2.0, dwell=2.5, fall=2.0), "rise, dwell and fall are more than 360° together"),
         (FourBar(crank=0.1, coupler=0.05, rocker=0.05, ground=0.12), "cannot turn all around"),
         (FourBar(crank=0.03, coupler=0.2, rocker=0.05, ground=0.1), "cannot turn all around"),
         (WormGear(z_2=40, gamma=0.9, mu=0.9), "lead angle and friction angle are 90° together"),
@@ -166,3 +167,19 @@ def test_parameters_that_do_not_fit_end_the_run_with_a_sentence(part: Component,
 def test_stages_of_a_coupling_begin_at_zero() -> None:
     with pytest.raises(LanguageError, match="the first stage begins at"):
         ElasticCoupling(stages=((0.1, 100.0),))
+
+
+def test_a_cam_may_take_a_whole_turn() -> None:
+    """The sum of its parts may be more by rounding."""
+    dwell = np.nextafter(2 * pi, 7.0) - 4.0
+    assert 2.0 + dwell + 2.0 > 2 * pi
+    run = simulate(
+        chain_of(
+            motor=ConstantSpeed(w_fixed=10.0, phi=0.0),
+            cam=Cam(h=0.02, rise=2.0, dwell=dwell, fall=2.0),
+            follower=Mass(m=1.0),
+        ),
+        0.3,
+        **TIGHT,
+    )
+    assert run.at(0.3)["follower.s"] - run.at(0.0)["follower.s"] == pytest.approx(0.02, rel=1e-6)
