@@ -38,7 +38,8 @@ class Options:
         for name, low, high in (("rtol", 1e-14, 0.1), ("atol", 1e-20, 1.0), ("points", 1, 10_000_000)):
             value = getattr(self, name)
             if not low <= value <= high:
-                raise ValueOutOfRange(f"{name} = {value:g} is out of range: it must be between {low:g} and {high:g}.")
+                told, least, most = (f"{one:,}" if isinstance(one, int) else f"{one:g}" for one in (value, low, high))
+                raise ValueOutOfRange(f"{name} = {told} is out of range: it must be between {least} and {most}.")
         kinds = get_args(OnChattering)
         if self.on_chattering not in kinds:
             what = f"There is no on_chattering '{self.on_chattering}'{did_you_mean(self.on_chattering, kinds) or '.'}"

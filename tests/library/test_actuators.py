@@ -141,6 +141,16 @@ def test_wind_cools_a_clutch_that_turns() -> None:
     assert run.final["clutch.T"] == pytest.approx(293.15 + 20 * 100 / (2 * (1 + 2**0.8)), rel=1e-9)
 
 
+@pytest.mark.parametrize(("s", "v", "mode"), [
+    (0.0, 0.0, "resting"), (1e-3, 0.0, "moving"), (0.0, 0.1, "moving"), (0.0, -0.1, "resting"), (2e-3, 0.0, "leaving"),
+])  # fmt: skip
+def test_a_piston_begins_at_a_stop_or_between(s: float, v: float, mode: str) -> None:
+    """Without pressure the spring takes it from its other stop at once."""
+    piston = PneumaticActuator(p_in=0.0, A=3e-3, V_0=1e-4, C=1e-8, travel=2e-3, m=0.8, f_spring=300.0, s=s, v=v)
+    run = simulate(Assembly("d", parts={"piston": piston}), 1e-6)
+    assert run.model.flat_discretes[0].names[int(run["piston.stop"][0])] == mode
+
+
 def test_air_into_a_vacuum() -> None:
     """At the sonic conductance C the pressure falls as exp(-C·p_N·t/V_0)."""
     piston = PneumaticActuator(p_in=0.0, A=3e-3, V_0=1e-4, C=1e-8, travel=2e-3, m=0.8, f_spring=300.0)

@@ -348,7 +348,16 @@ def test_the_end_may_be_a_quantity(until):
         ({"until": "5 m"}, UnitError, "until expects s; '5 m' is m."),
         ({"until": 0.0}, ValueOutOfRange, "The end time 0 s is not after the start time 0 s."),
         ({"until": 1.0, "t0": 2.0}, ValueOutOfRange, "The end time 1 s is not after the start time 2 s."),
-        ({"until": 1.0, "points": 0}, ValueOutOfRange, "points = 0 is out of range: it must be between 1 and 1e+07."),
+        (
+            {"until": 1.0, "points": 0},
+            ValueOutOfRange,
+            "points = 0 is out of range: it must be between 1 and 10,000,000.",
+        ),
+        (
+            {"until": 1.0, "points": 10_000_001},
+            ValueOutOfRange,
+            "points = 10,000,001 is out of range: it must be between 1 and 10,000,000.",
+        ),
         ({"until": 1.0, "rtol": 1.0}, ValueOutOfRange, "rtol = 1 is out of range: it must be between 1e-14 and 0.1."),
         ({"until": 1.0, "atol": -1.0}, ValueOutOfRange, "atol = -1 is out of range: it must be between 1e-20 and 1."),
         ({"until": float("nan")}, ValueOutOfRange, "until must be a finite number, not nan."),
