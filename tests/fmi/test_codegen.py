@@ -105,7 +105,7 @@ FUNCTIONS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize("drive", [DRIVES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in DRIVES[1:])])
 def test_tapes_give_the_bits_of_casadi(inside, drive):
     code = inside(drive)
     for seed in range(5):

@@ -29,8 +29,8 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 NATIVE = native_platform()
 
 
-@pytest.mark.parametrize("drive", ["msl/rotational/CoupledClutches", "dc_bench"])
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("drive", ["msl/rotational/CoupledClutches", pytest.param("dc_bench", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("version", [pytest.param("2.0", marks=pytest.mark.slow), "3.0"])
 def test_both_ways_of_export_give_the_same_bits(drive, version, tmp_path):
     paths = [tmp_path / "shipped.fmu", tmp_path / "embedded.fmu"]
     for path, embed in zip(paths, (False, True), strict=True):

@@ -21,6 +21,8 @@ PAGES = [
     DOCS / "modelica_text.md",
     *sorted([*DOCS.glob("how_to/*.md"), *DOCS.glob("theory/*.md")]),
 ]
+LONG = ("cosimulate", "fmu_in_importers")
+"""They compile several FMUs."""
 
 
 def command(line: str) -> None:
@@ -33,7 +35,9 @@ def command(line: str) -> None:
     assert result.exit_code == 0, f"{line}: {result.stderr}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("page", [
+    pytest.param(page, id=page.stem, marks=pytest.mark.slow if page.stem in LONG else ()) for page in PAGES
+])  # fmt: skip
 def test_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {"__name__": "page"}

@@ -43,6 +43,7 @@ def test_gears_by_hand(time: float, gear: int) -> None:
     assert at["input.w"] / at["wheels.w"] / 3 == pytest.approx(RATIOS[gear - 1], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_clutch_by_hand() -> None:
     """Friction falls with slip and temperature; the engine takes what the clutch leaves; the plates keep the heat."""
     at = run("launch").at(2.2)
@@ -134,7 +135,7 @@ def test_work_of_the_slideway() -> None:
     ("name", "of", "to", "value", "step"),
     [
         ("launch", "car.v", "mass", 1600.0, 1.6),
-        ("launch", "max(clutch.T)", "clutch.fn_max", 10e3, 10.0),
+        pytest.param("launch", "max(clutch.T)", "clutch.fn_max", 10e3, 10.0, marks=pytest.mark.slow),
         ("servo_axis", "table.s", "screw.backlash", 1e-5, 1e-8),
     ],
 )
