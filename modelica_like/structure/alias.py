@@ -10,6 +10,7 @@ from modelica_like.flatten.model import Coefficient, FlatModel, LinearEquation
 
 PREFERENCES = ("avoid", "default", "prefer", "always")
 """Preferences of states, in rising order."""
+PREFERRED = PREFERENCES.index("prefer")
 
 _ROUNDING = 1e-13
 

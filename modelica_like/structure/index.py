@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from modelica_like.errors import StructureError
-from modelica_like.structure.alias import PREFERENCES
+from modelica_like.structure.alias import PREFERRED
 from modelica_like.structure.system import System
 
 _MAX_INDEX = 8
-_PREFERRED = PREFERENCES.index("prefer")
 
 
 def prefer_relative_states(system: System) -> None:
@@ -35,7 +34,7 @@ def prefer_relative_states(system: System) -> None:
                 reach[shortest] = possible
                 changed = True
     for chain, length in enumerate(reach):
-        if max(system.levels[level].preference for level in system.chains[chain]) >= _PREFERRED:
+        if max(system.levels[level].preference for level in system.chains[chain]) >= PREFERRED:
             while len(system.chains[chain]) < length:
                 system.add_level(chain)
 

@@ -178,10 +178,11 @@ def _choose(flat: FlatModel, aliases: Aliases, groups: tuple[Group, ...]) -> _Ch
     _check_input_rates(system)
     prefer_relative_states(system)
     contradictions = [flat.linear[k].origin for group in aliases.contradictions for k in group]
-    check_solvable(system, _incidence(system), contradictions)
-    counts = Pantelides(system, _incidence(system)).counts
+    incidence = _incidence(system)
+    check_solvable(system, incidence, contradictions)
+    counts = Pantelides(system, incidence).counts
     prefer(system, groups, following)
-    states = select_states(system, counts, _top_slopes(system, counts))
+    states = select_states(system, counts, _top_slopes(system, counts), incidence)
     return _Chosen(system, counts, states, holds, flags, following)
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from modelica_like.errors import Overdetermined
+from modelica_like.structure.alias import PREFERRED
 from modelica_like.structure.diagnose import doubly_fixed
 from modelica_like.structure.matching import Elimination
 from modelica_like.structure.system import System
 
 
-def select_states(system: System, counts: list[int], slopes: list[dict[int, float]]) -> list[int]:
+def select_states(
+    system: System, counts: list[int], slopes: list[dict[int, float]], incidence: list[list[int]]
+) -> list[int]:
     """Choose the levels that become states.
 
     Args:
@@ -16,6 +19,7 @@ def select_states(system: System, counts: list[int], slopes: list[dict[int, floa
         counts: number of differentiations of each equation.
         slopes: for every equation the derivative of its highest differentiation by the highest level of each chain,
             as numbers at a generic point.
+        incidence: level numbers in each equation.
 
     Returns:
         Level numbers, in the order of declaration.
@@ -28,28 +32,42 @@ def select_states(system: System, counts: list[int], slopes: list[dict[int, floa
     known = set(system.inputs)
     dummies: set[int] = set()
     stage = 1
-    candidates = everything = [c for c, chain in enumerate(system.chains) if chain[0] not in known]
+    candidates = {c for c, chain in enumerate(system.chains) if chain[0] not in known}
     while rows := [e for e, count in enumerate(counts) if count >= stage]:
         # As a rule a position is a state if its speed is one. A relative angle between two shafts with friction, whose
         # speeds are wanted more than the relative one, is a state all the same: absolute angles grow without bound.
-        choices = [_least(system, rows, some, stage, slopes) for some in (candidates, everything)]
+        ranked = [c for c in _ranked(system, counts, slopes, incidence, stage) if system.chains[c][0] not in known]
+        choices = [_independent(rows, some, slopes) for some in ([c for c in ranked if c in candidates], ranked)]
         chosen = min(choices, key=lambda one: (-len(one), sum(_preference(system, c, stage) for c in one)))
         if len(chosen) < len(rows):
             raise _dependent(system, [e for e in rows if e not in chosen.values()])
         dummies.update(system.chains[c][-1 - stage] for c in chosen)
-        candidates = list(chosen)
+        candidates = set(chosen)
         stage += 1
     highest = {chain[-1] for chain in system.chains}
     return [n for n in range(len(system.levels)) if n not in dummies and n not in highest and n not in known]
 
 
-def _least(
-    system: System, rows: list[int], chains: list[int], stage: int, slopes: list[dict[int, float]]
-) -> dict[int, int]:
-    """Choose the chains that least want to be states; return chain -> row that determines it."""
-    columns = [c for c in chains if len(system.chains[c]) > stage]
-    columns.sort(key=lambda c: (_preference(system, c, stage), -c))
-    return _independent(rows, columns, slopes)
+def _ranked(
+    system: System, counts: list[int], slopes: list[dict[int, float]], incidence: list[list[int]], stage: int
+) -> list[int]:
+    """Return the chains that can lose a state; the one that least wants it comes first.
+
+    Of relative positions, one that only constraints read, such as a damper's, comes before that of a spring, whose
+    digits are those of its force. One from the ground, in a constraint of two, comes before a difference of two others:
+    it is not small, and as a sum of others it is as precise.
+    """
+    read = {level for row, count in enumerate(counts) if count < stage for level in incidence[row]}
+    shortest: dict[int, int] = {}
+    for row, count in enumerate(counts):
+        for chain in slopes[row] if count >= stage else ():
+            shortest[chain] = min(len(slopes[row]), shortest.get(chain, len(slopes[row])))
+
+    def rank(chain: int) -> tuple[int, ...]:
+        wanted, level = _preference(system, chain, stage), system.chains[chain][-1 - stage]
+        return (wanted, level in read, shortest.get(chain, 0), -chain) if wanted >= PREFERRED else (wanted, -chain)
+
+    return sorted((c for c, chain in enumerate(system.chains) if len(chain) > stage), key=rank)
 
 
 def _preference(system: System, chain: int, stage: int) -> int:

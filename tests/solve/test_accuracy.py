@@ -8,6 +8,7 @@ import pytest
 from components import (
     BearingFriction,
     ConstantTorque,
+    Damper,
     Fixed,
     IdealGear,
     Inertia,
@@ -77,6 +78,28 @@ def test_a_shaft_between_bearings_twists_as_precisely_after_an_hour() -> None:
     late = run.time > 100.0
     np.testing.assert_allclose(run["shaft.tau"][late], -19.0, rtol=1e-7)
     assert run.final["rotor.w"] == pytest.approx(100.0, rel=1e-7)
+
+
+@pytest.mark.parametrize("order", [("shaft", "front", "back"), ("front", "shaft", "back"), ("front", "back", "shaft")])
+def test_a_shaft_between_dampers_twists_precisely_wherever_it_is_declared(order: tuple[str, ...]) -> None:
+    """Two of three relative angles are states; those of the dampers are angles from the ground, and give no torque."""
+    between = {
+        "shaft": SpringDamper(c=1e5, d=10.0), "front": Damper(d=0.1), "back": Damper(d=0.2),
+    }  # fmt: skip
+    parts = {
+        "motor": ConstantTorque(tau_constant=30.0), "rotor": Inertia(J=0.1), "table": Inertia(J=0.8),
+        "ground": Fixed(), **{name: between[name] for name in order},
+    }  # fmt: skip
+    connections = {
+        "drive": ("motor.flange", "rotor.flange_a"), "ground": ("ground.flange", "front.flange_b", "back.flange_b"),
+        "left": ("rotor.flange_b", "shaft.flange_a", "front.flange_a"),
+        "right": ("shaft.flange_b", "table.flange_a", "back.flange_a"),
+    }  # fmt: skip
+    model = build(Assembly("drive", parts=parts, connect=connections))
+    assert {"shaft.phi_rel", "shaft.w_rel"} < {*model.states}
+    run = simulate(model, 3600.0, start="rest")
+    late = run.time > 200.0
+    np.testing.assert_allclose(run["shaft.tau"][late], -20.0, rtol=1e-7)
 
 
 def test_time_derivative_of_an_implicit_unknown() -> None:

@@ -1,5 +1,6 @@
 """Differentiations and states against Pryce's offsets and against all choices."""
 
+from collections.abc import Iterable
 from itertools import combinations
 from types import SimpleNamespace
 from typing import Any
@@ -150,15 +151,16 @@ def test_a_chain_is_preferred_if_one_of_its_levels_is() -> None:
 
 
 @st.composite
-def constraints(draw: st.DrawFn) -> tuple[list[list[int]], list[int], np.ndarray]:
-    """Preferences of all levels, numbers of differentiations, and slopes of rank as many as there are."""
+def constraints(draw: st.DrawFn) -> tuple[list[list[int]], list[int], np.ndarray, list[int]]:
+    """Preferences of all levels, numbers of differentiations, slopes of full rank, and levels that are read."""
     size = draw(st.integers(1, 5))
     count = draw(st.integers(0, size))
     chance = np.random.default_rng(draw(st.integers(0, 2**32)))
     slopes = np.where(chance.random((count, size)) < 0.6, chance.normal(size=(count, size)), 0.0)
     assume(not count or np.linalg.matrix_rank(slopes) == count)
     preferences = chance.integers(0, 4, (size, 3)).tolist()
-    return preferences, chance.integers(1, 3, count).tolist(), slopes
+    read = np.flatnonzero(chance.random(3 * size) < 0.4).tolist()
+    return preferences, chance.integers(1, 3, count).tolist(), slopes, read
 
 
 def first_basis(slopes: np.ndarray, columns: list[int]) -> list[int]:
@@ -170,34 +172,40 @@ def first_basis(slopes: np.ndarray, columns: list[int]) -> list[int]:
 @given(constraints())
 @settings(deadline=None, max_examples=60)
 def test_states_are_what_the_first_regular_choice_of_the_least_wanted_leaves(given_: Any) -> None:
-    """Of equals the one that was declared last is no state.
+    """Of relative positions, one that others read is a state, then one in longer constraints; else the first declared.
 
     A position may be a state though its speed is none, if that leaves states that are wanted more.
     """
-    preferences, counts, slopes = given_
+    preferences, counts, slopes, read = given_
     size, highest = len(preferences), 3
     made = system([highest] * size)
     for chain, own in zip(made.chains, preferences, strict=True):
         for level, preference in zip(chain, own, strict=True):
             made.levels[level].preference = preference
-    rows = [{k: float(one) for k, one in enumerate(row)} for row in slopes]
-    once = first_basis(slopes, sorted(range(size), key=lambda k: (preferences[k][1], -k))) if counts else []
+    rows = [{k: float(one) for k, one in enumerate(row) if one} for row in slopes]
     second = slopes[[k for k, count in enumerate(counts) if count == 2]]
-    nested, free = (
-        first_basis(second, sorted(some, key=lambda k: (preferences[k][0], -k))) if len(second) else []
-        for some in (once, range(size))
-    )
+
+    def ranked(chains: Iterable[int], order: int, remaining: np.ndarray) -> list[int]:
+        def rank(chain: int) -> tuple[int, ...]:
+            lengths = [int(np.count_nonzero(row)) for row in remaining if row[chain]]
+            relative = made.chains[chain][order] in read, min(lengths, default=0)
+            return preferences[chain][order], *(relative if preferences[chain][order] >= PREFER else (0, 0)), -chain
+
+        return sorted(chains, key=rank)
+
+    once = first_basis(slopes, ranked(range(size), 1, slopes)) if counts else []
+    nested, free = (first_basis(second, ranked(some, 0, second)) if len(second) else [] for some in (once, range(size)))
     twice = min(nested, free, key=lambda chosen: sum(preferences[k][0] for k in chosen))
     dummies = {*(made.chains[k][1] for k in once), *(made.chains[k][0] for k in twice)}
     expected = [level for k in range(size) for level in made.chains[k][:-1] if level not in dummies]
-    assert select_states(made, [*counts, 0], [*rows, {}]) == expected
+    assert select_states(made, [*counts, 0], [*rows, {}], [*([] for _ in counts), read]) == expected
 
 
 def test_unknowns_without_derivatives_and_inputs_are_no_states() -> None:
     made = system([2, 2, 1, 2])
     made.inputs = [2]
     slopes = [{1: 1.0, 3: 0.5, 0: 0.0}]
-    assert select_states(made, [1], slopes) == [0]
+    assert select_states(made, [1], slopes, [[]]) == [0]
 
 
 def test_constraints_that_follow_from_others_are_told() -> None:
@@ -207,4 +215,4 @@ def test_constraints_that_follow_from_others_are_told() -> None:
     made.origins = [Origin(path, "Gear", Source("")) for path in ("train.gear", "", "")]
     slopes = [{0: 1.0, 1: 2.0}, {0: -2.0, 1: -4.0}, {0: 0.5, 1: 1.0}]
     with pytest.raises(Overdetermined, match=r"the constraint of train\.gear, Gear follows from others"):
-        select_states(made, [1, 1, 1], slopes)
+        select_states(made, [1, 1, 1], slopes, [[]] * 3)
