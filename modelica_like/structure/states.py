@@ -53,9 +53,10 @@ def _ranked(
 ) -> list[int]:
     """Return the chains that can lose a state; the one that least wants it comes first.
 
-    Of relative positions, one that only constraints read, such as a damper's, comes before that of a spring, whose
-    digits are those of its force. One from the ground, in a constraint of two, comes before a difference of two others:
-    it is not small, and as a sum of others it is as precise.
+    Of relative motions, one whose position only constraints read, such as a damper's, comes before that of a spring,
+    whose digits are those of its force. One from the ground, in a constraint of two, comes before a difference of two
+    others: it is not small, and as a sum of others it is as precise. Of other motions, those of connectors come first:
+    users know components by their own variables.
     """
     read = {level for row, count in enumerate(counts) if count < stage for level in incidence[row]}
     shortest: dict[int, int] = {}
@@ -64,8 +65,9 @@ def _ranked(
             shortest[chain] = min(len(slopes[row]), shortest.get(chain, len(slopes[row])))
 
     def rank(chain: int) -> tuple[int, ...]:
-        wanted, level = _preference(system, chain, stage), system.chains[chain][-1 - stage]
-        return (wanted, level in read, shortest.get(chain, 0), -chain) if wanted >= PREFERRED else (wanted, -chain)
+        level = system.levels[system.chains[chain][-1 - stage]]
+        relative = system.chains[chain][0] in read, shortest.get(chain, 0)
+        return level.preference, *(relative if level.preference >= PREFERRED else (level.own, 0)), -chain
 
     return sorted((c for c, chain in enumerate(system.chains) if len(chain) > stage), key=rank)
 

@@ -21,6 +21,7 @@ class Level:
     Attributes:
         name: the shortest name of its variables.
         preference: as a state (0: avoid … 3: always).
+        own: whether a variable of a component names it, not one of a connector or a derivative.
     """
 
     chain: int
@@ -29,6 +30,7 @@ class Level:
     preference: int
     nominal: float
     guess: float
+    own: bool = False
 
 
 @dataclass
@@ -171,12 +173,13 @@ def _levels(model: FlatModel, chains: list[list[int]], ranked: dict[int, list[_N
     levels: list[Level] = []
     for chain, numbers in enumerate(chains):
         for order, number in enumerate(numbers):
-            (_, node, named, _), *_ = nodes = ranked[number]
-            own = [(one, factor) for rank, _, one, factor in nodes if rank[0] == 0]
-            preference = max((PREFERENCES.index(one.state) for one, _ in own), default=0)
+            ((times, connected, *_), node, named, _), *_ = nodes = ranked[number]
+            itself = [(one, factor) for rank, _, one, factor in nodes if rank[0] == 0]
+            preference = max((PREFERENCES.index(one.state) for one, _ in itself), default=0)
             # The name says nothing about the guess: any of them that has one knows more than zero.
-            guess = next((one.guess / factor for one, factor in own if one.guess), 0.0)
-            levels.append(Level(chain, order, model.node_name(node), preference, named.nominal, guess))
+            guess = next((one.guess / factor for one, factor in itself if one.guess), 0.0)
+            own = not (times or connected)
+            levels.append(Level(chain, order, model.node_name(node), preference, named.nominal, guess, own))
     return levels
 
 

@@ -151,16 +151,16 @@ def test_a_chain_is_preferred_if_one_of_its_levels_is() -> None:
 
 
 @st.composite
-def constraints(draw: st.DrawFn) -> tuple[list[list[int]], list[int], np.ndarray, list[int]]:
-    """Preferences of all levels, numbers of differentiations, slopes of full rank, and levels that are read."""
+def constraints(draw: st.DrawFn) -> tuple[list[list[int]], list[int], np.ndarray, list[int], list[int]]:
+    """Preferences of all levels, numbers of differentiations, slopes of full rank, levels that are read or own."""
     size = draw(st.integers(1, 5))
     count = draw(st.integers(0, size))
     chance = np.random.default_rng(draw(st.integers(0, 2**32)))
     slopes = np.where(chance.random((count, size)) < 0.6, chance.normal(size=(count, size)), 0.0)
     assume(not count or np.linalg.matrix_rank(slopes) == count)
     preferences = chance.integers(0, 4, (size, 3)).tolist()
-    read = np.flatnonzero(chance.random(3 * size) < 0.4).tolist()
-    return preferences, chance.integers(1, 3, count).tolist(), slopes, read
+    read, own = (np.flatnonzero(chance.random(3 * size) < 0.4).tolist() for _ in range(2))
+    return preferences, chance.integers(1, 3, count).tolist(), slopes, read, own
 
 
 def first_basis(slopes: np.ndarray, columns: list[int]) -> list[int]:
@@ -172,24 +172,28 @@ def first_basis(slopes: np.ndarray, columns: list[int]) -> list[int]:
 @given(constraints())
 @settings(deadline=None, max_examples=60)
 def test_states_are_what_the_first_regular_choice_of_the_least_wanted_leaves(given_: Any) -> None:
-    """Of relative positions, one that others read is a state, then one in longer constraints; else the first declared.
+    """Of relative motions, one whose position is read has a state, then one in longer ones; of others one of its own.
+
+    Of equals, the first one that is declared is a state.
 
     A position may be a state though its speed is none, if that leaves states that are wanted more.
     """
-    preferences, counts, slopes, read = given_
+    preferences, counts, slopes, read, own_levels = given_
     size, highest = len(preferences), 3
     made = system([highest] * size)
     for chain, own in zip(made.chains, preferences, strict=True):
         for level, preference in zip(chain, own, strict=True):
             made.levels[level].preference = preference
+            made.levels[level].own = level in own_levels
     rows = [{k: float(one) for k, one in enumerate(row) if one} for row in slopes]
     second = slopes[[k for k, count in enumerate(counts) if count == 2]]
 
     def ranked(chains: Iterable[int], order: int, remaining: np.ndarray) -> list[int]:
         def rank(chain: int) -> tuple[int, ...]:
             lengths = [int(np.count_nonzero(row)) for row in remaining if row[chain]]
-            relative = made.chains[chain][order] in read, min(lengths, default=0)
-            return preferences[chain][order], *(relative if preferences[chain][order] >= PREFER else (0, 0)), -chain
+            relative = made.chains[chain][0] in read, min(lengths, default=0)
+            wanted, named = preferences[chain][order], made.levels[made.chains[chain][order]].own
+            return wanted, *(relative if wanted >= PREFER else (named, 0)), -chain
 
         return sorted(chains, key=rank)
 

@@ -91,13 +91,17 @@ def named(first: dict[str, Any], second: dict[str, Any], factor: float = 4.0) ->
     return found.levels[0]
 
 
-def test_a_level_has_the_guess_the_nominal_value_and_the_preference_of_its_variables() -> None:
-    assert named({}, {"state": "prefer", "nominal": 3.0}) == Level(0, 0, "x1", 2, 3.0, 0.0)
-    assert named({"guess": 6.0}, {"state": "prefer"}) == Level(0, 0, "x1", 2, 1.0, 1.5)
-    assert named({"guess": 6.0}, {"state": "prefer", "guess": 7.0}) == Level(0, 0, "x1", 2, 1.0, 7.0)
-    assert named({"guess": 6.0, "state": "prefer", "nominal": 5.0}, {}) == Level(0, 0, "x0", 2, 5.0, 6.0)
-    assert named({"state": "prefer"}, {"guess": 6.0}) == Level(0, 0, "x0", 2, 1.0, 24.0)
+def test_a_level_has_the_guess_the_nominal_value_and_the_preference_of_its_variables_and_tells_whose_it_is() -> None:
+    assert named({}, {"state": "prefer", "nominal": 3.0}) == Level(0, 0, "x1", 2, 3.0, 0.0, True)
+    assert named({"guess": 6.0}, {"state": "prefer"}) == Level(0, 0, "x1", 2, 1.0, 1.5, True)
+    assert named({"guess": 6.0}, {"state": "prefer", "guess": 7.0}) == Level(0, 0, "x1", 2, 1.0, 7.0, True)
+    assert named({"guess": 6.0, "state": "prefer", "nominal": 5.0}, {}) == Level(0, 0, "x0", 2, 5.0, 6.0, True)
+    assert named({"state": "prefer"}, {"guess": 6.0}) == Level(0, 0, "x0", 2, 1.0, 24.0, True)
+    assert named({"kind": "potential"}, {"kind": "flow"}) == Level(0, 0, "x0", 1, 1.0, 0.0, False)
+    assert named({"kind": "potential"}, {}) == Level(0, 0, "x1", 1, 1.0, 0.0, True)
     assert named({"state": "avoid"}, {"state": "avoid"}).preference == 0
+    assert named({"kind": "potential"}, {"kind": "flow"}) == Level(0, 0, "x0", 1, 1.0, 0.0, False)
+    assert named({"kind": "potential"}, {}) == Level(0, 0, "x1", 1, 1.0, 0.0, True)
     assert named({"state": "avoid"}, {}).preference == 1
 
 
