@@ -187,11 +187,12 @@ class Lines:
         """
         found = self._of_statement(change, text)
         # What a test runs in another process is not recorded; a file of tests that is called after the module may.
-        if called := [
-            test for test in self.seconds if test.partition("::")[0].endswith(f"/test_{Path(change.file).name}")
-        ]:
-            found = {*found, *called}
+        name = f"/test_{Path(change.file).name}"
+        called = {test for test in self.seconds if test.partition("::")[0].endswith(name)}
+        found = found | called
         files = {one.removeprefix(_IMPORT) for one in found if one.startswith(_IMPORT)}
+        if files:  # recorded are those that were the first to import it; others see its constants, too
+            files.update(test.partition("::")[0] for test in called)
         return self._sorted(found), self._sorted(test for test in self.seconds if test.partition("::")[0] in files)
 
     def users(self, change: Change) -> dict[str, float]:

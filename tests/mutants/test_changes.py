@@ -33,14 +33,15 @@ def test_what_is_changed(tmp_path: Path) -> None:
 def test_tests_are_found_by_lines_that_moved(tmp_path: Path) -> None:
     found = Lines()
     found.texts = {"f.py": SOURCE}
-    found.seconds = {"slow": 2.0, "fast": 1.0, "other": 0.1, "o.py::made": 3.0}
+    found.seconds = {"slow": 2.0, "fast": 1.0, "other": 0.1, "o.py::made": 3.0, "t/test_f.py::own": 4.0}
+    own = "t/test_f.py::own"
     found.runs = {"f.py": {3: {""}, 4: {"slow", "fast", "+o.py"}, 6: {"other"}}}
     text = "import math\n" + SOURCE.replace("2 * c)", "2 *\n        c)")
     (tmp_path / "f.py").write_text(text)
     for one in changes(tmp_path, "f.py"):
-        tests = ["fast", "slow"], ["o.py::made"]
+        tests = ["fast", "slow", own], ["o.py::made", own]
         if one.line != 5:  # a new one
-            tests = ["other", "fast", "slow"], []
+            tests = ["other", "fast", "slow", own], []
         assert tuple(map(list, found.tests(one, text))) == tests
         assert list(found.users(one)) == ["other", "fast", "slow"]
     assert {one.line for one in changes(tmp_path, "f.py")} == {5, 7}
