@@ -21,7 +21,7 @@ class Level:
     Attributes:
         name: the shortest name of its variables.
         preference: as a state (0: avoid … 3: always).
-        own: whether a variable of a component names it, not one of a connector or a derivative.
+        own: whether its chain begins with a variable of a component, not with one of connectors only.
     """
 
     chain: int
@@ -95,7 +95,7 @@ class System:
         """Extend a chain by one derivative."""
         below = self.levels[self.chains[chain][-1]]
         number = len(self.levels)
-        self.levels.append(Level(chain, below.order + 1, f"der({below.name})", 1, below.nominal, 0.0))
+        self.levels.append(Level(chain, below.order + 1, f"der({below.name})", 1, below.nominal, 0.0, below.own))
         self.symbols.append(ca.SX.sym(self.levels[-1].name))
         self.chains[chain].append(number)
         return number
@@ -172,14 +172,14 @@ def _ranked(model: FlatModel, node_level: list[tuple[int, float] | None]) -> dic
 def _levels(model: FlatModel, chains: list[list[int]], ranked: dict[int, list[_Named]]) -> list[Level]:
     levels: list[Level] = []
     for chain, numbers in enumerate(chains):
+        (_, connected, *_), *_ = ranked[numbers[0]][0]
         for order, number in enumerate(numbers):
-            ((times, connected, *_), node, named, _), *_ = nodes = ranked[number]
-            itself = [(one, factor) for rank, _, one, factor in nodes if rank[0] == 0]
-            preference = max((PREFERENCES.index(one.state) for one, _ in itself), default=0)
+            (_, node, named, _), *_ = nodes = ranked[number]
+            own = [(one, factor) for rank, _, one, factor in nodes if rank[0] == 0]
+            preference = max((PREFERENCES.index(one.state) for one, _ in own), default=0)
             # The name says nothing about the guess: any of them that has one knows more than zero.
-            guess = next((one.guess / factor for one, factor in itself if one.guess), 0.0)
-            own = not (times or connected)
-            levels.append(Level(chain, order, model.node_name(node), preference, named.nominal, guess, own))
+            guess = next((one.guess / factor for one, factor in own if one.guess), 0.0)
+            levels.append(Level(chain, order, model.node_name(node), preference, named.nominal, guess, not connected))
     return levels
 
 
