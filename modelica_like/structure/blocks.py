@@ -152,6 +152,8 @@ class BlockSolver:
         self, rows: tuple[int, ...], columns: tuple[int, ...]
     ) -> tuple[list[tuple[int, int]], list[int], list[int]]:
         """Return pairs (equation, unknown) to solve one after the other, the torn unknowns, and the equations left."""
+        if len(rows) == 1 and (rows[0], columns[0]) in self.safe:  # most blocks
+            return [(rows[0], columns[0])], [], []
         open_unknowns = {r: self.rows[r].keys() & {*columns} for r in rows}
         users: dict[int, list[int]] = {}
         for row, unknowns in open_unknowns.items():
@@ -220,7 +222,7 @@ class BlockSolver:
         return "implicit"
 
     def _substitute(self, expressions: list[Any], inner: list[tuple[int, Any]]) -> list[Any]:
-        if not inner:
+        if not (inner and expressions):
             return expressions
         symbols = [self.unknowns[column] for column, _ in inner]
         _, replaced = ca.substitute_inplace(symbols, [expression for _, expression in inner], expressions, False)

@@ -143,13 +143,18 @@ def _entries(system: System, counts: list[int]) -> dict[int, dict[int, bool]]:
 def _connected(system: System, entries: dict[int, dict[int, bool]]) -> list[list[int]]:
     """Constraints that share chains."""
     chains = {row: {system.levels[level].chain for level in levels} for row, levels in entries.items()}
+    users: dict[int, list[int]] = {}
+    for row, own in chains.items():
+        for chain in own:
+            users.setdefault(chain, []).append(row)
     groups: list[list[int]] = []
     while chains:
         group = [next(iter(chains))]
-        reached = chains.pop(group[0])
-        while near := [one for one, own in chains.items() if own & reached]:
-            for one in near:
-                reached |= chains.pop(one)
+        reached = [*chains.pop(group[0])]
+        for chain in reached:  # grows
+            near = [row for row in users.pop(chain, ()) if row in chains]
+            for row in near:
+                reached += chains.pop(row)
             group += near
         groups.append(sorted(group))
     return groups
