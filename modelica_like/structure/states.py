@@ -8,6 +8,9 @@ from modelica_like.structure.diagnose import doubly_fixed
 from modelica_like.structure.matching import Elimination
 from modelica_like.structure.system import System
 
+_ABSOLUTE = 2.5
+"""Rank of an absolute speed among those of springs: behind one from the ground, before one between two others."""
+
 
 def select_states(
     system: System, counts: list[int], slopes: list[dict[int, float]], incidence: list[list[int]]
@@ -56,7 +59,8 @@ def _ranked(
     Of relative motions, one whose position only constraints read, such as a damper's, comes before that of a spring,
     whose digits are those of its force. One from the ground, in a constraint of two, comes before a difference of two
     others: it is not small, and as a sum of others it is as precise. Of other motions, those of connectors come first:
-    users know components by their own variables.
+    users know components by their own variables. The speed of a spring between two others, which is small, is wanted
+    more than theirs even without a name.
     """
     read = {level for row, count in enumerate(counts) if count < stage for level in incidence[row]}
     shortest: dict[int, int] = {}
@@ -64,10 +68,11 @@ def _ranked(
         for chain in slopes[row] if count >= stage else ():
             shortest[chain] = min(len(slopes[row]), shortest.get(chain, len(slopes[row])))
 
-    def rank(chain: int) -> tuple[int, ...]:
-        level = system.levels[system.chains[chain][-1 - stage]]
-        relative = system.chains[chain][0] in read, shortest.get(chain, 0)
-        return level.preference, *(relative if level.preference >= PREFERRED else (level.own, 0)), -chain
+    def rank(chain: int) -> tuple[float, ...]:
+        base, level = (system.levels[system.chains[chain][k]] for k in (0, -1 - stage))
+        wanted, relative = (one.preference >= PREFERRED for one in (level, base))
+        length = shortest.get(chain, 0) if wanted or relative else _ABSOLUTE
+        return level.preference, system.chains[chain][0] in read if wanted else level.own, length, -chain
 
     return sorted((c for c, chain in enumerate(system.chains) if len(chain) > stage), key=rank)
 

@@ -1,6 +1,6 @@
 """Runs against closed forms: long grids, inputs, tolerances, time derivatives."""
 
-from itertools import pairwise
+from itertools import pairwise, permutations
 
 import numpy as np
 import pytest
@@ -12,8 +12,12 @@ from components import (
     Fixed,
     IdealGear,
     Inertia,
+    Mass,
     SpeedDependentLoad,
+    Spring,
     SpringDamper,
+    TranslationalFixed,
+    TranslationalSpring,
 )
 from modelica_like import Assembly, build, simulate
 from modelica_like.language import Component, Equations, Input, Parameter, Variable, der, param, series, signal_in, var
@@ -100,6 +104,34 @@ def test_a_shaft_between_dampers_twists_precisely_wherever_it_is_declared(order:
     run = simulate(model, 3600.0, start="rest")
     late = run.time > 200.0
     np.testing.assert_allclose(run["shaft.tau"][late], -20.0, rtol=1e-7)
+
+
+@pytest.mark.parametrize("order", [*permutations(["shaft", "rotor", "table"])])
+def test_the_twist_of_a_spring_and_its_rate_are_states_wherever_it_is_declared(order: tuple[str, ...]) -> None:
+    """Two inertias on a spring without damper swing around their common turn: tau = c·Δw/ω·sin(ω·t)."""
+    made = {"shaft": Spring(c=100.0), "rotor": Inertia(J=0.1), "table": Inertia(J=0.8)}
+    drive = Assembly("pair", parts={name: made[name] for name in order}, connect={
+        "left": ("rotor.flange_b", "shaft.flange_a"), "right": ("shaft.flange_b", "table.flange_a"),
+    })  # fmt: skip
+    drive.set("rotor.phi", 0.0)
+    drive.set("rotor.w", 1000.0)
+    drive.set("table.w", 1000.01)
+    drive.set("shaft.phi_rel", 0.0)
+    model = build(drive)
+    assert {"shaft.phi_rel", "der(shaft.phi_rel)"} < {*model.states}
+    assert "rotor.w" in model.states or "table.w" in model.states
+    run = simulate(model, 10.0, rtol=1e-6)
+    omega = np.sqrt(100.0 * (1 / 0.1 + 1 / 0.8))
+    np.testing.assert_allclose(run["shaft.tau"], 100.0 * 0.01 / omega * np.sin(omega * run.time), atol=1e-3 / omega)
+
+
+@pytest.mark.parametrize("order", [*permutations(["spring", "mass", "wall"])])
+def test_the_speed_of_a_spring_at_the_ground_is_that_of_its_mass(order: tuple[str, ...]) -> None:
+    made = {"spring": TranslationalSpring(c=100.0, s_rel0=0.0), "mass": Mass(m=2.0), "wall": TranslationalFixed()}
+    drive = Assembly("mass on a spring", parts={name: made[name] for name in order}, connect={
+        "left": ("wall.flange", "spring.flange_a"), "right": ("spring.flange_b", "mass.flange_a"),
+    })  # fmt: skip
+    assert {*build(drive).states} == {"spring.s_rel", "mass.v"}
 
 
 def test_time_derivative_of_an_implicit_unknown() -> None:

@@ -174,7 +174,8 @@ def first_basis(slopes: np.ndarray, columns: list[int]) -> list[int]:
 def test_states_are_what_the_first_regular_choice_of_the_least_wanted_leaves(given_: Any) -> None:
     """Of relative motions, one whose position is read has a state, then one in longer ones; of others one of its own.
 
-    Of equals, the first one that is declared is a state.
+    Of others with an own name, the speed of a relative position in a constraint of three or more is a state, one from
+    the ground is none. Of equals, the first one that is declared is a state.
 
     A position may be a state though its speed is none, if that leaves states that are wanted more.
     """
@@ -190,10 +191,13 @@ def test_states_are_what_the_first_regular_choice_of_the_least_wanted_leaves(giv
 
     def ranked(chains: Iterable[int], order: int, remaining: np.ndarray) -> list[int]:
         def rank(chain: int) -> tuple[int, ...]:
-            lengths = [int(np.count_nonzero(row)) for row in remaining if row[chain]]
-            relative = made.chains[chain][0] in read, min(lengths, default=0)
+            length = min((int(np.count_nonzero(row)) for row in remaining if row[chain]), default=0)
             wanted, named = preferences[chain][order], made.levels[made.chains[chain][order]].own
-            return wanted, *(relative if wanted >= PREFER else (named, 0)), -chain
+            if wanted >= PREFER:
+                return wanted, made.chains[chain][0] in read, length, -chain
+            if preferences[chain][0] < PREFER:
+                return wanted, named, 0, 0, -chain
+            return wanted, named, *((1, length) if length > 2 else (-1, length)), -chain
 
         return sorted(chains, key=rank)
 
