@@ -120,7 +120,7 @@ def simulate(
         start: `given`, `rest` (variables without a start value are at rest) or `steady`.
         t0: start time in s.
         rtol: relative tolerance.
-        atol: absolute tolerance, in nominal values.
+        atol: absolute tolerance, in nominal values; if only `rtol` is given, at most a hundredth of it.
         points: number of equal intervals of the results.
         options: all options together; the arguments above override them.
         progress: called with the time reached.
@@ -227,6 +227,9 @@ def positive_step(asked: float | str | None) -> float:
 
 def _options(base: Options, settings: Mapping[str, Any], **given: Any) -> Options:
     values = {name: getattr(base, name) for name in Options.__dataclass_fields__}
-    values.update({name: settings[name] for name in ("rtol", "atol", "points", "on_chattering") if name in settings})
-    values.update({name: value for name, value in given.items() if value is not None})
-    return Options(**values)
+    told = {name: settings[name] for name in ("rtol", "atol", "points", "on_chattering") if name in settings}
+    told |= {name: value for name, value in given.items() if value is not None}
+    if "rtol" in told and "atol" not in told:
+        # Otherwise what is small compared with its nominal value would not become more precise.
+        told["atol"] = min(values["atol"], told["rtol"] / 100)
+    return Options(**(values | told))

@@ -37,7 +37,7 @@ class Native:
         outputs: variables, modes (as numbers) and other quantities of the model's FMU, read by steps.
         start: `given`, `rest` or `steady`; by default that of the netlist.
         rtol: relative tolerance.
-        atol: absolute tolerance, in nominal values.
+        atol: absolute tolerance, in nominal values; by default a hundredth of `rtol`.
         by: parameters, inputs that are held, and start values; `gradient` differentiates with respect to them.
         fixed_step: step size in s, or a time such as "1 ms", for bounded work per step; steps and output intervals
             are whole numbers of it. By default the step size is adaptive.

@@ -134,6 +134,23 @@ def test_the_speed_of_a_spring_at_the_ground_is_that_of_its_mass(order: tuple[st
     assert {*build(drive).states} == {"spring.s_rel", "mass.v"}
 
 
+def test_a_relative_tolerance_alone_is_enough_for_small_values() -> None:
+    """A spring that swings by 1 µm: x = 1e-6·cos(10·t); the absolute tolerance by default is 1e-9 m."""
+    drive = Assembly("small", parts={
+        "wall": TranslationalFixed(), "spring": TranslationalSpring(c=200.0, s_rel0=0.0), "mass": Mass(m=2.0),
+    }, connect={"left": ("wall.flange", "spring.flange_a"), "right": ("spring.flange_b", "mass.flange_a")})  # fmt: skip
+    drive.set("mass.s", 1e-6)
+    drive.set("mass.v", 0.0)
+
+    def error(**tolerances: float) -> float:
+        run = simulate(drive, 2.0, **tolerances)
+        return float(np.max(np.abs(run["spring.s_rel"] / 1e-6 - np.cos(10.0 * run.time))))
+
+    assert error(rtol=1e-10) < 1e-4
+    assert error(rtol=1e-10, atol=1e-9) > 1e-4
+    assert error(rtol=1e-4) == error(rtol=1e-4, atol=1e-9)
+
+
 def test_time_derivative_of_an_implicit_unknown() -> None:
     """y + y³ = t: der(y) = 1/(1 + 3·y²)."""
 
