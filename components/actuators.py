@@ -237,7 +237,7 @@ class PneumaticActuator(Actuator):
         ratio = low / high
         subsonic = sqrt(1 - (maximum(minimum(ratio, self.laminar) - self.b, 0) / (1 - self.b)) ** 2)
         share = subsonic * where(ratio > self.laminar, (1 - ratio) / (1 - self.laminar), 1)
-        yield self.flow == where(self.supply > self.p, 1, -1) * self.p_N * self.C * high * share
+        yield self.flow == where(self.supply > self.p, 1, -1, events=False) * self.p_N * self.C * high * share
         yield der(self.p * self.volume) == self.flow
 
     def stored_energy(self) -> Expr:

@@ -37,6 +37,7 @@ class DCMachine(Conducting, Rotor, partial=True):
     """
 
     icon = icons.MOTOR
+    renamed = {"alpha": "alpha20 = alpha/(1 - alpha*(T_ref - 293.15 K)): alpha was the coefficient at T_ref"}
     ap = Pin("positive armature terminal")
     an = Pin("negative armature terminal")
     inlet = "ap"

@@ -5,12 +5,14 @@ from __future__ import annotations
 from math import pi
 
 from components import icons
+from components.commands import Commanded
 from components.feasible import Feasible
 from components.friction import ShaftFriction
 from components.interfaces import CompliantWithRelativeStates, ShaftInHousing
 from components.thermal import Lossy
 from modelica_like.language import (
     Equations,
+    Events,
     Expr,
     Input,
     Parameter,
@@ -139,7 +141,7 @@ class ChurningGear(Lossy, ShaftInHousing):
         return self.tau * self.w
 
 
-class OpenPlates(Feasible, Lossy, CompliantWithRelativeStates):
+class OpenPlates(Feasible, Commanded, Lossy, CompliantWithRelativeStates):
     """Drag of an open wet clutch or brake: oil is sheared in n gaps, beside the `Clutch` that closes them.
 
     The torque is n·pi·eta·(r_o^4 - r_i^4)/(2·h)·fill times the slip, for laminar flow; oil that is thrown out at speed
@@ -164,6 +166,10 @@ class OpenPlates(Feasible, Lossy, CompliantWithRelativeStates):
         yield from super().equations()
         drag = self.n * pi * self.eta * (self.r_o**4 - self.r_i**4) / (2 * self.h)
         yield self.tau == drag * self.fill * self.w_rel
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.above_one("fill")
 
     def dissipation(self) -> Expr:
         return self.tau * self.w_rel

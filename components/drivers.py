@@ -43,7 +43,7 @@ class Driver(Component):
     foot = Mode("accelerator", "brake", description="pedal on which the foot is")
 
     def build(self) -> None:
-        self.wish = Table(table=self.profile, scale="v_scale", time_scale="time_scale", extrapolate="hold")
+        self.wish = Table(table=self.profile, scale="v_scale", time_scale="time_scale")
         self.control = PI(k="k", Ti="Ti", y_max=1.0, integral=0.0)
 
     def equations(self) -> Equations:

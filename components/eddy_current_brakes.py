@@ -17,6 +17,7 @@ class EddyCurrentDisc(Conducting, partial=True):
     """
 
     icon = icons.EDDY
+    renamed = {"alpha": "alpha20, with the same value"}
     excitation: Input = signal_in("1", "excitation current over its nominal value", default=1.0)
 
     def braking(self, relative_speed: Expr) -> Expr:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from components import icons
+from components.commands import Commanded
 from components.interfaces import Flange
 from components.rotors import Rotor
 from components.tabulated import Flat, Tabulated
@@ -81,11 +82,12 @@ class MappedEngine(Tabulated, Rotor, partial=True):
         return self.tau_combustion * self.w
 
 
-class CombustionEngine(MappedEngine):
+class CombustionEngine(Commanded, MappedEngine):
     """Engine by its map, with firing orders, drag, idle controller and rev limit.
 
     A PI controller presses the pedal to keep the speed above w_idle. Above w_max the fuel is cut until the speed has
-    fallen by w_band, and below w_stall the engine stalls, until it is turned faster than w_start.
+    fallen by w_band. Below w_stall the engine stalls, without a value where it turns backwards, until it is turned
+    faster than w_start.
     """
 
     pedal: Input = signal_in("1", "pedal, 0 to 1", default=0.0)
@@ -95,9 +97,13 @@ class CombustionEngine(MappedEngine):
     w_max: Parameter = param("rad/s", "speed at which the fuel is cut", default=1e6, min=0)
     w_band: Parameter = param("rad/s", "by which the speed falls until it is given again", default=5.0, min=0)
     w_stall: Parameter = param("rad/s", "speed below which the engine goes out", default=0.0, min=0)
-    w_start: Parameter = param("rad/s", "speed from which it runs again", default="1.2 * w_stall", min=0)
+    w_fire: Parameter = param("rad/s", "slowest speed at which a starter lets it fire", default=10.0, min=1e-12)
+    w_start: Parameter = param("rad/s", "speed from which it runs again", default="max(1.2 * w_stall, w_fire)", min=0)
     idle: Variable = var("1", "integral of the idle controller", default=0.0)
-    fuel = Mode("given", "cut", "out", description="whether there is combustion")
+    fuel = Mode(
+        "given", "cut", "out", description="whether there is combustion",
+        hysteresis="w_start well above w_stall, and w_band well above zero",
+    )  # fmt: skip
 
     def equations(self) -> Equations:
         yield from super().equations()
@@ -119,3 +125,4 @@ class CombustionEngine(MappedEngine):
         yield fuel.go(("given", "cut"), "out", when=w < self.w_stall, notice="stalls")
         yield fuel.go("out", "given", when=w > self.w_start, because="the engine is turned fast enough")
         yield from super().events()
+        yield from self.above_one("pedal")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from components import icons
+from components.commands import Commanded
 from components.interfaces import CompliantWithRelativeStates, ShaftInHousing
 from components.tabulated import Tabulated
 from components.thermal import Lossy
@@ -203,7 +204,7 @@ class ShaftFriction(ShaftSticking, DryFriction, partial=True):
     """Dry friction between turning parts."""
 
 
-class PressedFriction(Tabulated, ShaftFriction, partial=True):
+class PressedFriction(Tabulated, Commanded, ShaftFriction, partial=True):
     """Friction surfaces pressed together by a normal force.
 
     Friction torque cgeo·mu(slip)·fn with the normal force fn = fn_max·f_normalized. For N surfaces with the radii r_i
@@ -237,6 +238,7 @@ class PressedFriction(Tabulated, ShaftFriction, partial=True):
     def events(self) -> Events:
         yield from super().events()
         yield from self.measured()
+        yield from self.above_one("f_normalized")
 
     def measured(self) -> Events:
         """Yield the event at which the slip leaves mu_pos while the surfaces are pressed together."""

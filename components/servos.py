@@ -75,6 +75,7 @@ class ServoMotor(Servo):
 class PositionServo(Servo):
     """Motor with a drive that controls its angle: a proportional controller gives the speed, up to w_max."""
 
+    renamed = {"servo": "its values and parts without 'servo.': J instead of servo.J"}
     phi_ref: Input = signal_in("rad", "set value of the angle")
     w_ff: Input = signal_in("rad/s", "speed of the set value, as feed-forward", default=0.0)
     Kv: Parameter = param("1/s", "gain, speed over error of the angle", min=0)

@@ -60,6 +60,9 @@ class PulseSensor(Component):
     """
 
     icon = icons.SENSOR
+    renamed = {
+        "pulses": "n", "gate": "the period of a FrequencyMeter behind a PulseCounter", "w": "the y of a FrequencyMeter",
+    }  # fmt: skip
     flange = Flange("measured shaft end")
     n: Parameter = param("1", "pulses per turn", min=1e-12)
     y: Output = signal_out("1", "pulses, 1 or -1")

@@ -9,6 +9,7 @@ from math import log, pi
 from typing import Literal
 
 from components import icons
+from components.tabulated import GUESSED
 from modelica_like.language import (
     Component,
     Discrete,
@@ -40,7 +41,8 @@ from modelica_like.language import (
 _NEVER = 1e30
 _SETTLED = 9 * log(10)
 """Time constants after which an exponential counts as settled: nine decades."""
-_ROUNDING = 1e-9
+_INSTANT = 1e-9
+"""Time that counts as one instant, above the resolution of events."""
 
 
 class Constant(Component):
@@ -307,9 +309,9 @@ class Table(Rowwise):
     )
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
-    extrapolate: Literal["linear", "hold", "error"] = "linear"
-    """Beyond the ends continue the last slope (`linear`), `hold` the last value, or end the run (`error`)."""
-    end = Mode("ahead", "passed", description="whether the table has ended")
+    extrapolate: Literal["hold", "linear", "error"] = "hold"
+    """Beyond the ends `hold` the last value, continue the last slope (`linear`), or end the run (`error`)."""
+    end = Mode("ahead", "passed", "awaited", description="whether the table has ended, or not begun")
     scale: Parameter = param("*", "scale of the values", default=1.0)
 
     def moments(self) -> tuple[float, ...]:
@@ -324,8 +326,17 @@ class Table(Rowwise):
     def events(self) -> Events:
         if not self.smooth:
             yield from super().events()
-        if self.extrapolate == "error":
-            # A run may end with the table.
-            begin, end = self.table[0][0], self.table[-1][0]
-            over = self.time / self.time_scale > end + _ROUNDING * (end - begin)
-            yield self.end.go("ahead", "passed", when=over, notice="has no more rows", fails=True)
+        # A run may begin and end with the table. Where the value stays anyway, nothing is guessed.
+        (begin, first), (end, last) = self.table[0], self.table[-1]
+        now, slack = self.time / self.time_scale, _INSTANT * (1 + end - begin)
+        fails, goes_on = self.extrapolate == "error", self.extrapolate == "linear"
+        if len(self.table) > 1 and not _stays(first, self.table[1][1]):
+            notice = f"has no rows yet: its first {'slope' if goes_on else 'value'} counts"
+            yield self.end.go("ahead", "awaited", when=now < begin - slack, notice=notice)
+        if len(self.table) > 1 and (fails or not _stays(last, self.table[-2][1])):
+            notice = f"has no more rows{GUESSED[self.extrapolate]}"
+            yield self.end.go(("ahead", "awaited"), "passed", when=now > end + slack, notice=notice, fails=fails)
+
+
+def _stays(value: Expr | float, following: Expr | float) -> bool:
+    return isinstance(value, float | int) and isinstance(following, float | int) and value == following

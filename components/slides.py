@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from components import icons
+from components.commands import Commanded
 from components.friction import DryFriction, Rows, Sticking
 from components.inertias import OnSlope
 from components.interfaces import LinearCompliantWithRelativeStates, LinearFlange, SlideInHousing
@@ -167,7 +168,7 @@ class StribeckFriction(SlideFriction):
         return self.F_prop * speed + self.F_Coulomb + self.F_Stribeck * exp(-self.fexp * speed)
 
 
-class TranslationalBrake(Tabulated, SlideFriction):
+class TranslationalBrake(Tabulated, Commanded, SlideFriction):
     """Friction brake between a slide and the housing: friction force cgeo·mu(v)·fn, fn = fn_max·f_normalized."""
 
     icon = icons.SLIDE_BRAKE
@@ -188,6 +189,7 @@ class TranslationalBrake(Tabulated, SlideFriction):
     def events(self) -> Events:
         yield from super().events()
         yield from self.leaving("mu_pos", absolute(self.v) / self.v_scale, self.mu_pos, self.f_normalized > 0)
+        yield from self.above_one("f_normalized")
 
 
 class MassWithStopAndFriction(SlideSticking, DryFriction, OnSlope):

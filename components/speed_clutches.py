@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from components import icons
+from components.commands import Commanded
 from components.interfaces import CompliantWithRelativeStates
 from components.one_way import SlippingCoupling
 from components.thermal import Lossy
-from modelica_like.language import Equations, Expr, Input, Parameter, der, exp, maximum, param, signal_in
+from modelica_like.language import Equations, Events, Expr, Input, Parameter, der, exp, maximum, param, signal_in
 
 
 class CentrifugalClutch(SlippingCoupling):
@@ -34,7 +35,7 @@ class CentrifugalClutch(SlippingCoupling):
         return self.n * self.mu * self.R * maximum(press, 0)
 
 
-class ViscousClutch(Lossy, CompliantWithRelativeStates):
+class ViscousClutch(Commanded, Lossy, CompliantWithRelativeStates):
     """Viscous clutch: plates in silicone oil, whose viscosity falls with shear and heat.
 
     The torque is tau_nominal·fill·(|w|/w_nominal)^p against the slip w, with p below 1 for oil that is thinned by
@@ -57,6 +58,10 @@ class ViscousClutch(Lossy, CompliantWithRelativeStates):
         w, scale = self.w_rel / self.w_nominal, self.w_smooth / self.w_nominal
         law = w * (w**2 + scale**2) ** (0.5 * (self.p - 1))
         yield self.tau == self.tau_nominal * self.fill * exp(-self.beta * (T - self.T_nominal)) * law
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.above_one("fill")
 
     def dissipation(self) -> Expr:
         return self.tau * self.w_rel

@@ -23,7 +23,11 @@ from modelica_like.language import (
 
 
 class Diode(Lossy, TwoPins):
-    """Diode: it conducts from p to n above the forward voltage, and a small conductance is left when it blocks."""
+    """Diode: it conducts from p to n above the forward voltage, and a small conductance is left when it blocks.
+
+    The current has no jump at the forward voltage: G·V_f flows there in both states (Modelica Standard Library,
+    Electrical.Analog.Ideal.IdealDiode).
+    """
 
     icon = icons.DIODE
     V_f: Parameter = param("V", "forward voltage without current", default=0.0, min=0)
@@ -33,13 +37,13 @@ class Diode(Lossy, TwoPins):
 
     def equations(self) -> Equations:
         yield from super().equations()
-        conducting = self.v - self.V_f - self.R * self.i
+        conducting = self.v - self.V_f - self.R * (self.i - self.G * self.V_f)
         yield self.state.choose(blocking=self.i - self.G * self.v, conducting=conducting) == 0
 
     def events(self) -> Events:
         yield self.state.initially("conducting", when=self.v > self.V_f)
         yield self.state.go("blocking", "conducting", when=self.v > self.V_f)
-        yield self.state.go("conducting", "blocking", when=self.i < 0)
+        yield self.state.go("conducting", "blocking", when=self.i < self.G * self.V_f)
 
     def dissipation(self) -> Expr:
         return self.v * self.i

@@ -9,6 +9,7 @@ from modelica_like.language import Component, Events, Expr, LanguageError, Mode,
 
 Flat = tuple[float, ...]
 ROUNDING = 1e-10
+GUESSED = {"hold": ": its last value holds", "linear": ": its last slope goes on", "error": ""}
 
 
 class Tabulated(Component, partial=True):
@@ -57,7 +58,6 @@ class Tabulated(Component, partial=True):
             least: smallest possible x.
         """
         if len(table) > 1 and self.extrapolate != "linear":
-            told = ": its last value holds" if self.extrapolate == "hold" else ""
             first, last = table[0][0], table[-1][0]
             above = isinstance(first, float | int) and first <= least
             # Reaching the end of a table does not leave it.
@@ -65,5 +65,5 @@ class Tabulated(Component, partial=True):
             outside = x > last + slack if above else any_of(x > last + slack, x < first - slack)
             yield self.range.go(
                 "kept", "left", when=all_of(outside, *conditions), fails=self.extrapolate == "error",
-                notice=f"leaves the rows of {name}{told}",
+                notice=f"leaves the rows of {name}{GUESSED[self.extrapolate]}",
             )  # fmt: skip

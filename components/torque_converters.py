@@ -63,13 +63,13 @@ class TorqueConverter(Tabulated, Lossy, TwoFlanges):
     @property
     def leading(self) -> Expr:
         """Speed of the faster one."""
-        return where(self.overrun, self.w_turbine, self.w_pump)
+        return where(self.overrun, self.w_turbine, self.w_pump, events=False)
 
     @property
     def gain(self) -> Expr:
         """Torque of the turbine over that of the pump."""
         against = 1 - minimum(self.x, 0) * (self.look_up(-1.0, self.torque_ratio) - 1)
-        return where(self.overrun, against, self.look_up(self.x, self.torque_ratio))
+        return where(self.overrun, against, self.look_up(self.x, self.torque_ratio), events=False)
 
     def equations(self) -> Equations:
         self._check()
@@ -80,7 +80,7 @@ class TorqueConverter(Tabulated, Lossy, TwoFlanges):
         yield self.x == pump * turbine / maximum(leading**2, self.w_still**2)
         capacity = self.C_scale * self.look_up(self.x, self.capacity)
         yield self.tau_leading == capacity * leading * absolute(leading)
-        passed = where(self.overrun, -self.tau_leading, self.tau_leading)
+        passed = where(self.overrun, -self.tau_leading, self.tau_leading, events=False)
         yield self.flange_a.tau == passed
         yield self.flange_b.tau == -self.gain * passed
 

@@ -103,7 +103,7 @@ class ChainDrive(Lossy, TwoFlanges):
         yield self.x == way_a - way_b
         yield self.v == arm_a * w_a - arm_b * w_b
         pull = self.c * self.x + self.d * self.v
-        yield self.f == where(self.x > 0, maximum(pull, 0), -maximum(-pull, 0))
+        yield self.f == where(self.x > 0, maximum(pull, 0), -maximum(-pull, 0), events=False)
         yield self.flange_a.tau == arm_a * self.f
         yield self.flange_b.tau == -arm_b * self.f
 

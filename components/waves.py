@@ -66,7 +66,7 @@ class Sinc(Started):
 
     def running(self, elapsed: Expr) -> Expr:
         x = 2 * pi * self.f * elapsed
-        return self.amplitude * where(x**2 < 1e-12, 1, sin(x) / x)
+        return self.amplitude * where(x**2 < 1e-12, 1, sin(x) / x, events=False)
 
 
 class Exponentials(Component):
@@ -162,8 +162,8 @@ class CombiTable(Component):
     )
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
-    extrapolate: Literal["linear", "hold", "error"] = "linear"
-    """Beyond the ends continue the last slopes (`linear`), `hold` the last values, or end the run (`error`)."""
+    extrapolate: Literal["hold", "linear", "error"] = "hold"
+    """Beyond the ends `hold` the last values, continue the last slopes (`linear`), or end the run (`error`)."""
     time_scale: Parameter = param("s", "scale of the times", default=1.0)
 
     def build(self) -> None:

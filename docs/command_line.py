@@ -16,7 +16,8 @@ PAGE = Path(__file__).parent / "command_line.md"
 MORE = {
     "new": ("tutorial.md", "tutorial"), "check": ("how_to/does_not_start.md", "a drive that does not start"),
     "draw": ("schematics.md", "schematics"), "describe": ("components/README.md", "components"),
-    "schema": ("how_to/editor.md", "an editor that knows netlists"), "simulate": ("plots.md", "pictures"),
+    "schema": ("how_to/editor.md", "an editor that knows netlists"), "trust": ("security.md", "security"),
+    "simulate": ("plots.md", "pictures"),
     "report": ("reports.md", "reports"), "explore": ("explore.md", "explore"), "modes": ("analysis.md", "analysis"),
     "steady": ("analysis.md", "analysis"), "sweep": ("how_to/sweep.md", "sweeps"),
     "sensitivity": ("sensitivities.md", "sensitivities"), "size": ("sizing.md", "design checks"),
@@ -41,7 +42,8 @@ _HEAD = """# The command line
 version. `modelica-like --install-completion` makes the shell complete commands, options, values and component types.
 
 Options can stand anywhere behind the command. Those marked with … can be given as often as needed. Times are numbers in
-seconds or quantities: `2s`, `0.1ms`. `--json` prints tables as data. Errors are sentences on standard error; `--debug`
+seconds or quantities: `2s`, `0.1ms`. `--json` prints tables as data. `--trust`, with any command, runs Python modules
+beside the netlists: [security](security.md). Errors are sentences on standard error; `--debug`
 shows where in the code they were raised. Exit codes and files: [scripts](how_to/scripts.md)."""
 
 

@@ -117,6 +117,7 @@ _OFFERED |= {
     "load_modelica": "modelica_like.modelica_text.read",
     "mathematics": "modelica_like.report.mathematics",
     "plot": "modelica_like.solve.plot",
+    "read_after": "modelica_like.runs.results",
     "sankey": "modelica_like.solve.sankey",
     "size": "modelica_like.sizing.run",
 }

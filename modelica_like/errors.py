@@ -108,6 +108,10 @@ class NetlistError(ModelicaLikeError):
     """A netlist file cannot be read, or does not have the form of a netlist."""
 
 
+class UntrustedModule(NetlistError):
+    """A netlist uses a Python module in a folder that is not trusted."""
+
+
 class ModelicaTextError(NetlistError):
     """A Modelica text cannot be read, or uses what is not supported."""
 
@@ -201,6 +205,10 @@ class LimitPassed(SolveError):
 
 class StepFailed(SolveError):
     """The integrator gave up."""
+
+
+class EnergyDrift(SolveError):
+    """The stored energy of a component does not follow its power: the integrator has stepped over something."""
 
 
 class NoGradient(SolveError):

@@ -6,7 +6,7 @@ import copy
 import gc
 import math
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -15,8 +15,10 @@ from typing import Any, Literal, get_args
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.sliding import as_asked
+from modelica_like.driven import driven
 from modelica_like.errors import (
     ExportError,
+    InitializationError,
     LanguageError,
     MissingExtra,
     SolveError,
@@ -28,8 +30,11 @@ from modelica_like.errors import (
 )
 from modelica_like.flatten import flatten
 from modelica_like.initialize import StartKind, initialize
+from modelica_like.initialize.ideal import refuse_contradiction
 from modelica_like.language import Component
 from modelica_like.language.tunable import with_tunable_tables
+from modelica_like.runs.collect import collector
+from modelica_like.solve.conserve import conserving
 from modelica_like.solve.events import EventLoop, Progress
 from modelica_like.solve.options import OnChattering, Options
 from modelica_like.solve.solution import Solution
@@ -75,6 +80,8 @@ def build(
         from modelica_like.netlist import load
 
         drive = load(drive)
+    if not isinstance(drive, Component):
+        raise _no_drive(drive)
     if tables:
         drive = with_tunable_tables(drive, tables)
     model = _compiled(drive)
@@ -86,6 +93,15 @@ def build(
     for name in bound:
         drive.set(name, float(values[model.derived_position[name]]))
     return _compiled(drive)
+
+
+def _no_drive(given: Any) -> LanguageError:
+    if isinstance(given, type) and issubclass(given, Component):
+        return LanguageError(f"{given.__name__} is a class, not a drive.", advice=f"Create one: {given.__name__}(…).")
+    return LanguageError(
+        f"Something of type {type(given).__name__} is no drive: write a component, a built model, or a netlist's path.",
+        advice='Parts become a drive as Assembly(parts={"motor": …, "load": …}, series={"shaft": ["motor", "load"]}).',
+    )
 
 
 @contextmanager
@@ -109,7 +125,8 @@ def simulate(
     drive: Model, until: float | str | None = None, *, parameters: Mapping[str, Any] | None = None,
     start: StartKind | None = None, t0: float = 0.0, rtol: float | None = None, atol: float | None = None,
     points: int | None = None, options: Options | None = None, progress: Progress | None = None,
-    solver: Solver | None = None, on_chattering: OnChattering | None = None,
+    solver: Solver | None = None, on_chattering: OnChattering | None = None, readings: Sequence[str] = (),
+    inputs: Any = None,
 ) -> Solution:  # fmt: skip
     """Simulate a drive.
 
@@ -127,35 +144,82 @@ def simulate(
         solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast. By default
             IDAS; if IDAS gives up, the run-time if there is one and it succeeds, with a notice.
         on_chattering: what to do where events follow each other without end, see `Options`: `stop`, `slide` or `rest`.
+        readings: numbers to read off the run as it is integrated, `max(shaft.tau)`: `Solution.readings` has them. Of
+            runs that are not too large `Solution.read` reads others afterwards.
+        inputs: trajectories of open inputs by path, or a table with a column `time` (a dictionary, pandas, a CSV file):
+            see `driven`. They are linear in between, hold their first and last value beyond, and the run says so.
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot continue.
         KeyboardInterrupt: the run was interrupted. `run` of this and of a `SolveError` is the solution up to then.
     """
-    model = build(drive)
+    model = build(drive if inputs is None else driven(drive, inputs))
     if parameters:
         model = model.with_parameters(dict(parameters))
-    asked: dict[str, Any] = {"rtol": rtol, "atol": atol, "points": points, "on_chattering": on_chattering}
-    end, chosen = plan(model, until, t0=t0, options=options, **asked)
+    given: dict[str, Any] = {"rtol": rtol, "atol": atol, "points": points, "on_chattering": on_chattering}
+    end, chosen = plan(model, until, t0=t0, options=options, **given)
+    chosen.check_memory(len(model.states) + len(model.implicit))
     make = _loop(solver or "idas")
     begin = time.perf_counter()
     kind: StartKind = start or model.settings.get("start", "given")
     settings = {**model.settings, "start": kind, "on_chattering": chosen.on_chattering}
     model = as_asked(model if settings == model.settings else model.twin(settings=settings))
-    first = initialize(model, t0, kind)
-    loop = make(model, chosen, first, end, progress)
+
+    def attempt(options: Options) -> Solution:
+        loop = make(model, options, initialize(model, t0, kind), end, progress)
+        asked = collector(model, readings, options.atol)
+        if readings:
+            loop.record.keeper.read = lambda stretches: asked.feed(loop.dense(stretches))
+        try:
+            loop.run()
+        except (SolveError, KeyboardInterrupt) as error:
+            vars(error)["run"] = _solution(loop, begin, kind) if loop.record.segments else None
+            raise
+        for segment in loop.record.segments if model.ideal else ():
+            refuse_contradiction(model, segment.point(-1))
+        run = _solution(loop, begin, kind)
+        if not readings:
+            return run
+        asked.feed(loop.dense(loop.record.keeper.stretches))
+        return replace(run, readings=dict(zip(readings, asked.finish(run), strict=True)))
+
     try:
-        loop.run()
-    except (SolveError, KeyboardInterrupt) as error:
-        vars(error)["run"] = _solution(loop, begin, kind) if loop.record.segments else None
-        if solver is None and isinstance(error, StepFailed):
+        return conserving(attempt(chosen), attempt)
+    except StepFailed as error:
+        if solver is None:
             # Without a run-time, or if it also fails, the error of IDAS is raised.
             with suppress(SolveError, ExportError, LanguageError, MissingExtra):
-                run = simulate(model, end, start=start, t0=t0, options=chosen, progress=progress, solver="native")
+                run = simulate(
+                    model,
+                    end,
+                    start=start,
+                    t0=t0,
+                    options=chosen,
+                    progress=progress,
+                    solver="native",
+                    readings=readings,
+                )
                 told = f"{error.what} The whole run was done by the compiled run-time instead (solver native)."
                 return replace(run, notices=(told, *run.notices))
         raise
-    return _solution(loop, begin, kind)
+
+
+def quick_run(model: Model, until: float | str | None = None, **run: Any) -> Solution:
+    """Simulate with the compiled run-time, or with IDAS if there is none or it fails.
+
+    Args:
+        model: as of `simulate`.
+        until: end time.
+        run: further arguments of `simulate`.
+
+    Raises:
+        ModelicaLikeError: IDAS also fails; this is its error.
+    """
+    model = build(model)
+    try:
+        return simulate(model, until, **run, solver="native")
+    except (ExportError, InitializationError, LanguageError, MissingExtra, SolveError):
+        return simulate(model, until, **run, solver="idas")
 
 
 def plan(
@@ -195,7 +259,7 @@ def _solution(loop: Any, begin: float, start: StartKind) -> Solution:
     statistics = Statistics(steps, evaluations, integrations, len(record.events), elapsed)
     return Solution(
         loop.model, loop.options, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
-        tuple(record.notices), start,
+        tuple(record.notices), start, dense=record.keeper.dense(loop),
     )  # fmt: skip
 
 

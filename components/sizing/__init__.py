@@ -83,6 +83,8 @@ from components.sizing.gear_life import life_factor as life_factor
 from components.sizing.gear_strength import GearMaterial as GearMaterial
 from components.sizing.gear_strength import GearStrength as GearStrength
 from components.sizing.gear_strength import gear_strength as gear_strength
+from components.sizing.gear_teeth import GearTeeth as GearTeeth
+from components.sizing.gear_teeth import gear_teeth as gear_teeth
 from components.sizing.lepelletier import Lepelletier as Lepelletier
 from components.sizing.lepelletier import LepelletierGear as LepelletierGear
 from components.sizing.lepelletier import lepelletier as lepelletier
@@ -147,6 +149,7 @@ __all__ = [
     "GearMaterial",
     "GearPair",
     "GearStrength",
+    "GearTeeth",
     "GeneratorPoint",
     "Lepelletier",
     "LepelletierGear",
@@ -206,6 +209,7 @@ __all__ = [
     "friction_work",
     "gear_life",
     "gear_strength",
+    "gear_teeth",
     "generator_point",
     "generator_voltage",
     "lepelletier",

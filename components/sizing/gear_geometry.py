@@ -1,19 +1,34 @@
-"""Geometry of cylindrical gears: contact, and form of the teeth at their root (DIN 3960, DIN 3990-3)."""
+"""Geometry of cylindrical gears: contact, undercut, and form of the teeth at their root (DIN 3960, DIN 3990-3)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from components.sizing.maths import Number, acos, cos, require, sin, sqrt, tan
+import numpy as np
+
+from components.sizing.maths import (
+    Number,
+    acos,
+    cos,
+    hypot,
+    is_symbolic,
+    maximum,
+    minimum,
+    require,
+    sin,
+    sqrt,
+    tan,
+    where,
+)
 from modelica_like.language.quantities import Angle, Length, Ratio, Teeth
 
 RACK_ANGLE = math.pi / 9
 """Pressure angle of the standard rack, 20°, in rad."""
 _NEWTON_STEPS = 12
 _UNDERCUT = "The teeth of a gear end in a point, or have no root: check teeth, profile shift and rack."
-INTERNAL_FORM, INTERNAL_CORRECTION = 2.053, 2.65
-"""Form and stress correction factors of internal teeth, of the rack that stands for them (GB/T 3480, DIN 3990-3)."""
+_HALVINGS = 50
+"""Halvings of an interval below pi/2, to rounding."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +47,7 @@ class GearPair:
         addendum: of the rack of the gear in modules.
         dedendum: in modules.
         root_radius: of the rack's root in modules.
+        internal_root_radius: of the root of internal teeth in modules (GB/T 3480: 0.15).
     """
 
     pinion_teeth: Teeth
@@ -45,6 +61,7 @@ class GearPair:
     addendum: Ratio = 1.0
     dedendum: Ratio = 1.25
     root_radius: Ratio = 0.38
+    internal_root_radius: Ratio = 0.15
 
     @property
     def transverse_angle(self) -> Angle:
@@ -81,15 +98,40 @@ class GearPair:
         require("A tip circle lies inside its base circle.", square > 0)
         return sqrt(square)
 
+    def meeting(self, tangent: Number, teeth: Teeth, mate: Teeth) -> Number:
+        """Return the tangent of the pressure angle at which a point of a gear meets its mate.
+
+        Args:
+            tangent: of the pressure angle of the point.
+            teeth: of the gear.
+            mate: teeth of its mate.
+        """
+        return tan(self.working_angle) * (1 + teeth / mate) - tangent * teeth / mate
+
+    @property
+    def used_tips(self) -> tuple[Number, Number]:
+        """Tangents of the pressure angles up to which the flanks of pinion and wheel are used.
+
+        A tip is not used where it meets the mate within its undercut, or below its base circle. Internal teeth have
+        no undercut.
+        """
+        pinion, wheel = self.pinion_teeth, self.wheel_teeth
+        first, second = self.tip_over_base(pinion, self.pinion_shift), self.tip_over_base(wheel, self.wheel_shift)
+        by_pinion = self.meeting(undercut_end(self, pinion, self.pinion_shift), pinion, wheel)
+        # The tip of internal teeth is their inner end.
+        used = where(wheel < 0, maximum(second, by_pinion), minimum(second, by_pinion))
+        outside = maximum(wheel, 1.0)
+        by_wheel = self.meeting(undercut_end(self, outside, self.wheel_shift), outside, pinion)
+        return where(wheel < 0, first, minimum(first, by_wheel)), used
+
     @property
     def contact_ratio(self) -> Ratio:
-        """Transverse contact ratio: (z1·(tan a_a1 - tan a_w) + z2·(tan a_a2 - tan a_w))/(2·pi) (DIN 3960)."""
-        working = tan(self.working_angle)
-        tips = (
-            teeth * (self.tip_over_base(teeth, shift) - working)
-            for teeth, shift in ((self.pinion_teeth, self.pinion_shift), (self.wheel_teeth, self.wheel_shift))
-        )
-        return sum(tips) / (2 * math.pi)
+        """Transverse contact ratio: (z1·(tan a_a1 - tan a_w) + z2·(tan a_a2 - tan a_w))/(2·pi) (DIN 3960).
+
+        Only flanks that are there count: an undercut shortens the contact.
+        """
+        working, (pinion, wheel) = tan(self.working_angle), self.used_tips
+        return (self.pinion_teeth * (pinion - working) + self.wheel_teeth * (wheel - working)) / (2 * math.pi)
 
     @property
     def overlap_ratio(self) -> Ratio:
@@ -104,6 +146,79 @@ def involute(angle: Angle) -> Number:
 
 def _atan(tangent: Number) -> Angle:
     return acos(1 / sqrt(1 + tangent**2))
+
+
+def involute_start(pair: GearPair, teeth: Teeth, shift: Ratio) -> Number:
+    """Return the tangent of the pressure angle at which the involute of an external gear begins.
+
+    The straight flank of the rack, whose height is h = dedendum - radius·(1 - sin a), makes it from
+    tan a_F = tan a_t - (h - x)/(r·sin a_t·cos a_t) on (DIN 3960). Where that is below the base circle, the rack's
+    rounded tip cuts the involute away up to the crossing of its path; helical gears count by their transverse section.
+
+    Args:
+        pair: its rack, module and helix.
+        teeth: of the gear, not negative.
+        shift: its profile shift in modules.
+    """
+    angle, radius = pair.transverse_angle, teeth / (2 * cos(pair.helix))
+    height = pair.dedendum - pair.root_radius * (1 - sin(pair.pressure_angle))
+    start = tan(angle) - (height - shift) / (radius * sin(angle) * cos(angle))
+    return maximum(start, undercut_end(pair, teeth, shift))
+
+
+def undercut_end(pair: GearPair, teeth: Teeth, shift: Ratio) -> Number:
+    """Return the tangent of the pressure angle at which the undercut of an external gear ends; 0 if it has none.
+
+    The normal of the fillet passes the pitch point at an angle, whose two values are sought by halving: on the base
+    circle, and between there and the pressure angle where the fillet crosses the involute.
+    """
+    angle, radius = pair.transverse_angle, teeth / (2 * cos(pair.helix))
+    height = pair.dedendum - pair.root_radius * (1 - sin(pair.pressure_angle))
+    undercut = height - shift > radius * sin(angle) ** 2
+    if not is_symbolic(undercut) and not np.any(undercut):
+        return 0.0 * radius
+    depth = maximum(pair.dedendum - pair.root_radius - shift, 1e-9)  # without an undercut it may be negative
+    half = (math.pi / 4 - pair.dedendum * tan(pair.pressure_angle)) / cos(pair.helix)
+    half = half - (1 - sin(angle)) * pair.root_radius / cos(angle)
+    space = (math.pi / 2 - 2 * shift * tan(pair.pressure_angle)) / teeth - involute(angle)
+
+    def over_base(normal: Angle) -> tuple[Number, Number]:
+        lever = depth / sin(normal) + pair.root_radius
+        across, up = lever * cos(normal), radius - lever * sin(normal)
+        turned = acos(up / hypot(across, up)) - (depth / tan(normal) - half) / radius
+        return (across**2 + up**2) / (radius * cos(angle)) ** 2 - 1, turned
+
+    def into_flank(normal: Angle) -> Number:
+        square, turned = over_base(normal)
+        tangent = sqrt(maximum(square, 0.0))
+        return turned - space - (tangent - _atan(tangent))
+
+    low, high = angle, math.pi / 2
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        above = over_base(middle)[0] > 0
+        low, high = where(above, middle, low), where(above, high, middle)
+    end, low = high, angle
+    for _ in range(_HALVINGS):
+        middle = (low + end) / 2
+        outside = into_flank(middle) < 0
+        low, end = where(outside, middle, low), where(outside, end, middle)
+    return where(undercut, sqrt(maximum(over_base(end)[0], 0.0)), 0.0)
+
+
+def internal_form(pair: GearPair) -> tuple[Ratio, Ratio]:
+    """Return form factor Y_Fa and stress correction factor Y_Sa of internal teeth (DIN 3990-3, GB/T 3480).
+
+    A rack with the tooth depth and the root radius of the ring stands for them, so they do not depend on its teeth:
+    2.053 and 2.65 for the depth of 2.25 modules and the radius of 0.15 modules.
+    """
+    angle, radius = pair.pressure_angle, pair.internal_root_radius
+    depth = pair.addendum + pair.dedendum
+    chord = math.pi / 4 + (pair.dedendum - radius) * tan(angle) + radius / cos(angle) - radius * math.cos(math.pi / 6)
+    arm = depth - (math.pi / 4 + (pair.dedendum - depth) * tan(angle)) * tan(angle) - radius / 2
+    slenderness, sharpness = 2 * chord / arm, chord / radius
+    correction = (1.2 + 0.13 * slenderness) * sharpness ** (1 / (1.21 + 2.3 / slenderness))
+    return 6 * arm / (2 * chord) ** 2, correction
 
 
 def tooth_form(pair: GearPair, teeth: Teeth, shift: Ratio) -> tuple[Ratio, Ratio]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.sizing.gear_geometry import INTERNAL_CORRECTION, INTERNAL_FORM, GearPair, tooth_form
+from components.sizing.gear_geometry import GearPair, internal_form, tooth_form
 from components.sizing.maths import Number, cos, is_symbolic, maximum, minimum, require, sqrt, tan, where
 from modelica_like.language.quantities import Angle, Force, Ratio, Stress, Torque
 from modelica_like.language.results import Result, line
@@ -124,27 +124,28 @@ def root_sharing(pair: GearPair) -> Ratio:
 def single_contact(pair: GearPair, ratio: Ratio, overlap: Ratio) -> Number:
     """Return the larger one of Z_B and Z_D: contact at the inner points of single contact, not at the pitch point.
 
+    Of internal gears Z_D is 1, and Z_B that of the pinion, whose flank is most curved at its inner point there, too.
+
     Args:
         pair: geometry.
         ratio: transverse contact ratio.
-        overlap: overlap ratio, at most 1; no influence above it, or for internal gears.
+        overlap: overlap ratio, at most 1; no influence above it.
     """
-    tips = [
-        pair.tip_over_base(pair.pinion_teeth, pair.pinion_shift),
-        pair.tip_over_base(pair.wheel_teeth, pair.wheel_shift),
-    ]
+    tips = pair.used_tips
     steps = 2 * math.pi / pair.pinion_teeth, 2 * math.pi / pair.wheel_teeth
     square = tan(pair.working_angle) ** 2
     inner = (tips[0] - steps[0]) * (tips[1] - (ratio - 1) * steps[1])
     outer = (tips[1] - steps[1]) * (tips[0] - (ratio - 1) * steps[0])
-    largest = maximum(1.0, sqrt(square / abs(inner)), sqrt(square / abs(outer)))
-    return where(pair.wheel_teeth < 0, 1.0, largest - overlap * (largest - 1))
+    wheel = where(pair.wheel_teeth < 0, 1.0, sqrt(square / abs(outer)))
+    largest = maximum(1.0, sqrt(square / abs(inner)), wheel)
+    return largest - overlap * (largest - 1)
 
 
 def form_factors(pair: GearPair) -> tuple[Ratio, Ratio]:
-    """Return Y_Fa·Y_Sa of pinion and wheel; internal teeth count as a rack with a sharp root."""
+    """Return Y_Fa·Y_Sa of pinion and wheel."""
     form, correction = tooth_form(pair, pair.pinion_teeth, pair.pinion_shift)
     if not is_symbolic(pair.wheel_teeth) and np.all(np.asarray(pair.wheel_teeth) < 0):
-        return form * correction, INTERNAL_FORM * INTERNAL_CORRECTION
+        wheel_form, wheel_correction = internal_form(pair)
+        return form * correction, wheel_form * wheel_correction
     wheel_form, wheel_correction = tooth_form(pair, pair.wheel_teeth, pair.wheel_shift)
     return form * correction, wheel_form * wheel_correction

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 TASKS = {
     "Write a drive": {
         "new": "starters", "check": "models", "draw": "pictures", "library": "types", "describe": "types",
-        "schema": "types", "docs": "types",
+        "schema": "types", "docs": "types", "trust": "starters",
     },
     "Run it": {
         "simulate": "models", "report": "pictures", "explore": "pictures", "compare": "validation",
@@ -48,10 +48,17 @@ def __getattr__(name: str) -> Any:
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line. All commands know `--trust`, which is taken from their words here."""
+    from modelica_like.cli.trusted import decide
+    from modelica_like.trust import trusting
+
+    words = [word for word in sys.argv[1:] if word != "--trust"]
+    everything = len(words) < len(sys.argv) - 1
+    sys.argv[1:] = words
     try:
-        if not _ran(sys.argv[1:]):
-            __getattr__("app")()
+        with trusting(None if everything else decide()):
+            if not _ran(words):
+                __getattr__("app")()
     except KeyboardInterrupt:  # while modules are loaded
         raise SystemExit(130) from None
 

@@ -16,7 +16,8 @@ from modelica_like.cli.declare import Argument, Option, WrongUse
 _ABOUT = (
     "Acausal drive-train models: check, simulate, analyse and export netlists.\n\n"
     "Exit codes: 0 done; 1 the model cannot be solved, or a check failed; 2 the input is wrong, or a file cannot be "
-    "read or written; 130 stopped by Ctrl-C."
+    "read or written; 130 stopped by Ctrl-C.\n\n"
+    "`--trust`, with any command, runs Python modules beside the netlists."
 )
 
 

@@ -32,12 +32,12 @@ Inputs = Literal["linear", "hold"]
 def split(
     netlist: Netlist, assignments: Assignments = None, *,
     at: Annotated[
-        list[str],
+        list[str] | None,
         Option("--at", metavar="PLACE", help="A part (the cut is behind it), one of its ends, or a name in [connect]."),
-    ],
+    ] = None,
     output: Annotated[
         Path, Option("--output", "-o", metavar="FOLDER", help="Where to write: a folder, or an SSP (….ssp).")
-    ],
+    ] = Path("build/split"),
     names: Annotated[
         list[str] | None, Option("--name", metavar="NAME", help="Name of an FMU, in the order of the netlist.")
     ] = None,
@@ -56,10 +56,12 @@ def split(
         with Console(stderr=True).status("loading") as status:
             if output.suffix.lower() == ".ssp":
                 done = split_to_ssp(
-                    assembly, at, output, ssp, names=names or (), version=fmi, check=check, report=status.update
+                    assembly, at or (), output, ssp, names=names or (), version=fmi, check=check, report=status.update
                 )
             else:
-                done = run(assembly, at, output, names=names or (), version=fmi, check=check, report=status.update)
+                done = run(
+                    assembly, at or (), output, names=names or (), version=fmi, check=check, report=status.update
+                )
         say(str(done))
 
 

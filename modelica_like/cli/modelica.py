@@ -22,7 +22,7 @@ def from_modelica(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Write a model of Modelica text as a netlist."""
-    made = output or text.with_suffix(".toml")
+    made = output or text.parent / f"{text.stem or 'model'}.toml"
     with told(debug, files=[made]):
         from modelica_like.modelica_text.netlist_form import netlist_text
         from modelica_like.modelica_text.read import read_modelica
@@ -41,7 +41,7 @@ def to_modelica(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Write a netlist as Modelica text on classes of the Modelica Standard Library."""
-    made = output or netlist.with_suffix(".mo")
+    made = output or netlist.parent / f"{netlist.stem or 'model'}.mo"
     with told(debug, files=[made]):
         from modelica_like.modelica_text.write import modelica_text
 

@@ -54,8 +54,8 @@ def check(
 ) -> None:  # fmt: skip
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms.
 
-    Units, wiring and structure are checked without a run. What looks like a slip is told on stderr; the exit code
-    stays 0.
+    Units, wiring, structure, start values and what happens at the start are checked without a run. What looks like a
+    slip is told on stderr; the exit code stays 0.
     """
     with told(debug, json=json) as page:
         assembly = load_netlist(netlist, assignments)
@@ -64,9 +64,10 @@ def check(
         from modelica_like.report.structure import structure_report
         from modelica_like.simulation import build
 
-        page.print(structure_report(assembly))
-        model = build(assembly)
-        note(*drive_notes(assembly), *(start_notes(model) if not start_values else ()))
+        structure, model = structure_report(assembly), build(assembly)
+        missing = start_notes(model)  # before the report, which says that the drive can be simulated
+        page.print(structure)
+        note(*drive_notes(assembly), *(missing if not start_values else ()))
         if start_values:
             page.print("", start_report(assembly, model))
 
@@ -81,6 +82,9 @@ def simulate(
     display: Annotated[
         list[str] | None, Option(metavar="WHAT=UNIT", help="Unit of results, e.g. speed=rpm or '*.phi=deg'.")
     ] = None,
+    inputs: Annotated[
+        Path | None, Option(metavar="FILE", help="Open inputs over time: CSV with columns time and e.g. 'motor.tau'.")
+    ] = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw the energies as a flow diagram.")] = None,
     energy: Annotated[bool, Option(help="Print the energy balance.")] = True,
     json: Json = False, debug: Debug = False,
@@ -94,6 +98,7 @@ def simulate(
         # Errors in the file are reported before the solver is loaded.
         assembly = load_netlist(netlist, assignments)
         from modelica_like.cli.outcome import Outcome
+        from modelica_like.driven import driven
         from modelica_like.report.plausible import notes
         from modelica_like.report.progress import Bar
         from modelica_like.report.run import run_report
@@ -103,6 +108,8 @@ def simulate(
         from modelica_like.solve.signals import read_signals
 
         variants, files = _beside(compare or (), plot)
+        if inputs is not None:
+            assembly = driven(assembly, inputs)
         model = build(assembly, free=[path for path, _ in variants])
         read_signals(model, show or ())
         shown = assigned(display, "--display")

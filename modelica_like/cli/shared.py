@@ -186,15 +186,20 @@ def load_netlist(netlist: Path, assignments: list[str] | None) -> Any:
     from modelica_like.netlist import load
 
     assembly = load(netlist)
-    for path, value in assigned(assignments, "--set").items():
+    for path, value in values(assignments).items():
         place = Source("--set", text=f"{path}={value}")
         try:
-            assembly.set(path, _value(value))
+            assembly.set(path, value)
         except ModelicaLikeError as error:
             error.where = (place,)
             raise
         Assembly.place(assembly, f"set.{path}", place)
     return assembly
+
+
+def values(assignments: list[str] | None) -> dict[str, Any]:
+    """Return the values of `--set` by path."""
+    return {path: _value(text) for path, text in assigned(assignments, "--set").items()}
 
 
 def _value(text: str) -> Any:

@@ -1,4 +1,4 @@
-"""The command new: a netlist to begin with."""
+"""Commands to begin with: new and trust."""
 
 from __future__ import annotations
 
@@ -34,3 +34,26 @@ def new(
         except FileExistsError:
             raise NetlistError(f"{file} exists, and is left as it is.", advice="Choose another name with -o.") from None
         say(f"{file}: next, modelica-like simulate {file}")
+
+
+def trust(
+    folder: Annotated[
+        Path | None, Argument(metavar="FOLDER", help="Without one: list them.", show_default=False)
+    ] = None,
+    *, remove: Annotated[bool, Option("--remove", help="Trust it no longer.")] = False,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Trust a folder: Python modules beside its netlists, and beside those in folders below, may run.
+
+    A module can do all that you can. A netlist that names a module in any other folder is refused; `--trust` with
+    another command makes an exception for that call.
+    """
+    with told(debug):
+        import modelica_like.trust as trusted
+
+        if folder is None:
+            say("\n".join(map(str, trusted.trusted_folders())) or "No folder is trusted.")
+        elif remove:
+            say(f"{trusted.distrust(folder)} is not trusted any more.")
+        else:
+            say(f"{trusted.trust(folder)} is trusted.")

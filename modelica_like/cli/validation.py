@@ -6,7 +6,19 @@ from pathlib import Path
 from typing import Annotated
 
 from modelica_like.cli.declare import Argument, Option
-from modelica_like.cli.shared import SOLVE_FAILED, Debug, Json, Plot, Points, Timeout, Tolerance, Until, told
+from modelica_like.cli.shared import (
+    SOLVE_FAILED,
+    Assignments,
+    Debug,
+    Json,
+    Plot,
+    Points,
+    Timeout,
+    Tolerance,
+    Until,
+    told,
+    values,
+)
 from modelica_like.errors import NetlistError
 
 _HOMES = (Path(__file__).parents[1], Path(__file__).parents[2])
@@ -74,7 +86,8 @@ def compare(
     signals: Annotated[
         list[str] | None, Option("--signal", metavar="PATTERN", help="Signals to compare, e.g. '*.w'; default: all.")
     ] = None,
-    *, until: Until = None, rtol: Tolerance = None, points: Points = None, plot: Plot = None,
+    assignments: Assignments = None, *,
+    until: Until = None, rtol: Tolerance = None, points: Points = None, plot: Plot = None,
     json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Compare two trajectories of one system: the largest deviation of each signal, the times of the events.
@@ -82,14 +95,17 @@ def compare(
     Signals are compared by name, at common times; with few common times, the second side is interpolated, and the
     report says so. Mode changes are paired by mode and new mode; between the two times of a pair, nothing is compared.
     A signal's range is its largest minus its smallest value in A, at least a millionth of the largest value of its
-    unit. The picture has the signals that deviate most, or those chosen.
+    unit. `--set` sets a value in both, where they are netlists or FMUs. The picture has the signals that deviate most,
+    or those chosen.
     """
     with told(debug, json=json, pictures=[plot]) as page:
         from modelica_like.report.compare import compare as run
         from modelica_like.simulation import seconds
 
         end = None if until is None else seconds(until)
-        comparison = run(a, b, signals=signals or (), until=end, points=points or 500, tolerance=rtol)
+        comparison = run(
+            a, b, signals=signals or (), until=end, points=points or 500, tolerance=rtol, values=values(assignments)
+        )
         page.print(comparison)
         if plot:
             from modelica_like.solve.plot import save_plot

@@ -12,6 +12,7 @@ import casadi as ca
 
 from modelica_like.compile.buffers import Along, BufferedFunction
 from modelica_like.compile.buffers import Vector as Vector
+from modelica_like.compile.edges import Edges, find_edges
 from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.errors import LanguageError, ModelicaLikeError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
@@ -24,8 +25,8 @@ from modelica_like.units import Unit, to_si
 from modelica_like.upper import upper
 
 Made = TypeVar("Made")
-TERMINAL = "terminal()"
-"""Discrete value that becomes 1 at the end of a run."""
+TERMINAL, HOMOTOPY = "terminal()", "homotopy()"
+"""Discrete values of the model: 1 at the end of a run; the share of the actual expressions at a start."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,7 @@ class CompiledDae:
         p: parameter values.
         components: paths of the components of the energy balance.
         places: source places of the parts of netlists, by path.
+        renamed: what to write instead of paths of earlier versions.
         terminals: open ends with an adaptor.
         singular: names and origins of the blocks of `determinants`.
         implicit_blocks: names and origins of the blocks of `alg`.
@@ -153,6 +155,7 @@ class CompiledDae:
     u: Vector
     components: tuple[str, ...]
     places: dict[str, Source]
+    renamed: dict[str, str]
     summary: str
     terminals: tuple[CompiledTerminal, ...] = ()
     implicit_blocks: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...] = ()
@@ -205,6 +208,11 @@ class CompiledDae:
         """Position of every mode and discrete value by its path."""
         return {discrete.path: k for k, discrete in enumerate(self.flat_discretes)}
 
+    @property
+    def edges(self) -> Edges:
+        """Where slopes change without an event, and what repeats in guards."""
+        return self.once("edges", lambda: find_edges(self.arguments, self.ode, self.alg, self.guards))
+
     @cached_property
     def energy(self) -> ca.Function:
         """Energy terms, one row per component.
@@ -231,10 +239,25 @@ class CompiledDae:
             raise LanguageError("The start system of this model was not kept.")
         return self._make_start(rest)
 
-    @cached_property
+    @property
     def arguments(self) -> dict[str, Any]:
-        """Fresh symbols for the arguments of the functions."""
-        return {name: ca.SX.sym(name, self.ode.size1_in(k)) for k, name in enumerate(self.ode.name_in())}
+        """Symbols for the arguments of the functions, the same for all twins: what is cached has them."""
+        return self.once(
+            "arguments",
+            lambda: {name: ca.SX.sym(name, self.ode.size1_in(k)) for k, name in enumerate(self.ode.name_in())},
+        )
+
+    @property
+    def symbol_places(self) -> dict[int, tuple[int, int]]:
+        """Number of the argument and row of each of its symbols, by hash."""
+        return self.once(
+            "symbol_places",
+            lambda: {
+                symbol.element_hash(): (number, row)
+                for number, argument in enumerate(self.arguments.values())
+                for row, symbol in enumerate(ca.vertsplit(argument))
+            },
+        )
 
     @property
     def motion(self) -> Motion:
@@ -294,7 +317,9 @@ class CompiledDae:
                 raise LanguageError(f"{path} follows from other parameters.", advice="Set those.")
             else:
                 known = [*self.parameter_position, *inputs]
-                raise UnknownName(f"{self.name} has no parameter '{path}'{did_you_mean(path, known) or '.'}")
+                advice = f"Write {self.renamed[path]}." if path in self.renamed else ""
+                near = "." if advice else did_you_mean(path, known) or "."
+                raise UnknownName(f"{self.name} has no parameter '{path}'{near}", advice=advice)
         for below, above in self.rising:
             if not p[below] < p[above]:
                 names = [f"{self.flat_parameters[k].path} = {p[k]:g}" for k in (above, below)]
@@ -357,5 +382,4 @@ class CompiledDae:
     def __getstate__(self) -> dict[str, Any]:
         if self._make_energy is not None:
             _ = self.energy, self.start_system, self.rest_system  # symbols do not pickle, functions do
-        state = {key: value for key, value in self.__dict__.items() if key != "arguments"}
-        return {**state, "_make_energy": None, "_make_start": None, "_cache": {}}
+        return {**self.__dict__, "_make_energy": None, "_make_start": None, "_cache": {}}

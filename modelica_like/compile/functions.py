@@ -67,6 +67,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         u=_input_values(flat),
         components=tuple(flat.components),
         places=_places(flat),
+        renamed={f"{path}.{name}": to for path, one in flat.components.items() for name, to in one.renamed.items()},
         terminals=_terminals(flat),
         implicit_blocks=reduced.implicit_blocks,
         motion_sources=_motion_sources(flat),

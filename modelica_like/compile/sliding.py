@@ -17,6 +17,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.compile.soon import ahead, guards_soon, joined
+from modelica_like.flatten.generic import spread
 from modelica_like.structure.motion import Motion
 
 SLIDES = " ⇄ "
@@ -124,12 +125,9 @@ def _pairs(model: CompiledDae, samples: Any) -> Iterator[Pair]:
 
 def _samples(model: CompiledDae) -> Any:
     """Values of the guards at arbitrary points, shape (points, guards)."""
-    random, rows = np.random.default_rng(1), list[Any]()
-    for _ in range(_SAMPLES):
-        t, p, u = (random.uniform(size=model.guards.size1_in(name)) for name in "tpu")
-        x, z = (random.normal(size=model.guards.size1_in(name)) for name in "xz")
-        rows.append(model.guards(t, x, z, p, u, random.integers(2, size=model.discrete_size)).full().ravel())
-    return np.array(rows)
+    sizes = [model.guards.size1_in(k) for k in range(model.guards.n_in())]
+    t, x, z, p, u, d = np.split(spread(0.0, 1.0, (sum(sizes), _SAMPLES)), np.cumsum(sizes)[:-1])
+    return model.guards.map(_SAMPLES)(t, 4 * x - 2, 4 * z - 2, p, u, np.floor(2 * d)).full().T
 
 
 def _decides(model: CompiledDae, mode: int, guard: int) -> bool:

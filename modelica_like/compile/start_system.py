@@ -9,9 +9,13 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.flatten.template import column
+from modelica_like.structure.alias import PREFERRED
 from modelica_like.structure.reduce import ReducedDae
+from modelica_like.structure.system import System
 
 _STORED = 0
+_RATES = 2
+"""Levels of a chain whose speed may rest: a position and its speed, below an acceleration."""
 
 
 @dataclass(frozen=True)
@@ -24,12 +28,14 @@ class StartSystem:
         nodes: variables (nodes) at its end.
         rest: variables at rest if not given, in order of priority: node, and the state if it is one.
         rates: positions in (x, y) of derivatives of others, which are all zero at rest.
+        guesses: numbers of the guessed start values of variables that may be at rest, in the same order.
     """
 
     function: ca.Function
     nodes: tuple[int, ...]
     rest: tuple[tuple[int, int | None], ...] = ()
     rates: tuple[int, ...] = ()
+    guesses: tuple[int, ...] = ()
 
 
 def start_system(reduced: ReducedDae, rest: bool) -> StartSystem:
@@ -57,7 +63,18 @@ def start_system(reduced: ReducedDae, rest: bool) -> StartSystem:
     results = [y, ca.jacobian(values, unknowns), values]
     names = ["t", "x", "y", "z", "p", "u", "d"]
     function = ca.Function("start_system", arguments, results, names, ["variables", "jacobian", "values"])
-    return StartSystem(function, nodes, order, _rates(reduced, [level for level, _ in needed]) if rest else ())
+    rates = _rates(reduced, [level for level, _ in needed]) if rest else ()
+    return StartSystem(function, nodes, order, rates, _guesses(reduced, [node for node, _ in order]))
+
+
+def _guesses(reduced: ReducedDae, resting: list[int]) -> tuple[int, ...]:
+    """Numbers of the guesses of variables at rest; of equal variables, the first by name comes first."""
+    placed, guessed = reduced.system.node_level, dict[int, list[tuple[str, int]]]()
+    for k, one in enumerate(reduced.flat.starts):
+        if one.strength == "guess" and (place := placed[one.node]) is not None:
+            guessed.setdefault(place[0], []).append((reduced.flat.node_name(one.node), k))
+    levels = [place[0] for node in resting if (place := placed[node]) is not None]
+    return tuple(k for level in levels for _, k in sorted(guessed.get(level, ())))
 
 
 def _rates(reduced: ReducedDae, needed: list[int]) -> tuple[int, ...]:
@@ -70,12 +87,14 @@ def _rates(reduced: ReducedDae, needed: list[int]) -> tuple[int, ...]:
 def rest_order(reduced: ReducedDae) -> list[int]:
     """Undetermined variables (nodes) that are zero at rest, in an order that does not depend on the order of lines.
 
-    Variables that store energy come first: speeds of inertias and masses before currents, pressures and twists of
-    springs. Relative speeds follow, then positions. Equal variables count as one; among equal ranks the first
-    by name counts.
+    Relative speeds of springs come first: what is coupled elastically turns with a part that is given a speed. Then
+    variables that store energy: speeds of inertias and masses before currents, pressures and twists of springs. Other
+    relative speeds, those of clutches and dampers, come next, then positions. Equal variables count as one; among
+    equal ranks the first by name counts.
     """
     system = reduced.system
     stores = {placed[0] for node in _storing(reduced) if (placed := system.node_level[node]) is not None}
+    springs = _spring_rates(reduced) - stores
     first: dict[int, tuple[str, int]] = {}
     for node, placed in enumerate(system.node_level):
         if placed is not None and (placed[0] in stores or system.derivative(placed[0]) is not None):
@@ -88,9 +107,43 @@ def rest_order(reduced: ReducedDae) -> list[int]:
         relative = -one.preference if one.order == 0 else one.preference
         # A state is free to be zero; another position may be a way that no angle leads to.
         follows = one.order == 0 and reduced.node_states[first[level][1]] is None
-        return level not in stores, one.order == 0, relative, follows, first[level][0]
+        return level not in springs, level not in stores, one.order == 0, relative, follows, first[level][0]
 
     return [first[level][1] for level in sorted(first, key=rank) if level not in system.inputs]
+
+
+def _spring_rates(reduced: ReducedDae) -> set[int]:
+    """Rates of relative positions that a force follows in every mode: those of springs.
+
+    A gap couples nothing before it closes: its force follows the position in some modes only. The angle of a clutch
+    or damper occurs in kinematic equations, and perhaps in an output, by which nothing moves.
+    """
+    system, model = reduced.system, reduced.flat
+    wanted = [one.preference >= PREFERRED for one in system.levels]
+    relative = [chain for chain in system.chains if len(chain) > _RATES and any(wanted[level] for level in chain[:2])]
+    bases = system.column(chain[0] for chain in relative)
+    slopes = ca.jacobian(system.residual, bases)
+    by_mode = {*ca.jacobian_sparsity(ca.vertcat(ca.SX(0, 1), *slopes.nonzeros()), model.d).row()}
+    forces = _force_rows(system)
+    read = {column for k, (row, column) in enumerate(_entries(slopes.sparsity())) if row in forces and k not in by_mode}
+    states, moving = (
+        {column for _, column in _entries(ca.jacobian_sparsity(one, bases))}
+        for one in (reduced.x, ca.vertcat(reduced.ode, reduced.alg))
+    )
+    return {relative[k][1] for k in read - (states - moving)}
+
+
+def _force_rows(system: System) -> set[int]:
+    """Equations with an unknown that has no derivatives and is no place of a connector: not kinematic ones."""
+    kinds, nodes = system.model.variables, zip(system.model.nodes, system.node_level, strict=True)
+    places = {placed[0] for (k, _), placed in nodes if placed is not None and kinds[k].kind == "potential"}
+    incidence = _entries(ca.jacobian_sparsity(system.residual, system.everything))
+    single = {chain[0] for chain in system.chains if len(chain) == 1} - places
+    return {row for row, level in incidence if level in single}
+
+
+def _entries(pattern: ca.Sparsity) -> list[tuple[int, int]]:
+    return [*zip(*pattern.get_triplet(), strict=True)]
 
 
 def _storing(reduced: ReducedDae) -> list[int]:

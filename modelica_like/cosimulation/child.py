@@ -1,7 +1,7 @@
 """Runs a system of FMUs in a separate process: python child.py FOLDER.
 
-Results are written to the folder as they are computed: before the first step `columns.json`, renamed to `meta.json` at
-the end; `rows`, doubles of the time, the columns, the energies and the counts.
+Results are written to the folder as they are computed: before the first step `columns.json`, and `meta.json` at the
+end; `rows`, doubles of the time, the columns, the energies and the counts.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like.cosimulation.master import Balance, Master, Signal
-from modelica_like.cosimulation.slaves import Slave
+from modelica_like.cosimulation.slaves import Slave, Terminated
 from modelica_like.fmi.inside import Job, Refused, about
 
 
@@ -131,16 +131,19 @@ def run(job: Job) -> None:
     recorder.keep(recorder.look(asked["start"]))
     width = (folder / "rows").stat().st_size // 8
     known = {"units": columns_of(slaves, outputs), "open": open_inputs(slaves, asked), "width": width}
-    columns = job.leave(known, "columns.json")
+    job.leave(known, "columns.json")
     span = asked["start"], asked["until"], asked["step"]
-    if asked["tolerance"] is None:
-        master.run_fixed(*span, recorder)
-    else:
-        master.run_variable(*span, asked["tolerance"], recorder)
-    recorder.close(asked["until"])
+    try:
+        if asked["tolerance"] is None:
+            master.run_fixed(*span, recorder)
+        else:
+            master.run_variable(*span, asked["tolerance"], recorder)
+        recorder.close(asked["until"])
+    except Terminated as end:  # results are those of the communication points before
+        known["ended"] = end.detail
     for slave in slaves:
         slave.close()
-    columns.rename(folder / "meta.json")
+    job.leave(known)
 
 
 def columns_of(slaves: list[Slave], outputs: list[list[str]]) -> list[dict[str, Any]]:

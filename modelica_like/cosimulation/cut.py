@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from modelica_like.errors import NetlistError, Source, UnknownName, did_you_mean
+from modelica_like.errors import ModelicaLikeError, NetlistError, Source, UnknownName, did_you_mean
 from modelica_like.language import Assembly, Connector
 from modelica_like.language.equation import Connection
 from modelica_like.language.expr import Symbol
+
+_TRIED, _SHOWN = 40, 8
+"""Parts that are tried and named for a list of possible cuts."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,7 @@ def cut_netlist(assembly: Assembly, at: Sequence[str]) -> CutNetlist:
         NetlistError: the place cannot be cut, or the cut does not separate the netlist.
     """
     if not at:
-        raise NetlistError(f"{assembly.label}: there is nothing to cut.", advice="Name a shaft, e.g. --at shaft.")
+        raise NetlistError(f"{assembly.label}: it is not said where to cut.", advice=_places(assembly))
     wires = _joined(_wires(assembly))
     cuts: dict[Wire, Cut] = {}
     for name in at:
@@ -70,6 +74,19 @@ def cut_netlist(assembly: Assembly, at: Sequence[str]) -> CutNetlist:
     for cut in found.cuts:
         _check_apart(assembly, found, cut)
     return found
+
+
+def _places(assembly: Assembly) -> str:
+    """Return a sentence with the parts behind which one cut separates the netlist."""
+    places: list[str] = []
+    for name in [*assembly.parts][:_TRIED]:
+        with suppress(ModelicaLikeError):
+            cut_netlist(assembly, [name])
+            places.append(name)
+    if not places:
+        return "No single cut behind a part separates it; --at can be given several times, also for ends of parts."
+    more = ", …" if len(places) > _SHOWN else ""
+    return f"It can be cut at {', '.join(places[:_SHOWN])}{more}, as in --at {places[0]}."
 
 
 def _wires(assembly: Assembly) -> list[Wire]:
@@ -165,7 +182,8 @@ def _nowhere(assembly: Assembly, name: str, connected: Sequence[str]) -> Excepti
     known = [*assembly.parts, *assembly.wires, *connected]
     return UnknownName(
         f"{assembly.label} has no shaft '{name}'{did_you_mean(name, known) or '.'}",
-        advice="Name a part (it is cut behind it), one of its ends (shaft.flange_a), or an entry of [connect].",
+        why="A name is a part (it is cut behind it), one of its ends (shaft.flange_a), or an entry of [connect].",
+        advice=_places(assembly),
     )
 
 

@@ -240,5 +240,4 @@ _FAILURES: failures.Failures = failures.FAILURES | {
         StepFailed, "{system}: after t = {time:.6g} s no step is short enough for the tolerance of the coupling.", "",
         "Give a larger tolerance, or a fixed step.",
     ),
-    "ends": (FmuFailed, "{unit} asks to end the run after t = {time:g} s.", "", ""),
 }  # fmt: skip

@@ -7,11 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import fmi2Discard, fmi2LastSuccessfulTime, fmi2Terminated
 from fmpy.simulation import instantiate_fmu
 
 from modelica_like.fmi.inside import DISCRETE, REAL, Refused, savings
 
 _STORED = {name: name for name in (*REAL, *DISCRETE)} | {"Enumeration": "Integer"}
+
+
+class Terminated(Exception):
+    """An FMU ends the run at a time in s."""
+
+    def __init__(self, unit: str, time: float) -> None:
+        super().__init__(unit, time)
+        self.detail = {"unit": unit, "time": time}
 
 
 class Slave:
@@ -102,12 +112,17 @@ class Slave:
         self._fmu.setRealInputDerivatives(references, [1] * len(names), list(slopes))
 
     def step(self, time: float, size: float) -> None:
-        """Step to time + size."""
+        """Step to time + size, or raise `Terminated`."""
         self.notice()
-        done = self._fmu.doStep(currentCommunicationPoint=time, communicationStepSize=size,
-                                noSetFMUStatePriorToCurrentPoint=not self.can_save)  # fmt: skip
+        try:
+            done = self._fmu.doStep(currentCommunicationPoint=time, communicationStepSize=size,
+                                    noSetFMUStatePriorToCurrentPoint=not self.can_save)  # fmt: skip
+        except FMICallException as refused:
+            if refused.status != fmi2Discard or not self._fmu.getBooleanStatus(fmi2Terminated):
+                raise
+            raise Terminated(self.name, self._fmu.getRealStatus(fmi2LastSuccessfulTime)) from None
         if isinstance(done, tuple) and done[1]:
-            raise Refused(kind="ends", unit=self.name, time=time)
+            raise Terminated(self.name, done[3])
 
     def close(self) -> None:
         """Terminate the FMU."""

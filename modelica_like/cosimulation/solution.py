@@ -13,6 +13,7 @@ from modelica_like.compile.compiled import Vector
 from modelica_like.cosimulation.described import described
 from modelica_like.cosimulation.system import Energies, System
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+from modelica_like.solve.recorder import TERMINATED, Ended
 
 _TOLD = 5
 """Numbers of a bond in a row: power, energies delivered and received, throughput, mismatch."""
@@ -53,6 +54,11 @@ class CosimSolution(RecordedSolution):
         notices: messages about the run: unconnected inputs.
     """
 
+    advice = (
+        "Repeat the run with shorter communication steps until its results no longer change, or simulate the whole "
+        "netlist."
+    )
+
     def __init__(self, system: System, left: Mapping[str, Any], table: Vector, seconds: float) -> None:
         columns = _columns(system, [part["columns"] for part in left["units"]])
         constants = {
@@ -74,6 +80,8 @@ class CosimSolution(RecordedSolution):
             for bond, last in zip(system.bonds, bonds[:, :, -1], strict=True)
         )
         self.notices = tuple(map(_notice, left["open"]))
+        if (end := left.get("ended")) is not None:
+            self._ended = Ended(end["time"], end["unit"], TERMINATED)
         self.shortest, self.longest = map(float, table[-1, -2:])
         self.steps, self.rejected = map(int, table[-1, -4:-2])
 

@@ -1,12 +1,12 @@
 "use strict";
 /* The drive runs in the process that has opened this page; see explorer/server.py. */
 const QUIET = 300; // ms without a change after which sensitivities are asked for
-let requests = 0;
+let running = null;
 
-async function post(what, content) {
+async function post(what, content, signal) {
   const headers = { "X-Token": PAGE.token }, body = JSON.stringify(content);
-  const answer = await fetch(what, { method: "POST", headers, body }).catch(() => {
-    throw new Error("nobody answers. Start `modelica-like explore` again.");
+  const answer = await fetch(what, { method: "POST", headers, body, signal }).catch((error) => {
+    throw signal?.aborted ? error : new Error("nobody answers. Start `modelica-like explore` again.");
   });
   if (!answer.ok || answer.headers.has("X-Refused")) throw new Error(await answer.text());
   return answer;
@@ -16,12 +16,14 @@ async function openDrive() {
   return { simulate };
 }
 
-/* As `Drive.simulate` of wasm.js. */
+/* As `Drive.simulate` of wasm.js. An older run is no longer wanted: the server notices that nobody waits for it. */
 async function simulate(values, references, until, wanted) {
-  requests += 1;
-  const answer = await post("/run", { turn: requests, values, references, until });
-  if (answer.status === 204 || !wanted()) return null;
-  const data = await answer.arrayBuffer(), length = Number(new BigInt64Array(data, 0, 1)[0]);
+  running?.abort();
+  const { signal } = running = new AbortController();
+  const data = await post("/run", { values, references, until }, signal).then((answer) => answer.arrayBuffer())
+    .catch((error) => { if (!signal.aborted) throw error; });
+  if (signal.aborted || !wanted()) return null;
+  const length = Number(new BigInt64Array(data, 0, 1)[0]);
   const { sizes, ...found } = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 8, length)));
   let place = 8 + length;
   for (const [k, name] of ["times", "outputs", "events"].entries()) {

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
+import math
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from modelica_like.simulation import build, simulate
 from modelica_like.solve.options import Options
 
 _MOST_BARS = 12
+_LOOK = 0.05
+"""Seconds between two looks whether a run that waits for another is still wanted."""
 FILES = {"netlist": ".toml", "FMU": ".fmu", "report": ".html"}
 """What can be saved, with the endings."""
 
@@ -42,38 +45,62 @@ class Runs:
         self._instance = Instance(model)
         self.references = {name: one.reference for name, one in self._instance.native.variables.items()}
         self._names = {reference: name for name, reference in self.references.items()}
-        self._newest, self._one_at_a_time = 0, threading.Lock()
+        self._settable = {self.references[one.path] for one in model.flat_parameters if one.tunable}
+        self._settable |= {self.references[model.flat_variables[k].path] for k in model.inputs}
+        self._running, self._analysing = threading.Lock(), threading.Lock()
+
+    def values(self, asked: Mapping[str, Any]) -> list[tuple[int, float]]:
+        """Return the value references of parameters and inputs in a request, with what they are, in SI units.
+
+        Raises:
+            KeyError, TypeError, ValueError: the request is wrong.
+        """
+        return [(_known(reference, self._settable), number(value)) for reference, value in asked["values"]]
+
+    def outputs(self, asked: Mapping[str, Any]) -> list[int]:
+        """Return the value references of the outputs in a request.
+
+        Raises:
+            KeyError, TypeError, ValueError: the request is wrong.
+        """
+        return [_known(reference, self._names) for reference in asked["references"]]
 
     def run(
-        self, turn: int, values: Sequence[tuple[int, float]], references: Sequence[int], until: float
+        self, values: Sequence[tuple[int, float]], references: Sequence[int], until: float, wanted: Callable[[], bool]
     ) -> tuple[dict[str, Any], list[Vector]] | None:
-        """Run the drive.
+        """Run the drive, one run at a time.
 
         Args:
-            turn: number of the request; a run that is not the newest one stops.
             values: value references of parameters and inputs, with what they are, in SI units.
             references: value references of the requested outputs.
             until: end time in s.
+            wanted: tells whether the run is still wanted.
 
         Returns:
-            Counts and a message if the run did not finish; times, outputs and events as rows. None: a newer run is
-            requested.
+            Counts and a message if the run did not finish; times, outputs and events as rows. None: it is not wanted.
         """
-        self._newest = max(turn, self._newest)
-        with self._one_at_a_time:
-            if turn < self._newest:
+        while not self._running.acquire(timeout=_LOOK):
+            if not wanted():
                 return None
-            instance, widths = self._instance, {"times": 1, "outputs": len(references), "events": 7}
-            try:
-                self._begin(values, until)
-            except ModelicaLikeError as error:
-                return self._about(self._said(error, values)), [np.zeros(0)] * 3
-            written = Buffers(instance, until, self._options.points, widths, references)
-            code = written.go(lambda _: turn >= self._newest and written.run.n_events <= self._options.max_events)
-            if turn < self._newest:
-                return None
-            message = instance.library.message(instance.address).decode() if code != OK else ""
-            return self._about(message), [written[name] for name in ("times", "outputs", "events")]
+        try:
+            return self._run(values, references, until, wanted)
+        finally:
+            self._running.release()
+
+    def _run(
+        self, values: Sequence[tuple[int, float]], references: Sequence[int], until: float, wanted: Callable[[], bool]
+    ) -> tuple[dict[str, Any], list[Vector]] | None:
+        instance, widths = self._instance, {"times": 1, "outputs": len(references), "events": 7}
+        if not wanted():
+            return None
+        try:
+            self._begin(values, until)
+        except ModelicaLikeError as error:
+            return self._about(self._said(error, values)), [np.zeros(0)] * 3
+        written = Buffers(instance, until, self._options.points, widths, references)
+        code = written.go(lambda _: wanted() and written.run.n_events <= self._options.max_events)
+        message = instance.library.message(instance.address).decode() if code != OK else ""
+        return self._about(message), [written[name] for name in ("times", "outputs", "events")]
 
     def _begin(self, values: Sequence[tuple[int, float]], until: float) -> None:
         instance = self._instance
@@ -115,7 +142,8 @@ class Runs:
             NoGradient, ModelicaLikeError: there are no derivatives.
         """
         given = {self._names[reference]: value for reference, value in values}
-        found = sensitivities(self._model, [output], until=until, parameters=given)
+        with self._analysing:
+            found = sensitivities(self._model, [output], until=until, parameters=given)
         (end,) = found.outputs
         rows = [
             (one.name, relative if end.value else 0.01 * one.value * derivative)
@@ -153,6 +181,18 @@ class Runs:
         return path
 
 
-def pairs(asked: Mapping[str, Any]) -> list[tuple[int, float]]:
-    """Return the values of a request."""
-    return [(int(reference), float(value)) for reference, value in asked["values"]]
+def number(value: Any) -> float:
+    """Return a finite number.
+
+    Raises:
+        TypeError, ValueError: it is none.
+    """
+    if not math.isfinite(value):
+        raise ValueError(f"{value} is not finite")
+    return float(value)
+
+
+def _known(reference: Any, known: Collection[int]) -> int:
+    if not isinstance(reference, int) or reference not in known:
+        raise ValueError(f"there is no reference {reference}")
+    return reference

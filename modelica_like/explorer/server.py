@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import secrets
+import socket
+import sys
+import tempfile
+import threading
+import time
 import webbrowser
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
@@ -17,15 +23,22 @@ import numpy as np
 
 from modelica_like.draw import schematic
 from modelica_like.errors import ModelicaLikeError
-from modelica_like.explorer.runs import FILES, Runs, pairs
+from modelica_like.explorer.runs import FILES, Runs, number
 from modelica_like.language import Assembly
 from modelica_like.native.page import page, page_content
 from modelica_like.netlist import load
 from modelica_like.simulation import build, seconds, simulate
 from modelica_like.solve.plot import for_page
+from modelica_like.writing import write_text
 
 _LARGEST = 1_000_000
 """Bytes of a request."""
+_PATIENCE = 5.0
+"""Seconds for a request to arrive, for its answer to leave, for a free place; on one machine they take milliseconds."""
+_PLACES = 16
+"""Connections at once; a browser opens six for a page."""
+_WRONG = (ArithmeticError, KeyError, RecursionError, TypeError, ValueError)
+"""What a request that is no JSON, or has other content than expected, ends in."""
 
 
 def explore(
@@ -63,6 +76,7 @@ class Explorer(ThreadingHTTPServer):
     """
 
     daemon_threads = True
+    request_queue_size = 64
 
     def __init__(
         self, drive: Assembly | str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
@@ -78,6 +92,7 @@ class Explorer(ThreadingHTTPServer):
             model.name, str(assembly.description), content, Path(__file__).parent / "explore.js", connect="'self'",
             schematic=f'<div id="schematic">{schematic(assembly, background=False)}</div>', more=_BELOW,
         ).encode()  # fmt: skip
+        self._places = threading.BoundedSemaphore(_PLACES)
         super().__init__(("127.0.0.1", 0), _Handler)
         self.address = f"http://{self.host}/?token={self.token}"
 
@@ -87,10 +102,32 @@ class Explorer(ThreadingHTTPServer):
         Args:
             browser: open the page.
         """
-        if browser:
-            webbrowser.open(self.address)
-        with contextlib.suppress(KeyboardInterrupt):
+        with tempfile.TemporaryDirectory(prefix="modelica_like_") as private, contextlib.suppress(KeyboardInterrupt):
+            if browser:
+                # All users of the machine can read the command line of the browser, but not this file.
+                way = Path(private) / "explore.html"
+                write_text(way, f'<meta http-equiv="refresh" content="0;url={self.address}">')
+                webbrowser.open(way.as_uri())
             self.serve_forever()
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer a connection in a thread, if there is a place for it."""
+        if self._places.acquire(timeout=_PATIENCE):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Answer a connection, and leave its place."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._places.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that has left is no error."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
     @property
     def host(self) -> str:
@@ -105,11 +142,29 @@ _BELOW = f"""
 <table></table></details>"""
 
 
+class _Arriving(socket.SocketIO):
+    """What a connection sends until a time."""
+
+    def __init__(self, connection: socket.socket, end: float) -> None:
+        super().__init__(connection, "r")
+        self._connection, self._end = connection, end
+
+    def readinto(self, b: Any) -> int | None:
+        self._connection.settimeout(max(self._end - time.monotonic(), 1e-3))
+        return super().readinto(b)
+
+
 class _Handler(BaseHTTPRequestHandler):
+    """Answers one request, and closes the connection, so that none waits for a next one in a place."""
+
     server: Explorer  # pyright: ignore[reportIncompatibleVariableOverride]
-    protocol_version = "HTTP/1.1"
+    timeout = _PATIENCE
     disable_nagle_algorithm = True
     _kinds: ClassVar = {"/run": "_run", "/ranking": "_ranking", "/save": "_save"}
+
+    def setup(self) -> None:
+        super().setup()
+        self.rfile = io.BufferedReader(_Arriving(self.connection, time.monotonic() + _PATIENCE))
 
     def do_GET(self) -> None:
         asked = urlsplit(self.path)
@@ -127,15 +182,15 @@ class _Handler(BaseHTTPRequestHandler):
         if self.path not in self._kinds or not size.isdecimal() or int(size) > _LARGEST:
             self._answer(HTTPStatus.NOT_FOUND, b"There is nothing here.")
             return
+        body = self.rfile.read(int(size))
+        self.connection.settimeout(_PATIENCE)
         try:
-            getattr(self, self._kinds[self.path])(json.loads(self.rfile.read(int(size))))
+            getattr(self, self._kinds[self.path])(json.loads(body))
         except ModelicaLikeError as error:
             # Told in the page, with an answer that browsers do not report as a failure.
             told = " ".join(filter(None, (error.what, error.why, error.advice)))
             self._answer(HTTPStatus.OK, told.encode(), refused=True)
-        except OSError as error:
-            self._answer(HTTPStatus.OK, str(error).encode(), refused=True)
-        except (KeyError, TypeError, ValueError) as error:
+        except _WRONG as error:
             self._answer(HTTPStatus.BAD_REQUEST, f"The request is wrong: {error!r}.".encode())
 
     def _known(self, token: str) -> bool:
@@ -143,15 +198,25 @@ class _Handler(BaseHTTPRequestHandler):
         right = secrets.compare_digest(token.encode(), self.server.token.encode())
         if right and self.headers.get("Host") == self.server.host:
             return True
-        self.close_connection = True
         self._answer(HTTPStatus.FORBIDDEN, b"Open the address that the command has printed.")
         return False
 
+    def _waits(self) -> bool:
+        """Tell whether the browser still waits: a page that wants another run closes the connection."""
+        self.connection.setblocking(False)
+        try:
+            return self.connection.recv(1, socket.MSG_PEEK) != b""
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+        finally:
+            self.connection.settimeout(_PATIENCE)
+
     def _run(self, asked: Mapping[str, Any]) -> None:
-        references = [int(one) for one in asked["references"]]
-        found = self.server.runs.run(int(asked["turn"]), pairs(asked), references, float(asked["until"]))
+        runs = self.server.runs
+        found = runs.run(runs.values(asked), runs.outputs(asked), number(asked["until"]), self._waits)
         if found is None:
-            self._answer(HTTPStatus.NO_CONTENT, b"")
             return
         about, arrays = found
         head = json.dumps(about | {"sizes": [one.size for one in arrays]}).encode()
@@ -160,12 +225,16 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(HTTPStatus.OK, b"".join((parts[0].tobytes(), head, *(one.tobytes() for one in parts[1:]))))
 
     def _ranking(self, asked: Mapping[str, Any]) -> None:
-        rows = self.server.runs.ranking(pairs(asked), float(asked["until"]), str(asked["output"]))
+        rows = self.server.runs.ranking(self.server.runs.values(asked), number(asked["until"]), str(asked["output"]))
         self._answer(HTTPStatus.OK, json.dumps(rows).encode(), "application/json")
 
     def _save(self, asked: Mapping[str, Any]) -> None:
-        path = self.server.runs.save(str(asked["what"]), pairs(asked), float(asked["until"]), self.server.folder)
-        self._answer(HTTPStatus.OK, str(path).encode())
+        runs, what, until = self.server.runs, str(asked["what"]), number(asked["until"])
+        try:
+            said, refused = str(runs.save(what, runs.values(asked), until, self.server.folder)), False
+        except OSError as error:
+            said, refused = str(error), True
+        self._answer(HTTPStatus.OK, said.encode(), refused=refused)
 
     def _answer(
         self, code: HTTPStatus, body: bytes, kind: str = "application/octet-stream", *, refused: bool = False
@@ -174,6 +243,7 @@ class _Handler(BaseHTTPRequestHandler):
         for name, value in (
             ("Content-Type", kind), ("Content-Length", str(len(body))), ("Cache-Control", "no-store"),
             ("X-Content-Type-Options", "nosniff"), ("Referrer-Policy", "no-referrer"),
+            ("Content-Security-Policy", "frame-ancestors 'none'"),
             *([("X-Refused", "yes")] if refused else []),
         ):  # fmt: skip
             self.send_header(name, value)

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, UnitMismatch, raise_together_or_one
+from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, Source, UnitMismatch, raise_together_or_one
 from modelica_like.flatten.dimensions import Dimensions, check_equation, check_expression
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
@@ -39,16 +39,15 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
     Args:
         component: of the class to check.
         equations: its own.
-        joined: own signals in its connections; an output there has its equation.
+        joined: own signals and connectors in its connections, which give outputs and flows their equations.
 
     Raises:
         ComponentUnbalanced: it does not.
     """
     own = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
     unknowns = [n for n in own if n not in joined]
-    if not component.parts:
-        used = {name: connector for name, connector in component.connectors.items() if connector.used}
-        unknowns += [f"{name}.{n}" for name, one in used.items() for n, f in one.quantities.items() if f.is_flow]
+    used = {name: one for name, one in component.connectors.items() if one.used and name not in joined}
+    unknowns += [f"{name}.{n}" for name, one in used.items() for n, f in one.quantities.items() if f.is_flow]
     if len(equations) == len(unknowns):
         return
     kind = type(component).__name__
@@ -110,11 +109,15 @@ def check_units(
             if str(error) not in map(str, errors):  # both directions of a relation have the same one
                 errors.append(error)
 
+    wrong: set[Source] = set()
     for equation in equations:
+        before = len(errors)
         attempt(_infer, component, equation, dimensions, inferred)
         attempt(check_equation, equation.left, equation.right, dimensions, kind, equation.source)
+        if len(errors) > before:
+            wrong.add(equation.source)
     for event in events:
-        if event.when is not None:
+        if event.when is not None and event.source not in wrong:  # its steps are told with the equation
             attempt(check_expression, event.when, ONE, dimensions, f"{kind}, condition", event.source)
         if getattr(event, "at", None) is not None:
             attempt(check_expression, event.at, _SECOND, dimensions, f"{kind}, time of an event", event.source)

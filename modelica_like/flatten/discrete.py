@@ -9,9 +9,10 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError, Source, did_you_mean
+from modelica_like.flatten.steps import with_events
 from modelica_like.language.component import Component
 from modelica_like.language.delay import Part, parts
-from modelica_like.language.discrete import INITIAL, Assertion, Marker, Pre, When, edge, eventful, is_a, moves
+from modelica_like.language.discrete import INITIAL, Assertion, Ending, Marker, Pre, When, edge, eventful, is_a, moves
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, Expr, Symbol, is_expression, symbols_in
 from modelica_like.language.fields import Discrete, Input, Variable
@@ -118,7 +119,7 @@ class DiscreteEquations:
         found: dict[int, tuple[Symbol, Any, Any]] = {}
         for active, values in reversed(one.branches):
             for key, value in values.items():
-                target = _target(key)
+                target = key if isinstance(key, Ending) else _target(key)
                 if target is None:
                     what = f"{self._kind}: a `when` gives {key} a value, which is neither a variable nor discrete."
                     raise LanguageError(what, where=one.source, advice="Name variables, as in {self.n: pre(self.n)}.")
@@ -126,6 +127,9 @@ class DiscreteEquations:
                 flag: Any = active
                 chosen = ca.SX(value) if id(target) not in found else ca.if_else(flag, ca.SX(value), later)
                 found[id(target)] = target, ca.logic_or(flag, before), chosen
+        for target, *_ in reversed(found.values()):
+            if isinstance(target, Ending):
+                self._write_ending(target, one.source)
         return [Update(*parts, one.source, at_start=False) for parts in found.values()]
 
     def check_determined(self, used: Iterable[str]) -> None:
@@ -174,7 +178,7 @@ class DiscreteEquations:
             expression, source = pending.pop(0)
             for symbol in symbols_in(expression) if is_expression(expression) else ():
                 one = symbol.of if isinstance(symbol, Pre) else symbol
-                if not isinstance(one, Marker) or id(one) in seen:
+                if not isinstance(one, Marker) or isinstance(one, Ending) or id(one) in seen:
                     continue
                 if isinstance(one, Part):
                     seen.update(map(id, parts(one.whole)))
@@ -206,6 +210,7 @@ class DiscreteEquations:
 
     def _write_delay(self, one: Marker, source: Source) -> list[Located]:
         """Name the numbers of a delay; return further expressions. Before the start, it is the value at the start."""
+        one.of = with_events(one.of)
         self.delays.append((one, source))
         for k, part in enumerate(parts(one)):
             part.name = f"delay[{len(self.delays)}][{k}]"
@@ -232,11 +237,27 @@ class DiscreteEquations:
         ]
         self.updates.append(Update(one, INITIAL, ca.floor(value), source, at_start=True))
 
-    def _write_assertion(self, one: Assertion, path: str) -> None:
-        for name in NAME_IN_NOTICE.findall(one.text):
+    def _check_text(self, text: str, what: str, source: Source) -> None:
+        for name in NAME_IN_NOTICE.findall(text):
             if name not in self._component.fields:
-                what = f"{self._kind}: the text of an assertion names {name}, which is not declared"
-                raise LanguageError(f"{what}{did_you_mean(name, self._component.fields) or '.'}", where=one.source)
+                what = f"{self._kind}: the text of {what} names {name}, which is not declared"
+                raise LanguageError(f"{what}{did_you_mean(name, self._component.fields) or '.'}", where=source)
+
+    def _write_ending(self, one: Ending, source: Source) -> None:
+        """Declare the mode that ends the run where a `when` has set the ending: the instant is completed before."""
+        self._check_text(one.text, "terminate(…)", source)
+        path = f"terminate[{sum(one.path.startswith('terminate[') for one in self.hidden) + 1}]"
+        one.name = f"reached {path}"
+        self.hidden.append(Hidden(one.name, "whether the run ends"))
+        symbol = Marker("ending", one.of)
+        symbol.name = path
+        self._kept += [one, symbol]
+        mode = self._mode(path, one.text, symbol, ("runs", "ended"))
+        go = mode.go("runs", "ended", when=cast(Expr, cast(Any, one) > 0), notice=one.text)
+        self.events.append(replace(go, source=source, ends=True))
+
+    def _write_assertion(self, one: Assertion, path: str) -> None:
+        self._check_text(one.text, "an assertion", one.source)
         symbol = Marker("relation", one.condition)
         symbol.name = path
         self._kept.append(symbol)

@@ -34,7 +34,7 @@ from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, Declared
-from modelica_like.language.discrete import INITIAL, TERMINAL
+from modelica_like.language.discrete import HOMOTOPY, INITIAL, TERMINAL
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
 from modelica_like.units import ONE, coherent
@@ -57,6 +57,14 @@ def flatten(root: Component, *, open_inputs: bool = False, disturbed: str = "") 
         CyclicAssembly: parameters depend on each other cyclically.
     """
     return _Flattener(root, open_inputs, disturbed).run()
+
+
+_OF_ALL = {
+    INITIAL.name: ("whether a run begins", 1.0),
+    TERMINAL.name: ("whether a run ends", 0.0),
+    HOMOTOPY.name: ("share of the actual expressions", 1.0),
+}
+"""Discrete values of the whole model: description and start."""
 
 
 class _Flattener:
@@ -146,7 +154,8 @@ class _Flattener:
         for name, mode in ((n, m) for n, m in component.modes.items() if (id(component), n) in used):
             self.discrete_of[id(component), name] = len(self.discretes)
             start = mode.number(component.start_mode(name))
-            self.discretes.append(FlatDiscrete(prefix + name, ONE, mode.description, start, mode.names))
+            one = FlatDiscrete(prefix + name, ONE, mode.description, start, mode.names, hysteresis=mode.hysteresis)
+            self.discretes.append(one)
         for end, connector in component.connectors.items():
             if connector.used:
                 for name, field in connector.quantities.items():
@@ -199,8 +208,8 @@ class _Flattener:
         return self.discrete_of[owner, name]
 
     def _discrete(self, component: Component, path: str) -> int:
-        """Return the position of a mode, a discrete value, a `pre`, or `initial()`."""
-        key = (id(None), path) if path in (INITIAL.name, TERMINAL.name) else self._owner(component, _plain(path))
+        """Return the position of a mode, a discrete value, a `pre`, or one of the whole model."""
+        key = (id(None), path) if path in _OF_ALL else self._owner(component, _plain(path))
         if path != _plain(path):
             of = self.discrete_of[key]
             key = key[0], f"pre({key[1]})"
@@ -208,9 +217,9 @@ class _Flattener:
                 flat = self.discretes[of]
                 self.pres[self._hide(*key, f"pre({flat.path})", Hidden("", ""), flat.start)] = of
         elif key not in self.discrete_of:
-            begins = path == INITIAL.name
-            here = self._hide(*key, path, Hidden("", f"whether a run {'begins' if begins else 'ends'}"), float(begins))
-            self.pres |= {here: here} if begins else {}
+            about, start = _OF_ALL[path]
+            here = self._hide(*key, path, Hidden("", about), start)
+            self.pres |= {here: here} if path == INITIAL.name else {}
         return self.discrete_of[key]
 
     # -- instances ---------------------------------------------------------------------------------------------------

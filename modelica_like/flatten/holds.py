@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import casadi as ca
-import numpy as np
 
 from modelica_like.errors import LanguageError
+from modelica_like.flatten.generic import spread
 from modelica_like.language.component import Component
 from modelica_like.language.expr import Symbol, flagged_motion, symbol_of, symbols_in
 from modelica_like.language.fields import Variable
@@ -180,8 +180,9 @@ def _is_variable(symbol: Symbol) -> bool:
 
 def _number(expression: Any) -> float:
     """Value of an expression at a generic point, without prescribed motions."""
-    symbols, chance = symbols_in(expression), np.random.default_rng(1)
-    values = [0.0 if flagged_motion(s.name) else _generic(s, chance.uniform()) for s in symbols]
+    symbols = symbols_in(expression)
+    points = zip(symbols, spread(0.0, 1.0, len(symbols)), strict=True)
+    values = [0.0 if flagged_motion(symbol.name) else _generic(symbol, value) for symbol, value in points]
     return float(ca.Function("value", [ca.SX(ca.vertcat(*symbols))], [expression])(values))
 
 

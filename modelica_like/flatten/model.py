@@ -69,6 +69,7 @@ class FlatParameter:
 class FlatDiscrete:
     """A mode (with `names`) or a discrete value (without); `start` is a number or an expression of parameters.
 
+    `hysteresis` is that of its `Mode`.
     `kind` is number, boolean or integer; a hidden one belongs to a relation or an edge, and no user has declared it.
     """
 
@@ -79,6 +80,7 @@ class FlatDiscrete:
     names: tuple[str, ...] = ()
     kind: str = "number"
     hidden: bool = False
+    hysteresis: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -143,7 +143,7 @@ class Parameters:
         field = owner.fields.get(name)
         if not isinstance(field, Parameter | Input):
             known = [key for key, one in owner.fields.items() if isinstance(one, Parameter)]
-            raise unknown("parameter", f"{label}: {owner.label}", path, known)
+            raise unknown("parameter", f"{label}: {owner.label}", path, known, {path: owner.renamed.get(name, "")})
         found = self._q[self.position(owner, name)]
         # A constant has a unit, too.
         return self._constant(path, float(found), unit_of_field(owner, name)) if found.is_constant() else found

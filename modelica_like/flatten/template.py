@@ -14,11 +14,12 @@ from modelica_like.flatten.conditions import guard_of
 from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, between_events, is_discrete
 from modelica_like.flatten.holds import HoldForm, IdealForm, hold_forms, ideal_forms, starts_at_rest
 from modelica_like.flatten.reasons import reason
+from modelica_like.flatten.steps import honest, with_events
 from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.delay import parts
-from modelica_like.language.discrete import INITIAL, TERMINAL, Marker, Pre
+from modelica_like.language.discrete import HOMOTOPY, INITIAL, TERMINAL, Marker, Pre
 from modelica_like.language.equation import Connection, Equation, FreeEnd, as_equation, as_statement
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, symbol_of, symbols_in
 from modelica_like.language.fields import Parameter, Variable
@@ -71,6 +72,7 @@ class TransitionForm(Generic[ModeT, ResetT]):
         notice: message for the user.
         because: why it happens, in words; names of parameters in braces stand for name and value.
         fails: whether the run ends there, with an error.
+        ends: whether the run ends there regularly, with the notice as the reason.
     """
 
     mode: ModeT
@@ -83,6 +85,7 @@ class TransitionForm(Generic[ModeT, ResetT]):
     notice: str
     because: str
     fails: bool
+    ends: bool = False
 
 
 ClassTransition = TransitionForm[str, tuple[str, int]]
@@ -193,7 +196,7 @@ def path_of(symbol: Symbol, root: Component) -> str:
     """Return the path of a symbol, seen from a component: `n`, `clutch.n`, `pre(n)`, `relation[1]`, `time`."""
     if isinstance(symbol, Pre):
         return f"pre({path_of(symbol.of, root)})"
-    global_one = isinstance(symbol, Marker) or any(symbol is one for one in (TIME, INITIAL, TERMINAL))
+    global_one = isinstance(symbol, Marker) or any(symbol is one for one in (TIME, INITIAL, TERMINAL, HOMOTOPY))
     return symbol.name if global_one else relative_path(symbol.owner, root, symbol.name)
 
 
@@ -232,9 +235,9 @@ def _build(component: Component) -> Template:
     equations, determined, initial, wiring = _statements(component)
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
-    residuals = [between_events(e.left - e.right) for e in equations]
+    residuals = [with_events(between_events(e.left - e.right)) for e in equations]
     sources = tuple(e.source for e in (*equations, *initial))
-    residuals += [one - (e.left - e.right) for one, e in zip(starts, initial, strict=True)]
+    residuals += [honest(one - (e.left - e.right)) for one, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
     others = [*zip(residuals, sources, strict=True), *((term, NOWHERE) for term in energy_terms)]
@@ -348,7 +351,7 @@ class _Changes:
             resets = tuple((path, position + k) for k, path in enumerate(paths))
             position += len(paths)
             numbers, target = tuple(t.mode.mode.number(name) for name in t.sources), t.mode.mode.number(t.target)
-            words = t.source, t.notice, reason(t, self._path), t.fails
+            words = t.source, t.notice, reason(t, self._path), t.fails, t.ends
             forms.append(TransitionForm(self._mode(t), numbers, target, t.at is not None, index, resets, *words))
         return tuple(forms)
 

@@ -163,10 +163,11 @@ def _givers(scope: Component, ends: Iterable[Connector | Symbol]) -> list[Symbol
 
 
 def taken(scope: Component, connection: Connection) -> list[str]:
-    """Return the own signals that a connection determines."""
+    """Return the own signals that a connection determines, and the own connectors in it."""
+    connectors = [one._name for one in connection.ends if isinstance(one, Connector) and one._owner is scope]
     givers = [id(one) for one in _givers(scope, connection.ends)]
     own = [one for one in connection.ends if isinstance(one, Symbol) and one.owner is scope]
-    return [one.name for one in own if id(one) not in givers]
+    return connectors + [one.name for one in own if id(one) not in givers]
 
 
 def _name(end: Connector | Symbol) -> str:
@@ -181,5 +182,17 @@ def _different_kinds(first: Connector, second: Connector, source: Source) -> Wro
     article = "an" if first_one.startswith(tuple("AEIOU")) else "a"
     return WrongConnection(
         f"connect({first.label}, {second.label}): {article} {first_one} cannot join a {second_one}. {between}",
-        where=source,
-    )
+        where=source, advice=_fitting(first, second),
+    )  # fmt: skip
+
+
+def _fitting(first: Connector, second: Connector) -> str:
+    """Return the connection that is meant where a part has one other end of the kind."""
+    for end, other in ((first, second), (second, first)):
+        owner = other._owner
+        own = owner.connectors.values() if isinstance(owner, Component) else ()
+        ends = [one for one in own if type(one) is type(end) and not one.optional]
+        if len(ends) == 1:
+            meant = [end.label, ends[0].label] if end is first else [ends[0].label, end.label]
+            return f'To join them, write in [connect]: joint = ["{meant[0]}", "{meant[1]}"]'
+    return ""

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Collection
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import fmpy
 import numpy as np
@@ -20,6 +20,8 @@ KINDS = {"me": "ModelExchange", "cs": "CoSimulation"}
 POINTS = 500
 """Default number of equal intervals, as in simulations."""
 _TIME_RESOLUTION = 1e-12
+_OF_STEP = 4
+"""Results of a step of FMI 3.0; the last one is its time."""
 
 
 class EventLocator:
@@ -85,6 +87,36 @@ class EventLocator:
             row = self._probe(high)
             self._recorder.rows.append(row)
             self.begin(time)
+
+
+class Ending:
+    """Sees whether an FMU ends the run, behind the functions by which it says so; it has a last row then.
+
+    Attributes:
+        seen: whether it does.
+        recorder: of the run, once a step is done.
+        time: of the end in s, where a step of FMI 3.0 tells it: FMPy may take the end of that step.
+    """
+
+    def __init__(self, fmu: Any, kind: str) -> None:
+        self.seen, self.recorder, self._kind = False, cast("Recorder | None", None), kind
+        self.time: float | None = None
+        for name in ("doStep", "getBooleanStatus", "newDiscreteStates", "updateDiscreteStates"):
+            if hasattr(fmu, name):
+                setattr(fmu, name, self._watched(getattr(fmu, name)))
+
+    def _watched(self, call: Callable[..., Any]) -> Callable[..., Any]:
+        def watched(*given: Any, **named: Any) -> Any:
+            done = call(*given, **named)
+            if done[1] if isinstance(done, tuple) else done:
+                self.seen = True
+                if isinstance(done, tuple) and len(done) == _OF_STEP:
+                    self.time = done[-1]
+                if self._kind == "me" and self.recorder is not None:  # FMPy leaves out what the event has done
+                    self.recorder.sample(self.recorder.rows[-1][0], force=True)
+            return done
+
+        return watched
 
 
 def choose_kind(description: Any, kind: str | None) -> str:
@@ -255,12 +287,13 @@ def can_locate(description: Any, kind: str) -> bool:
     return bool(able) and not getattr(cs, "hasEventMode", False)
 
 
-def watcher(job: Job, description: Any, kind: str) -> Callable[[float, Recorder], bool]:
+def watcher(job: Job, description: Any, kind: str, ending: Ending) -> Callable[[float, Recorder], bool]:
     """Return the callback after every step: report the time, locate mode changes."""
     locators: list[EventLocator] = []
 
     def after_step(time: float, recorder: Recorder) -> bool:
         job.reach(time)
+        ending.recorder = recorder
         if can_locate(description, kind):
             if not locators:
                 locators.append(EventLocator(recorder, description.fmiVersion))
@@ -281,13 +314,34 @@ def run(job: Job) -> None:
     check_names(asked, {name: v.causality or "local" for name, v in known.items()}, arrays)
     take_arrays(asked["parameters"], arrays)
     outputs = asked["outputs"] or [name for name, v in known.items() if v.causality != "parameter"]
-    np.save(job.folder / "result.npy", np.asarray(simulate(job, description, kind, outputs)))
+    instance = _instance(job, description, kind)
+    ending = Ending(instance, kind)
+    table = np.asarray(simulate(job, description, kind, outputs, instance, ending))
+    if ending.time is not None:
+        table["time"][-1] = ending.time
+    np.save(job.folder / "result.npy", table)
     parameters = {name: v.start for name, v in known.items() if v.causality == "parameter"}
     constants = {name: start for name, start in parameters.items() if start not in (None, "true", "false")}
-    job.leave({"name": description.modelName, "variables": [*map(about, known.values())], "constants": constants})
+    variables = [*map(about, known.values())]
+    job.leave({"name": description.modelName, "variables": variables, "constants": constants, "ended": ending.seen})
+    instance.freeInstance()  # after all else: it may crash there
 
 
-def simulate(job: Job, description: Any, kind: str, outputs: list[str]) -> Any:
+def _instance(job: Job, description: Any, kind: str) -> Any:
+    event_mode, make = _has_event_mode(description), cast("Any", fmpy.instantiate_fmu)
+    return make(
+        str(job.folder / "0"), description, KINDS[kind], logger=job.hear, early_return_allowed=event_mode,
+        event_mode_used=event_mode, require_functions=False,
+    )  # fmt: skip
+
+
+def _has_event_mode(description: Any) -> bool:
+    return bool(getattr(description.coSimulation, "hasEventMode", False))
+
+
+def simulate(
+    job: Job, description: Any, kind: str, outputs: list[str], instance: Any, ending: Ending
+) -> Any:  # fmt: skip
     """Run the FMU by FMPy; return its table."""
     asked, fmu = job.asked, str(job.folder / "0")
     experiment = description.defaultExperiment
@@ -295,12 +349,7 @@ def simulate(job: Job, description: Any, kind: str, outputs: list[str]) -> Any:
     stop = float(stop) if stop is not None else asked["start"] + 1.0
     step = output_step(asked, stop, getattr(experiment, "stepSize", None))
     inputs = {n: np.array(v if isinstance(v, list) else [[0.0, v]]) for n, v in asked["inputs"].items()}
-    event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
-    make: Any = fmpy.instantiate_fmu
-    instance = make(
-        fmu, description, KINDS[kind], logger=job.hear, early_return_allowed=event_mode,
-        event_mode_used=event_mode, require_functions=False,
-    )  # fmt: skip
+    event_mode = _has_event_mode(description)
     if any(np.ptp(series[:, 1]) for series in inputs.values()):
         Ramps(instance, description, inputs, kind, asked["start"])
     go: Any = fmpy.simulate_fmu
@@ -310,7 +359,7 @@ def simulate(job: Job, description: Any, kind: str, outputs: list[str]) -> Any:
         step_size=step if asked["solver"] == "Euler" else None, output_interval=step,
         start_values=asked["parameters"], input=input_table(inputs), output=outputs,
         use_event_mode=event_mode, early_return_allowed=event_mode, fmu_instance=instance,
-        step_finished=watcher(job, description, kind),
+        step_finished=watcher(job, description, kind, ending),
     )  # fmt: skip
 
 

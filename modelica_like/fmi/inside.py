@@ -23,6 +23,9 @@ DISCRETE = ("Integer", "Enumeration", "Boolean", *WHOLE)
 PLACE = struct.Struct("dq")
 """What `progress` holds."""
 _MESSAGES = 20
+MEMORY = "MODELICA_LIKE_FMU_MEMORY"
+"""Environment variable with the most memory that the process may take, in MB."""
+_MEMORY = 8000
 
 
 class Refused(Exception):
@@ -44,6 +47,7 @@ class Job:
 
     def __init__(self, folder: Path) -> None:
         threading.Thread(target=_end_with_parent, daemon=True).start()
+        _limit_memory()
         self.folder = folder
         self.messages: dict[str, list[str]] = {}
         self.unit = ""
@@ -81,8 +85,22 @@ class Job:
 
 def _end_with_parent() -> None:
     """End where the process that asked has ended, killed perhaps: then this end of the pipe is closed."""
-    sys.stdin.buffer.read()
+    while os.read(0, 1):  # unbuffered: the lock of a buffer would abort the process at its end
+        pass
     os._exit(1)
+
+
+def most_memory() -> int | None:
+    """Return the most memory that the process may take, in MB; None where the system cannot limit it."""
+    return int(os.environ.get(MEMORY) or _MEMORY) if sys.platform == "linux" else None
+
+
+def _limit_memory() -> None:
+    """Limit what is allocated, not addresses: run-times of other languages reserve hundreds of gigabytes of those."""
+    if (most := most_memory()) is not None:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_DATA, (most * 10**6, resource.RLIM_INFINITY))
 
 
 def savings(fmu: Any, version: str) -> tuple[Any, Any, Any]:

@@ -305,8 +305,8 @@ class _Starts:
         discrete = model.discrete_starts(*arguments, np.zeros(model.discrete_size)).full().ravel()
         self._values = model.start_values(*arguments, discrete).full().ravel()
         self.tables, self.discrete = tables, discrete.tolist()
-        used = {k for k, _, _ in tables.rows}
-        used |= {k for _, k, _ in (*tables.direct, *tables.x_guesses, *tables.z_guesses)}
+        self._rows = {k for k, _, _ in tables.rows}
+        used = self._rows | {k for _, k, _ in (*tables.direct, *tables.x_guesses, *tables.z_guesses)}
         if tables.steady is not None:
             used |= {k for _, k, _ in tables.defaults}
         self._of_variable = {entry.node: k for k, entry in reversed([*enumerate(model.starts)]) if k in used}
@@ -316,6 +316,7 @@ class _Starts:
         number = self._of_variable.get(k)
         if number is None:
             return {"initial": "calculated"}
-        exact = self.model.starts[number].strength != "guess" and self.tables.steady is None
+        exact = number in self._rows or self.model.starts[number].strength != "guess"
+        exact = exact and self.tables.steady is None
         start = float(self._values[number])
         return {"initial": "exact" if exact else "approx", "start": start, "start_entry": number}

@@ -30,7 +30,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
 """Path of the file in an FMU."""
-FORMAT = 6
+FORMAT = 7
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
 _ENTRY = struct.Struct("<4i")
@@ -49,13 +49,13 @@ _START_OF = _record("position start", "factor")
 _START_ROW = _record("start node row")
 _QR = ("colind", "row", "v_colind", "v_row", "r_colind", "r_row", "row_place", "column_order")
 _TAPES = (
-    "rates", "jacobian", "alg", "alg_jacobian", "variables", "guards", "guards_soon", "moments", "resets",
+    "rates", "jacobian", "alg", "alg_jacobian", "variables", "guards", "edges", "guards_soon", "moments", "resets",
     "updates", "start_conditions", "start_values", "discrete_starts", "hold_terms", "determinants", "start_system",
     "start_jacobian", "derived", "delays",
 )  # fmt: skip
 SECTIONS: dict[str, Any] = {
     "settings": _record(
-        "n_d n_y steady rates_depend_on_time implicit_linear terminal ideal rests",
+        "n_d n_y steady rates_depend_on_time implicit_linear terminal ideal n_edges n_slope_edges rests",
         "absolute_to_relative default_tolerance fixed_step",
     ),
     "text": _TEXT,
@@ -66,7 +66,7 @@ SECTIONS: dict[str, Any] = {
     "variables": [("reference", "<u4"), *_record("type kind index start tunable name count")],
     "rising": _record("below above below_name above_name"),
     "transitions": [
-        *_record("mode target"), ("timed", "<i2"), ("fails", "<i2"),
+        *_record("mode target"), ("timed", "<i2"), ("ends", "<i2"),
         *_record("index name notice"), ("sources", "<u8"),
     ],
     "guard_transition": _INTEGER,
@@ -191,6 +191,8 @@ def _contents(
                 *flags,
                 model.discrete_position.get(TERMINAL, -1),
                 model.ideal.first if model.ideal else 0,
+                model.edges.count,
+                model.edges.slopes,
                 int(model.settings.get("on_chattering") == "rest"),
                 ABSOLUTE_TO_RELATIVE,
                 tolerance,
@@ -232,7 +234,8 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
         path = model.flat_discretes[one.mode].path
         texts = (text(path), text(_notice(path, one.notice)))
         sources = sum(1 << source for source in one.sources)
-        transitions.append((one.mode, one.target, int(one.timed), int(one.fails), one.index, *texts, sources))
+        ends = 2 if one.ends else int(one.fails)
+        transitions.append((one.mode, one.target, int(one.timed), ends, one.index, *texts, sources))
         resets += [(_place(model, r), r.value, k, -1, r.factor) for r in one.resets]
     guards = {one.index: k for k, one in enumerate(model.transitions) if not one.timed}
     names = [text(name) for one in model.flat_discretes for name in one.names]

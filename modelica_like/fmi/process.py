@@ -40,7 +40,7 @@ def workplace(job: Mapping[str, Any], fmus: Sequence[Path] = ()) -> Iterator[Pat
         yield folder
 
 
-def run_child(name: str, script: Path, folder: Path, timeout: float, environment: dict[str, str] | None = None) -> None:
+def run_child(name: str, script: Path, folder: Path, timeout: float, environment: dict[str, str] | None = None) -> str:
     """Run a Python script on a workplace and wait for its end.
 
     Args:
@@ -49,6 +49,9 @@ def run_child(name: str, script: Path, folder: Path, timeout: float, environment
         folder: its argument and working directory.
         timeout: time limit in s.
         environment: additional environment variables.
+
+    Returns:
+        How the process ended after it had done its job, if it crashed then; otherwise an empty text.
 
     Raises:
         FmuCrashed: the process ended before the script did.
@@ -65,6 +68,7 @@ def run_child(name: str, script: Path, folder: Path, timeout: float, environment
         )
     if not any((folder / file).exists() for file in ("meta.json", "error.json")):
         raise FmuCrashed(f"{name} {_death(code)}{_reached(folder)}.", why="It ran in a separate process.")
+    return _death(code) if code else ""
 
 
 def _wait(command: Sequence[str], folder: Path, timeout: float, environment: dict[str, str]) -> int | None:

@@ -10,10 +10,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from modelica_like.errors import ValueOutOfRange
+from modelica_like.errors import FmuFailed, ValueOutOfRange
 from modelica_like.fmi.failures import tell_error
 from modelica_like.fmi.process import run_child, workplace
+from modelica_like.runs.results import settled
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+from modelica_like.solve.recorder import TERMINATED, Ended
 
 Kind = Literal["me", "cs"]
 Solver = Literal["CVode", "Euler"]
@@ -26,7 +28,7 @@ def run_fmu(
     path: str | Path, inputs: Mapping[str, Any] | None = None, parameters: Mapping[str, Any] | None = None, *,
     start: float = 0.0, stop: float | None = None, kind: Kind | None = None, tolerance: float | None = None,
     step: float | None = None, points: int | None = None, outputs: Sequence[str] | None = None,
-    timeout: float = TIMEOUT, solver: Solver = "CVode",
+    timeout: float = TIMEOUT, solver: Solver = "CVode", readings: Sequence[str] = (),
 ) -> RecordedSolution:  # fmt: skip
     """Run an FMU of FMI 1.0, 2.0 or 3.0 with FMPy, in a separate process.
 
@@ -52,11 +54,16 @@ def run_fmu(
         outputs: variables to record; by default all that are not parameters.
         timeout: time limit in s.
         solver: of Model Exchange.
+        readings: numbers to read off the run, `max(shaft.tau)`. An FMU tells nothing of the time between its results,
+            so the run is repeated with twice as many, until a number changes by less than 1e-5 of the largest amount
+            twice in a row; `change` of a number is what it was. What is shorter than all these steps can be missed.
 
     Raises:
         FmuRefused: the file is not an FMU, is unsafe to unpack, or lacks what was requested.
-        FmuFailed: the FMU reported an error; FmuCrashed: it crashed its process; FmuTimeout: it did not finish.
+        FmuFailed: the FMU reported an error, or a result is not finite; FmuCrashed: it crashed its process; FmuTimeout:
+            it did not finish.
         UnknownName: it has no such variable.
+        MissingValue: a reading still changes with 100,000 results.
         ValueOutOfRange: an array has another shape, or a time is wrong.
         OSError: the file cannot be read.
     """
@@ -67,13 +74,50 @@ def run_fmu(
         "inputs": {name: _series(name, value) for name, value in (inputs or {}).items()},
     }  # fmt: skip
     _check_times(path.name, start, stop, step, timeout)
+    run = _run(path, job, timeout)
+    if readings:
+        intervals, needed = int(np.count_nonzero(np.diff(run.time))), _needed(run, readings)
+        again = lambda times: _run(path, job | {"points": times * intervals, "outputs": needed}, timeout)  # noqa: E731
+        run.readings = settled(run, again, readings)
+    return run
+
+
+def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:
     begin = time.perf_counter()
     with workplace(job, [path]) as folder:
-        run_child(path.name, _CHILD, folder, timeout)
+        death = run_child(path.name, _CHILD, folder, timeout)
         tell_error(folder, {"": path.name})
         table = np.load(folder / "result.npy", max_header_size=_HEADER)  # names of all columns
         meta = json.loads((folder / "meta.json").read_text())
-    return _solution(meta, table, job["parameters"], time.perf_counter() - begin)
+    run = _solution(meta, table, job["parameters"], time.perf_counter() - begin)
+    if meta["ended"]:
+        run._ended = Ended(float(run.time[-1]), run.model.name, TERMINATED)
+    if death:
+        run.notices = (f"{path.name} {death} while it was freed, after its results were complete.",)
+    _check_finite(path.name, run)
+    return run
+
+
+def _needed(run: RecordedSolution, readings: Sequence[str]) -> list[str]:
+    """Return modes, which tell where values jump, and what readings may name, energies of parts included."""
+    owners = [(one.path, one.path.rpartition(".")[0]) for one in run.model.flat_variables]
+    named = [path for path, owner in owners if any((owner or path) in name for name in readings)]
+    return [*named, *run.model.discrete_position]
+
+
+def _check_finite(name: str, run: RecordedSolution) -> None:
+    """Refuse results that are not finite; the run is on the error."""
+    paths = [one.path for one in run.model.flat_variables]
+    bad = [(int(np.argmin(finite)), path) for path in paths if not (finite := np.isfinite(run[path])).all()]
+    if bad:
+        first, path = min(bad)
+        error = FmuFailed(
+            f"{name}: {path} is not finite at t = {run.time[first]:.6g} s.",
+            why=f"So are others: {', '.join(path for _, path in bad[1:6])}." if bad[1:] else "",
+            advice="The run is on the error, as `run`. If this value does not matter, choose others by `outputs`.",
+        )
+        error.run = run
+        raise error
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.initialize import Point, call, settled_guess, share, start_plan
+from modelica_like.initialize import HOMOTOPY, Point, call, initialize, settled_guess, share, start_plan
 from modelica_like.initialize.plan import is_near, start_name
 from modelica_like.initialize.start import StartProblem
 from modelica_like.initialize.steady import moving_states
@@ -37,7 +37,8 @@ class StartTables:
         wanted: its rows.
         steady: states whose derivatives are zero in the steady start; None for another start.
         guesses: of the states and the implicit unknowns. A steady start that is not found near those of the model
-            begins where the drive settles; then other guesses and defaults do not count.
+            begins where the drive settles, one with `homotopy` at its solution; then other guesses and defaults do not
+            count.
     """
 
     direct: tuple[tuple[int, int, float], ...]
@@ -65,6 +66,8 @@ def start_tables(model: CompiledDae) -> StartTables:
     share(model, point)
     kind = model.settings.get("start", "given")
     settled = settled_guess(model, point) if kind == "steady" else None
+    if HOMOTOPY in model.discrete_position:
+        settled = initialize(model, start=kind)
     StartProblem(model, point).fix(point)
     plan = start_plan(model, kind, point)
     own = plan.system.function.size1_out(0) + len(model.implicit)

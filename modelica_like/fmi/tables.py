@@ -107,7 +107,7 @@ def _functions(model: CompiledDae, start: StartTables) -> tuple[dict[str, Any], 
         "alg", "variables", "guards_soon", "moments", "resets", "updates", "start_conditions", "start_values",
         "discrete_starts", "determinants", "hold_terms", "derived", "delays",
     )  # fmt: skip
-    functions |= {name: getattr(model, name) for name in plain}
+    functions |= {name: getattr(model, name) for name in plain} | {"edges": model.edges.function}
     y = ca.SX.sym("y", start.system.size1_out(0))
     order = [y if name == "y" else arguments[name] for name in start.system.name_in()]
     _, start_jacobian, start_values = start.system(*order)

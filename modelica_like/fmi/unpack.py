@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import lzma
 import stat
+import struct
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -14,6 +16,10 @@ import lxml.etree as etree
 from modelica_like.errors import FmuRefused
 
 _ENCRYPTED = 0x1
+_DAMAGED = (
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, RuntimeError, ValueError,
+)  # fmt: skip
+"""What damaged archives end in: places before their beginning (an OSError without a file), unknown methods, names."""
 _LONGEST, _LONGEST_PART = 500, 255
 """Characters of a path inside, bytes of a name: files 1,500 folders deep can be neither created nor removed."""
 
@@ -70,12 +76,14 @@ def unpack(path: Path, target: Path, limits: Limits = LIMITS, kind: Kind = FMU) 
         with zipfile.ZipFile(path) as archive:
             _look_through(path.name, archive.infolist(), limits, kind)
             archive.extractall(target)
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, EOFError) as error:
+    except (IsADirectoryError, NotADirectoryError, FileExistsError):
+        raise FmuRefused(f"{path.name} is refused: a file in it has the name of a folder.") from None
+    except _DAMAGED as error:
+        if isinstance(error, OSError) and error.filename is not None:
+            raise
         raise FmuRefused(
             f"{path.name} is not an {kind.name}: it is not a valid zip archive.", why=_sentence(error)
         ) from None
-    except (IsADirectoryError, NotADirectoryError, FileExistsError):
-        raise FmuRefused(f"{path.name} is refused: a file in it has the name of a folder.") from None
     refuse_document_type(path.name, target / kind.description)
     return target
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import InitializationError, UnknownName, did_you_mean
-from modelica_like.initialize.equilibrium import MODE_ROUNDS, steady_start, unsettled
+from modelica_like.initialize.equilibrium import MODE_ROUNDS, found, steady_start, unsettled
 from modelica_like.initialize.equilibrium import settled_guess as settled_guess
 from modelica_like.initialize.holds import INSTANT as INSTANT
 from modelica_like.initialize.holds import Impact as Impact
@@ -17,7 +17,10 @@ from modelica_like.initialize.holds import holding as holding
 from modelica_like.initialize.holds import rest as rest
 from modelica_like.initialize.holds import share as share
 from modelica_like.initialize.holds import sharing as sharing
+from modelica_like.initialize.homotopy import HOMOTOPY as HOMOTOPY
+from modelica_like.initialize.homotopy import lead
 from modelica_like.initialize.ideal import meet as meet
+from modelica_like.initialize.ideal import refuse_contradiction as refuse_contradiction
 from modelica_like.initialize.modes import chosen_modes as chosen_modes
 from modelica_like.initialize.modes import complete, started
 from modelica_like.initialize.plan import StartKind as StartKind
@@ -65,15 +68,20 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
     point.d = call(model, model.discrete_starts, point)
     share(model, point)
     if start == "steady":
-        return steady_start(model, point)
-    _find_modes(model, point, start)
-    complete(model, point)
-    return point
-
-
-def _find_modes(model: CompiledDae, point: Point, start: StartKind) -> None:
-    """Find states and modes: modes depend on states, and start values may depend on modes."""
+        return lead(model, point, lambda at: steady_start(model, at), lambda at: found(model, at, lambda _: None))
     problem = StartProblem(model, point)
+
+    def solve(at: Point) -> Point:
+        _find_modes(problem, at, start)
+        complete(model, at)
+        return at
+
+    return lead(model, point, solve, solve)
+
+
+def _find_modes(problem: StartProblem, point: Point, start: StartKind) -> None:
+    """Find states and modes: modes depend on states, and start values may depend on modes."""
+    model = problem.model
     old = modes = point.d
     for _ in range(MODE_ROUNDS):
         problem.solve(point, start)

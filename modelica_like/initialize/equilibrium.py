@@ -35,7 +35,7 @@ def steady_start(model: CompiledDae, declared: Point) -> Point:
         if point is None:
             raise
         try:
-            return _found(model, point, StartProblem(model, declared.copy()).fix)
+            return found(model, point, StartProblem(model, declared.copy()).fix)
         except InitializationError:
             raise error from None
 
@@ -64,13 +64,13 @@ def _near_guesses(model: CompiledDae, declared: Point) -> Point:
     modes[free] = declared.d[free]
     point.d = chosen
     try:
-        return _found(model, point.copy(), problem.apply)
+        return found(model, point.copy(), problem.apply)
     except InitializationError as error:
         if np.array_equal(modes, chosen):
             raise
         point.d = modes
         try:
-            return _found(model, point, problem.apply)
+            return found(model, point, problem.apply)
         except InitializationError:
             raise error from None
 
@@ -86,8 +86,17 @@ def _run_down(model: CompiledDae, declared: Point) -> Point | None:
     return point
 
 
-def _found(model: CompiledDae, point: Point, again: Callable[[Point], None]) -> Point:
-    """Find states and modes; `again` gives states their start values before each round."""
+def found(model: CompiledDae, point: Point, again: Callable[[Point], None]) -> Point:
+    """Find states and modes of a steady state.
+
+    Args:
+        model: the compiled model.
+        point: near it.
+        again: gives states their start values before each round.
+
+    Raises:
+        InitializationError: there is none nearby, or the modes do not stay.
+    """
     share(model, point)
     old = modes = point.d
     for _ in range(MODE_ROUNDS):

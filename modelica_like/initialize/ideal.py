@@ -155,6 +155,39 @@ def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool
     return True
 
 
+def refuse_contradiction(model: CompiledDae, point: Point) -> None:
+    """Refuse modes in which an ideal element and the rest of the circuit ask for different voltages or currents.
+
+    Args:
+        model: the compiled model.
+        point: with settled modes.
+
+    Raises:
+        NoValidModes: an element's voltage or current that its mode makes zero is not zero.
+    """
+    network = model.ideal
+    if network is None:
+        return
+    rows = point.d[network.entries].reshape(len(network.elements), network.width)
+    if not rows[:, HEAD - 1].any():
+        return
+    values = call(model, model.variables, point)
+    for k in rows[:, HEAD - 1].nonzero()[0]:
+        element = network.elements[k]
+        node = _zero(element, point.d)
+        if abs(values[node]) > _LOST * largest(model, np.abs(values), node):
+            mode = model.flat_discretes[element.mode].names[int(point.d[element.mode])]
+            unit = str(model.flat_variables[node].unit)
+            current = unit == "A"
+            raise NoValidModes(
+                f"At t = {point.t:.9g} s {element.component} contradicts the rest of the circuit: it is ideal and "
+                f"{mode}, so its {'current' if current else 'voltage'} is zero, but the rest makes it "
+                f"{values[node]:.4g} {unit}.",
+                advice=f"Put a resistance in {'parallel' if current else 'series'} with "
+                f"{element.component}, or take an element that is not ideal (Diode, Switch).",
+            )
+
+
 def _no_valid(
     model: CompiledDae, point: Point, network: IdealNetwork, row: Vector, value: float, node: int
 ) -> NoValidModes:

@@ -11,6 +11,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, StartEntry, StartSystem, Vector
 from modelica_like.errors import MissingStart
+from modelica_like.flatten.generic import spread
 from modelica_like.initialize.point import Point
 from modelica_like.netlist.document import StartKind as StartKind
 from modelica_like.structure.matching import Elimination, Matching
@@ -157,11 +158,10 @@ def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> An
 
     Where the start is from rest, nothing moves there: speeds that are zero do not determine positions.
     """
-    chance = np.random.default_rng(1)
-    moved = point.copy()
-    for part in (moved.x, moved.z):
-        part += 0.1 * (1.0 + np.abs(part)) * chance.uniform(0.5, 1.0, part.shape)
-    y = chance.uniform(0.5, 1.0, system.function.size1_out(0))
+    moved, ends = point.copy(), np.cumsum([len(point.x), len(point.z)])
+    of_x, of_z, y = np.split(spread(0.5, 1.0, ends[-1] + system.function.size1_out(0)), ends)
+    for part, by in ((moved.x, of_x), (moved.z, of_z)):
+        part += 0.1 * (1.0 + np.abs(part)) * by
     for k in system.rates:
         part, place = (moved.x, k) if k < len(moved.x) else (y, k - len(moved.x))
         part[place] = 0.0
@@ -205,7 +205,8 @@ class _Choice:
         rows = [k for k in general if self._accept(self.model.starts[k].node)]
         taken = set(rows)
         dependent = [k for k in general if k not in taken]
-        rows += [k for k in self._defaults() if self._accept(self.model.starts[k].node)]
+        # What nothing else determines starts at its guess rather than at rest.
+        rows += [k for k in (*self.system.guesses, *self._defaults()) if self._accept(self.model.starts[k].node)]
         resting, zero = self._rest()
         if self.choice.size < len(self.columns):
             raise self._missing()

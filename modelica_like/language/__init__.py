@@ -11,12 +11,14 @@ from modelica_like.language.discrete import change as change
 from modelica_like.language.discrete import clock as clock
 from modelica_like.language.discrete import edge as edge
 from modelica_like.language.discrete import hold as hold
+from modelica_like.language.discrete import homotopy as homotopy
 from modelica_like.language.discrete import if_ as if_
 from modelica_like.language.discrete import initial as initial
 from modelica_like.language.discrete import pre as pre
 from modelica_like.language.discrete import previous as previous
 from modelica_like.language.discrete import sample as sample
 from modelica_like.language.discrete import terminal as terminal
+from modelica_like.language.discrete import terminate as terminate
 from modelica_like.language.discrete import when as when
 from modelica_like.language.equation import Equations as Equations
 from modelica_like.language.equation import connect as connect

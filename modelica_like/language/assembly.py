@@ -192,4 +192,4 @@ class Assembly(Component):
         label = f"{owner.label} ({type(owner).__name__})" if owner_path else owner.label
         if name in owner.parts:
             raise unknown("connector", label, name, [f"{name}.{c}" for c in owner.parts[name].connectors])
-        raise unknown("connector", label, name, [*owner.connectors, *signals])
+        raise unknown("connector", label, name, [*owner.connectors, *signals], owner.renamed)

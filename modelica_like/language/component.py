@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
-from modelica_like.language.declared import Connector, Declared, annotated, unknown
+from modelica_like.language.declared import Connector, Declared, annotated, refuse_collection, unknown
 from modelica_like.language.equation import Equations
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
@@ -60,6 +60,9 @@ class Component(Declared):
         cls._class_parts = {name: part for base in ancestors for name, part in base._class_parts.items()} | parts
         cls._replaceable = frozenset(parts.keys() & {*annotations}).union(*(base._replaceable for base in ancestors))
         declared = (Field, Connector, Mode)
+        for name, value in own.items():
+            if type(value) is list and name not in parts and (name in annotations or name not in hints):
+                refuse_collection(f"{cls.__name__}.{name}", cast(object, value))
         plain = {
             n: own.get(n, REQUIRED) for n in annotations if not isinstance(own.get(n), declared) and n not in parts
         }
@@ -157,8 +160,9 @@ class Component(Declared):
                 advice=f"Annotate the part in {type(self).__name__} to make it replaceable, or set its values by path.",
             )  # fmt: skip
         else:
+            refuse_collection(f"{type(self).__name__}.{name}", value, caller)
             known = [*self.fields, *self._class_modes, *self._structural, *self._replaceable]
-            error = unknown("parameter or variable", type(self).__name__, name, known)
+            error = unknown("parameter or variable", type(self).__name__, name, known, self.renamed)
             error.where = (caller(),)
             raise error
 
@@ -262,7 +266,7 @@ class Component(Declared):
         component = self
         for name in path.split(".") if path else ():
             if name not in component.parts:
-                raise unknown("part", component.label, name, component.parts)
+                raise unknown("part", component.label, name, component.parts, component.renamed)
             component = component.parts[name]
         return component
 
@@ -319,7 +323,9 @@ class Component(Declared):
         names = getattr(type(self), which).split()
         found = next((self._connectors[name] for name in names if name in self._connectors), None)
         if found is None:
-            raise unknown(which, f"{self.label} ({type(self).__name__})", " or ".join(names), list(self._connectors))
+            error = unknown(which, f"{self.label} ({type(self).__name__})", " or ".join(names), list(self._connectors))
+            error.advice = f'Join it in [connect], not in a series: joint = ["{self.label}.{min(self._connectors)}", …]'
+            raise error
         return found
 
     def __setattr__(self, name: str, value: Any) -> None:

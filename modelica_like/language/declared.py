@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, cast
 
-from modelica_like.errors import UnknownName, did_you_mean
+from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Field, Variable
 from modelica_like.language.icon import Stroke
@@ -21,6 +21,8 @@ def annotated(cls: type) -> Mapping[str, Any]:
 class Declared:
     """An object with declared fields, an owner and a name there."""
 
+    renamed: ClassVar[Mapping[str, str]] = {}
+    """What to write instead of names of earlier versions, by them: `{"pulses": "n"}`; bases add theirs."""
     _class_fields: ClassVar[dict[str, Field]] = {}
     _own_fields: Mapping[str, Field] = {}
     _owner: Declared | None = None
@@ -30,6 +32,8 @@ class Declared:
         super().__init_subclass__(**options)
         lineage = reversed(cls.__mro__)
         cls._class_fields = {name: f for base in lineage for name, f in vars(base).items() if isinstance(f, Field)}
+        former = (vars(base).get("renamed", {}) for base in reversed(cls.__mro__))
+        cls.renamed = {name: instead for names in former for name, instead in names.items()}
 
     @classmethod
     def _hint(cls, name: str) -> str:
@@ -159,7 +163,9 @@ class Connector(Declared):
         return f"<{type(self).__name__} {self.label}>"
 
 
-def unknown(kind: str, label: str, name: str, known: Iterable[str]) -> UnknownName:
+def unknown(
+    kind: str, label: str, name: str, known: Iterable[str], renamed: Mapping[str, str] | None = None
+) -> UnknownName:
     """Return the error about a name that does not exist.
 
     Args:
@@ -167,7 +173,33 @@ def unknown(kind: str, label: str, name: str, known: Iterable[str]) -> UnknownNa
         label: owner of the names.
         name: the name.
         known: the names that exist.
+        renamed: what to write instead of names of earlier versions.
     """
+    if renamed and renamed.get(name):
+        return UnknownName(f"{label} has no {kind} '{name}' any more.", advice=f"Write {renamed[name]}.")
     names = list(known)
     listing = f" It has {', '.join(names)}." if names else " It has none."
     return UnknownName(f"{label} has no {kind} '{name}'{did_you_mean(name, names) or '.'}{listing}")
+
+
+def refuse_collection(label: str, value: object, where: Callable[[], Source] | None = None) -> None:
+    """Refuse a list, tuple or dictionary with parts or connectors that is no list of parts.
+
+    Raises:
+        LanguageError: it is one.
+    """
+    if not isinstance(value, list | tuple | dict):
+        return
+    elements = list(cast("Iterable[Any]", value.values() if isinstance(value, dict) else value))
+    inner = [part for one in elements for part in cast("Iterable[Any]", one if isinstance(one, tuple) else (one,))]
+    if any(isinstance(one, Connector) for one in inner):
+        advice = "Give each a name of its own: flange_1 and flange_2; where their number varies, by setattr in `build`."
+    elif any(isinstance(one, Declared) for one in inner):
+        advice = "An array is a list of parts only: [Inertia(J=1), Inertia(J=2)]; other parts have names of their own."
+    else:
+        return
+    kind = type(cast(object, value)).__name__
+    kinds = ", ".join(dict.fromkeys(type(one).__name__ for one in elements))
+    raise LanguageError(
+        f"{label} is a {kind} that is no array of parts: it has {kinds}.", where=where() if where else (), advice=advice
+    )

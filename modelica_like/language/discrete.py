@@ -14,7 +14,7 @@ from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Variable
 from modelica_like.language.places import NOWHERE, caller
 
-MarkerKind = Literal["relation", "floor", "was", "once", "clock", "delay", "sample", "previous"]
+MarkerKind = Literal["relation", "floor", "was", "once", "clock", "delay", "sample", "previous", "ending"]
 
 
 class Marker(Symbol):
@@ -24,7 +24,7 @@ class Marker(Symbol):
         kind: `relation`: whether `of` is true, changed by events; `floor`: the whole number below `of`, changed by
             events; `was`: the condition `of` at the present instant; `once`: 1 where `of` has just become true;
             `clock`: number of ticks, `of` is their period; `delay`: see `delay.Part`; `sample` and
-            `previous`: their arguments, until a `when` of a clock has replaced them.
+            `previous`: their arguments, until a `when` of a clock has replaced them; `ending`: see `Ending`.
         of: the condition or value.
         offset: time of the first tick of a clock, or a delay, in s.
         name: path from the component, given when its template is made.
@@ -49,7 +49,16 @@ class Pre(Symbol):
         self.of = of
 
 
-INITIAL, TERMINAL = Symbol(None, "initial()"), Symbol(None, "terminal()")
+class Ending(Marker):
+    """Becomes 1 where a `when` ends the run, for the reason `text`."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__("ending", cast(Expr, ca.SX(0)))
+        self.text = text
+
+
+INITIAL, TERMINAL, HOMOTOPY = (Symbol(None, name) for name in ("initial()", "terminal()", "homotopy()"))
+"""Of the whole model: whether a run begins, whether it ends, and the share of the actual expressions: 1 in a run."""
 _timed: list[Marker] = []
 """Markers of expressions of time alone, which no component owns."""
 
@@ -83,6 +92,25 @@ def is_a(symbol: Symbol, kind: type | tuple[type, ...]) -> bool:
 
 
 _JOINS = {ca.OP_AND: ca.logic_and, ca.OP_OR: ca.logic_or}
+SILENT, CONTINUOUS = 2.0, 3.0
+"""Marks of conditions without events: asked for, or with branches that meet wherever the condition changes."""
+
+
+def silent(condition: Expr | bool, mark: float = SILENT) -> Expr:
+    """Return a condition that makes no event: an `and` with a true number that nobody else writes.
+
+    Args:
+        condition: relations and Boolean variables, joined.
+        mark: `SILENT` or `CONTINUOUS`.
+    """
+    one: Any = ca.SX(cast(Any, condition))
+    return one if one.is_constant() else ca.logic_and(one, mark)
+
+
+def silence(node: Any) -> float:
+    """Return the mark of a condition without events, or 0."""
+    mark = node.dep(1) if node.op() == ca.OP_AND else None
+    return float(mark) if mark is not None and mark.is_constant() and float(mark) in (SILENT, CONTINUOUS) else 0.0
 
 
 def eventful(condition: Expr | bool) -> Expr:
@@ -96,6 +124,8 @@ def eventful(condition: Expr | bool) -> Expr:
     """
     one: Any = ca.SX(cast(Any, condition))
     operation = one.op()
+    if silence(one):
+        return one
     if operation in _JOINS:
         return _JOINS[operation](*(cast(Any, eventful(one.dep(k))) for k in (0, 1)))
     if operation == ca.OP_NOT:
@@ -240,6 +270,22 @@ def initial() -> Expr:
     return INITIAL
 
 
+def homotopy(actual: Scalar, simplified: Scalar) -> Expr:
+    """Return `actual`, to which the start is led from `simplified`: for equations that are hard to solve from guesses.
+
+    The system at the start is solved with all simplified expressions first, then with growing shares of the actual
+    ones, each from the solution before. In a run it is `actual`. An FMU holds the solution for the values with which
+    it was exported, and solves the actual system from there.
+
+    Args:
+        actual: what holds.
+        simplified: the same quantity, by a law that is easy to solve, such as a linear one.
+    """
+    a, s = ca.SX(cast(Any, actual)), ca.SX(cast(Any, simplified))
+    share: Any = HOMOTOPY
+    return ca.if_else(share < 1, share * a + (1 - share) * s, a)
+
+
 def terminal() -> Expr:
     """Return a condition that becomes true at the end of a run: for `when`."""
     return TERMINAL
@@ -331,6 +377,18 @@ def assert_(condition: Expr, text: str) -> Assertion:
             names in braces become numbers in SI units.
     """
     return Assertion(condition, text)
+
+
+def terminate(text: str) -> dict[Expr, Scalar]:
+    """Return what ends the run regularly, for `when`: what else happens at that instant still happens.
+
+    Beside new values, write `when(condition, {self.n: 1, **terminate("is at the top")})`.
+
+    Args:
+        text: the reason; it goes on after the name of the component, such as "is at the top, {x_top} m"; names in
+            braces become numbers in SI units.
+    """
+    return {Ending(text): 1.0}
 
 
 def is_fixed(symbol: Symbol) -> bool:

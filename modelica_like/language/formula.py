@@ -14,7 +14,7 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import NetlistError, UnitError, did_you_mean
-from modelica_like.units import ONE, Unit, coherent, parse_unit, read_quantity, same_dimension
+from modelica_like.units import ONE, Unit, coherent, parse_unit, plain_digits, read_quantity, same_dimension
 
 _MAX_LENGTH = 2000
 _MAX_DEPTH = 150
@@ -183,7 +183,7 @@ def parse_formula(text: str) -> Formula:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            replaced, quantities = _without_quantities(text.strip())
+            replaced, quantities = _without_quantities(plain_digits(text.strip()))
             tree = ast.parse(replaced, mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise _not_a_formula(text) from None

@@ -10,7 +10,7 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError
-from modelica_like.language.discrete import if_, marker
+from modelica_like.language.discrete import CONTINUOUS, Marker, if_, marker, silent
 from modelica_like.language.expr import (
     TIME,
     Expr,
@@ -39,6 +39,8 @@ def der(expression: Expr) -> Expr:
         return expression.derivative()
     total: Any = 0.0
     for symbol in symbols_in(expression):
+        if isinstance(symbol, Marker):
+            continue  # constant between events
         rate: Any = 1.0 if symbol is TIME else _rate(symbol)
         total = total + ca.jacobian(_sx(expression), symbol) * rate
     return total
@@ -108,33 +110,37 @@ def absolute(x: Scalar, *, events: bool = False) -> Expr:
     return if_(_sx(x) < 0, -_sx(x), x) if events else ca.fabs(_sx(x))
 
 
-def sign(x: Scalar, *, events: bool = False) -> Expr:
+def sign(x: Scalar, *, events: bool | None = None) -> Expr:
     """Return the sign: -1, 0 or 1.
 
     Args:
         x: an expression or a number.
-        events: as of `absolute`.
+        events: as of `where`.
     """
-    return if_(_sx(x) > 0, 1, 0) - if_(_sx(x) < 0, 1, 0) if events else ca.sign(_sx(x))
+    if events is None:
+        return ca.sign(_sx(x))
+    return where(_sx(x) > 0, 1, 0, events=events) - where(_sx(x) < 0, 1, 0, events=events)
 
 
-def floor(x: Scalar, *, events: bool = False) -> Expr:
+def floor(x: Scalar, *, events: bool | None = None) -> Expr:
     """Return the largest whole number that is not above a value.
 
     Args:
         x: an expression or a number.
-        events: as of `absolute`; without, it belongs into what changes at events.
+        events: as of `where`.
     """
-    return marker("floor", _sx(x)) if events else ca.floor(_sx(x))
+    if events:
+        return marker("floor", _sx(x))
+    return ca.floor(_sx(x)) if events is None else -ca.ceil(-_sx(x))
 
 
-def mod(x: Scalar, y: Scalar, *, events: bool = False) -> Expr:
+def mod(x: Scalar, y: Scalar, *, events: bool | None = None) -> Expr:
     """Return what is left of a value after subtracting a whole multiple of another one: `x - y * floor(x / y)`.
 
     Args:
         x: an expression or a number.
         y: another one.
-        events: as of `absolute`; without, it belongs into what changes at events.
+        events: as of `where`.
     """
     return _sx(x) - _sx(y) * floor(_sx(x) / _sx(y), events=events)
 
@@ -171,15 +177,23 @@ def maximum(x: Scalar, y: Scalar, *, events: bool = False) -> Expr:
     return if_(_sx(x) > _sx(y), x, y) if events else ca.fmax(_sx(x), _sx(y))
 
 
-def where(condition: Expr | bool, then: Scalar, otherwise: Scalar) -> Expr:
-    """Choose by a condition, without an event (`if_` is the form with events); the branch not taken may be undefined.
+def where(condition: Expr | bool, then: Scalar, otherwise: Scalar, *, events: bool | None = None) -> Expr:
+    """Choose by a condition; the branch not taken may be undefined.
 
     Args:
         condition: a relation, or several joined with `all_of` and the like.
         then: value if it is true.
         otherwise: value if it is false.
+        events: None: in an equation, a relation makes an event if the equation jumps there; it makes none where the
+            branches meet, nor in what changes at events only. True: always (this is `if_`). False: never; then what
+            jumps is integrated as it is written.
+
+    Raises:
+        LanguageError: events are asked for, and it is no condition.
     """
-    return ca.if_else(condition, _sx(then), _sx(otherwise))
+    if events:
+        return if_(condition, then, otherwise)
+    return ca.if_else(condition if events is None else silent(condition), _sx(then), _sx(otherwise))
 
 
 def all_of(*conditions: Expr) -> Expr:
@@ -245,10 +259,10 @@ def interpolate(
     pieces = [_piece(x, xs, ys, slopes, k) for k in range(len(xs) - 1)]
     result: Any = pieces[0]
     for start, piece in zip(xs[1:-1], pieces[1:], strict=True):
-        result = ca.if_else(x < start, result, piece)
+        result = ca.if_else(silent(x < start, CONTINUOUS), result, piece)
     if slopes is not None and extrapolate == "linear":
-        result = ca.if_else(x < xs[0], ys[0] + slopes[0] * (x - xs[0]), result)
-        result = ca.if_else(x > xs[-1], ys[-1] + slopes[-1] * (x - xs[-1]), result)
+        result = ca.if_else(silent(x < xs[0], CONTINUOUS), ys[0] + slopes[0] * (x - xs[0]), result)
+        result = ca.if_else(silent(x > xs[-1], CONTINUOUS), ys[-1] + slopes[-1] * (x - xs[-1]), result)
     return result
 
 

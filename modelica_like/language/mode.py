@@ -28,6 +28,7 @@ class Mode:
         ideal: for one of two modes each, the variable that its equation sets to zero: the current of a blocking diode,
             the voltage of a conducting one. Where such equations do not determine all unknowns, those for the
             derivatives of states that the modes fix, or the least norm of what they leave open, do.
+        hysteresis: the parameters to set, and how, so that the modes do not switch without end: completes "set …".
     """
 
     name: str = ""
@@ -40,10 +41,12 @@ class Mode:
         description: str = "",
         holds: Mapping[str, str | Hold] | None = None,
         ideal: Mapping[str, str] | None = None,
+        hysteresis: str = "",
     ) -> None:
         self.names = names
         self.start = names[0] if start is None else start
         self.description = description
+        self.hysteresis = hysteresis
         self.holds = {name: Hold(one) if isinstance(one, str) else one for name, one in (holds or {}).items()}
         self.ideal = dict(ideal or {})
 
@@ -213,6 +216,7 @@ class Transition:
         notice: message for the user, without the name of the component.
         because: reason in a few words.
         fails: whether the run ends there, with an error.
+        ends: whether the run ends there regularly, with the notice as the reason.
     """
 
     mode: BoundMode
@@ -225,6 +229,7 @@ class Transition:
     notice: str = ""
     because: str = ""
     fails: bool = False
+    ends: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,6 +58,8 @@ def located(generator: Any, label: str = "equations()") -> Iterator[tuple[Any, S
             item = next(items, _END)
         except RuntimeError as error:
             raise _undecided(error, label) or _left_open(error) or error from None
+        except (OSError, SystemExit) as error:
+            raise LanguageError(f"{label} fails.", why=f"It raises {type(error).__name__}: {error}.") from error
         if item is _END:
             return
         yield item, _place(items)

@@ -65,15 +65,17 @@ def _check_transition(transition: Transition, source: Source, component: str) ->
 
 
 def _check_notice(transition: Transition, source: Source, component: str) -> None:
-    """Check that the names in a notice and in a reason are parameters."""
+    """Check that the names in a reason are parameters, and those in a notice parameters or inputs."""
     fields = transition.mode.symbol.owner.fields
-    parameters = [name for name, field in fields.items() if isinstance(field, Parameter)]
+    known = {"notice": Parameter | Input, "reason": Parameter}
     told = {"notice": transition.notice, "reason": transition.because}
     for kind, name in ((kind, name) for kind, text in told.items() for name in NAME_IN_NOTICE.findall(text)):
-        if name not in parameters:
+        names = [name for name, field in fields.items() if isinstance(field, known[kind])]
+        if name not in names:
+            what = "parameter" if kind == "reason" else "parameter or input"
             raise LanguageError(
                 f"{component}: the {kind} of an event names {name}, "
-                f"which is not a parameter{did_you_mean(name, parameters) or '.'}",
+                f"which is not a {what}{did_you_mean(name, names) or '.'}",
                 where=source,
             )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,13 +25,13 @@ from modelica_like.language.fields import Discrete, Field, Input
 from modelica_like.modelica_text.instance import Given, Instance, Member, refused
 from modelica_like.modelica_text.known import library_part
 from modelica_like.modelica_text.library import Known, connector_type
-from modelica_like.modelica_text.members import element, part_of, sizes
+from modelica_like.modelica_text.members import element, exists, part_of, sizes
 from modelica_like.modelica_text.resolve import Resolver
 from modelica_like.modelica_text.statements import Statements
 from modelica_like.modelica_text.types import Basic, basic_type
 from modelica_like.modelica_text.wiring import groups
-from modelica_like.modelica_text.written import Written, WrittenConnector, as_formula, written_class
-from modelica_like.units import parse_unit
+from modelica_like.modelica_text.written import MEMORY, Written, WrittenConnector, as_formula, written_class
+from modelica_like.units import parse_unit, same_dimension
 
 
 @dataclass
@@ -97,19 +98,15 @@ class _Builder:
             if not any(one.file.endswith(".mo") for one in error.where):
                 error.where = (place,) if place.file else error.where
             self.errors.append(error)
+            if self.instance.classes.spent:
+                raise
 
     # -- members -----------------------------------------------------------------------------------------------------
 
     def _member(self, name: str, member: Member) -> None:
-        if member.declaration.condition is not None:
-            known = Resolver(self.instance, member.text, numeric=True)(member.declaration.condition)
-            if known.kind != "boolean":
-                raise refused(
-                    "a condition of a component that is not known before the run", member.text, member.declaration.line
-                )
-            if not known.args[0]:
-                self.absent.add(name)
-                return
+        if not exists(self.instance, member):
+            self.absent.add(name)
+            return
         basic = basic_type(self.instance, member)
         if basic is not None:
             self._basic(name, member, basic)
@@ -119,20 +116,20 @@ class _Builder:
             raise refused(f"{name}, an array with several dimensions,", member.text, member.declaration.line)
         if not shape:
             part = part_of(self.instance, member)
-            self._adopt(name, self._part(name, member, part, member.given))
+            setattr(self.component, name, self._part(name, member, part, member.given))
             return
         made = [
             self._part(f"{name}[{k}]", member, part_of(self.instance, member, k), element(member.given, k))
             for k in range(1, shape[0] + 1)
         ]
         if made and isinstance(made[0], Connector):
-            raise refused(f"{name}, an array of connectors,", member.text, member.declaration.line)
-        self._adopt(name, made)
-
-    def _adopt(self, name: str, part: Any) -> None:
-        setattr(self.component, name, part)
+            for k, one in enumerate(made, 1):
+                setattr(self.component, f"{name}[{k}]", one)
+        else:
+            setattr(self.component, name, made)
 
     def _part(self, name: str, member: Member, part: Instance | Known | str, given: Given) -> Component | Connector:
+        self.instance.classes.spend(50, member.text, member.declaration.line)
         if isinstance(part, Known):
             driven = {
                 end.rpartition(".")[2] for wire in self.wires for end in wire.ends if end.rpartition(".")[0] == name
@@ -173,7 +170,6 @@ class _Builder:
         self.component._declare(name, made)
         if given.value is not None and outside:
             self.component.give(name, self._value(given, self.instance.owner, ""))
-        self._display(name, basic)
 
     def _value(self, given: Given, reader: Instance | None, prefix: str) -> Any:
         """Return a value as a number or a formula, read among the names of `reader`."""
@@ -211,6 +207,10 @@ class _Builder:
         else:
             nominal = self._number(basic.given.inner.get("nominal"))
             field_made = var(self._unit(basic), description, state=self._preference(basic), nominal=nominal or 1.0)
+        if path in self.statements.outputs:
+            memory = boolean(description)
+            self.component._declare(f"{path}{MEMORY}", memory)
+            self._start(path, basic, memory)
         self.component._declare(path, field_made)
         self._display(path, basic)
         self._start(path, basic, field_made)
@@ -229,7 +229,7 @@ class _Builder:
             )
             made.default = float(known) if isinstance(known, bool | int | float) else 0.0
             return
-        if isinstance(made, Input) or (given is None and not fixed):
+        if isinstance(made, Input) or basic.kind == "Boolean" or (given is None and not fixed):
             return
         outside = given is not None and given.scope is not None and given.scope[0] is not self.instance
         value = (
@@ -257,21 +257,27 @@ class _Builder:
         return value if isinstance(value, float) and abs(value) < 1e50 else None
 
     def _unit(self, basic: Basic) -> str:
+        """Return the unit; one that is not coherent is left out, because Modelica converts nothing."""
         unit = self._known(basic.given.inner.get("unit"))
         try:
-            return str(unit) if unit and parse_unit(str(unit)) else "1"
+            read = parse_unit(str(unit or "1"))
         except UnitError:
             self.notes.tell(f"The unit '{unit}' is not known here and is left out.")
             return "1"
+        if (read.factor, read.offset) == (1.0, 0.0):
+            return str(read)
+        self.notes.tell(f"The unit '{unit}' is left out: numbers of the text stay as they are.")
+        return "1"
 
     def _preference(self, basic: Basic) -> Any:
         wanted = self._known(basic.given.inner.get("stateSelect"))
         return {"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}.get(wanted, "default")
 
     def _display(self, path: str, basic: Basic) -> None:
-        unit = self._known(basic.given.inner.get("displayUnit"))
-        if unit:
-            self.notes.display[f"{self.instance.path}.{path}".lstrip(".")] = str(unit)
+        unit = str(self._known(basic.given.inner.get("displayUnit")) or "")
+        with suppress(UnitError):  # it is only shown
+            if unit and same_dimension(parse_unit(unit), parse_unit(self._unit(basic))):
+                self.notes.display[f"{self.instance.path}.{path}".lstrip(".")] = unit
 
     def _label(self, name: str) -> str:
         return f"{self.instance.path}.{name}".lstrip(".")
@@ -282,6 +288,7 @@ class _Builder:
         self.component.__dict__.update(
             _statements=tuple(self.statements.equations), _initial=tuple(self.statements.initial),
             _happenings=tuple(self.statements.happenings),
+            _instants=frozenset(name for name, instant in self.statements.outputs.items() if instant),
         )  # fmt: skip
 
     def _connect(self) -> None:
@@ -310,6 +317,12 @@ class _Builder:
         kinds = {tuple(one.fields) for one in found if isinstance(one, WrittenConnector)}
         if len(kinds) > 1:
             raise ModelicaTextError(f"The connectors {', '.join(ends)} differ.")
+        for end, one in zip(ends, found, strict=True):
+            if not isinstance(one, Connector) and one.name in getattr(one.owner, "_instants", ()):
+                raise ModelicaTextError(
+                    f"{end} is true for instants only, which a connection does not carry here.",
+                    advice="Write the 'when' in the class of the sample, or name the variable: when block.y then.",
+                )
 
 
 def _elements(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:

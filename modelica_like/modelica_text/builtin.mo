@@ -334,6 +334,7 @@ package Modelica
         end PartialCompliantWithRelativeStates;
         partial model PartialElementaryOneFlangeAndSupport2
           parameter Boolean useSupport = false;
+          Units.SI.Length s "position against the housing";
           Flange_b flange "slide end";
           Support support if useSupport "housing";
         protected
@@ -345,13 +346,12 @@ package Modelica
           else
             s_support = 0;
           end if;
+          s = flange.s - s_support;
         end PartialElementaryOneFlangeAndSupport2;
         partial model PartialForce
           extends PartialElementaryOneFlangeAndSupport2;
-          Units.SI.Position s "position against the housing";
           Units.SI.Force f "force on the slide";
         equation
-          s = flange.s - s_support;
           f = flange.f;
         end PartialForce;
         partial model PartialAbsoluteSensor

@@ -12,6 +12,13 @@ from modelica_like.netlist.document import read_text
 
 BASIC = ("Real", "Integer", "Boolean", "String", "StateSelect")
 _SI = ("SI", "SIunits")
+_RENAMED = (
+    ("Modelica.SIunits.Conversions.NonSIunits", "Modelica.Units.NonSI"),
+    ("Modelica.SIunits.Conversions", "Modelica.Units.Conversions"),
+    ("Modelica.SIunits", "Modelica.Units.SI"),
+)
+_MOST_STEPS = 1_000_000
+"""Of about 10 microseconds; 10,000 parts of own classes, or 100,000 equations."""
 Found = ClassText | Known | str
 """A class with its text, one with a component, or the name of a basic type or a connector of the standard library."""
 
@@ -37,6 +44,7 @@ class Classes:
         self.read: dict[Path, list[ClassText]] = {}
         self.open: set[tuple[int, str]] = set()
         self.found: dict[tuple[int, str], Found | None] = {}
+        self.steps = 0
 
     def chosen(self, name: str = "") -> ClassText:
         """Return the class to read: the one of this name, or the last model of the file.
@@ -56,6 +64,25 @@ class Classes:
             what = f"no class '{name}'" if name else "no model"
             raise ModelicaTextError(f"'{self.file.name}' has {what}. Its models: {names}.", where=self.own[0].place(1))
         return found[0]
+
+    @property
+    def spent(self) -> bool:
+        """Whether reading has taken all the steps it may."""
+        return self.steps > _MOST_STEPS
+
+    def spend(self, steps: int, text: ClassText, line: int) -> None:
+        """Count what reading takes: 10 for a statement, 50 for a part, 5 for a step of an algorithm.
+
+        Raises:
+            ModelicaTextError: loops, arrays or classes within classes make too many of them.
+        """
+        self.steps += steps
+        if self.spent:
+            raise ModelicaTextError(
+                f"The text has too many parts and equations: reading it takes more than {_MOST_STEPS} steps.",
+                where=text.place(line),
+                advice="Look for loops and arrays that are longer than meant, and for classes that contain each other.",
+            )
 
     def find(self, name: str, scope: ClassText) -> Found | None:
         """Return the class that a name means inside a class."""
@@ -124,7 +151,10 @@ class Classes:
         return None
 
     def full(self, path: str) -> Found | None:
-        """Return a class by its full name."""
+        """Return a class by its full name; units of version 3 of the standard library have the names of version 4."""
+        for old, new in _RENAMED:
+            if path == old or path.startswith(f"{old}."):
+                path = f"{new}{path[len(old) :]}"
         for one in self.own:
             if path == one.path:
                 return one

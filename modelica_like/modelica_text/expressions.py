@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from modelica_like.modelica_text.tokens import Tokens
-from modelica_like.modelica_text.tree import Expr
+import math
 
-_RELATIONS = {"<", "<=", ">", ">=", "==", "<>"}
+from modelica_like.modelica_text.tokens import Tokens
+from modelica_like.modelica_text.tree import Expr, chain
+
 _ELEMENTWISE = {".+": "+", ".-": "-", ".*": "*", "./": "/", ".^": "^"}
-_DEEPEST = 100
+_OR, _AND, _NOT, _RELATION, _SUM, _PRODUCT, _POWER = range(1, 8)
+_LEVELS = {
+    "or": _OR, "and": _AND, **dict.fromkeys(("<", "<=", ">", ">=", "==", "<>"), _RELATION),
+    **dict.fromkeys(("+", "-", ".+", ".-"), _SUM), **dict.fromkeys(("*", "/", ".*", "./"), _PRODUCT),
+    **dict.fromkeys(("^", ".^"), _POWER),
+}  # fmt: skip
+_SINGLE = (_RELATION, _POWER)
+"""Levels whose operators do not follow each other."""
 
 
 class Expressions(Tokens):
@@ -16,9 +24,7 @@ class Expressions(Tokens):
     def expression(self) -> Expr:
         """Read an expression."""
         line = self.line
-        self.depth += 1
-        if self.depth > _DEEPEST:
-            self.refuse("An expression is nested too deeply.", line)
+        self.deeper()
         if not self.take("if"):
             made = self.simple()
         else:
@@ -37,60 +43,39 @@ class Expressions(Tokens):
     def simple(self) -> Expr:
         """Read an expression that is not an `if`, possibly a range."""
         line = self.line
-        first = self._or()
+        first = self._operation(_OR)
         if not self.take(":"):
             return first
-        second = self._or()
-        third = self._or() if self.take(":") else None
+        second = self._operation(_OR)
+        third = self._operation(_OR) if self.take(":") else None
         return Expr("range", (first, second) if third is None else (first, second, third), line)
 
-    def _or(self) -> Expr:
-        made = self._and()
-        while self.take("or"):
-            made = Expr("or", (made, self._and()), made.line)
-        return made
-
-    def _and(self) -> Expr:
-        made = self._not()
-        while self.take("and"):
-            made = Expr("and", (made, self._not()), made.line)
-        return made
-
-    def _not(self) -> Expr:
+    def _operation(self, level: int) -> Expr:
+        """Read operators of this level and above, by precedence climbing."""
         line = self.line
-        return Expr("not", (self._relation(),), line) if self.take("not") else self._relation()
-
-    def _relation(self) -> Expr:
-        made = self._sum()
-        if self.kind in _RELATIONS:
-            return Expr(self.take(self.kind), (made, self._sum()), made.line)
-        return made
-
-    def _sum(self) -> Expr:
-        line, sign = self.line, self.take("+", "-", ".+", ".-")
-        made = self._product()
-        if sign in ("-", ".-"):
-            made = Expr("neg", (made,), line)
-        while sign := self.take("+", "-", ".+", ".-"):
-            made = Expr(_ELEMENTWISE.get(sign, sign), (made, self._product()), line)
-        return made
-
-    def _product(self) -> Expr:
-        made = self._power()
-        while sign := self.take("*", "/", ".*", "./"):
-            made = Expr(_ELEMENTWISE.get(sign, sign), (made, self._power()), made.line)
-        return made
-
-    def _power(self) -> Expr:
-        made = self._primary()
-        if self.take("^", ".^"):
-            return Expr("^", (made, self._primary()), made.line)
+        if level <= _NOT and self.take("not"):
+            made = Expr("not", (self._operation(_RELATION),), line)
+        elif level <= _SUM and (sign := self.take("+", "-", ".+", ".-")):
+            made = self._operation(_PRODUCT)
+            made = Expr("neg", (made,), line) if sign in ("-", ".-") else made
+        else:
+            made = self._primary()
+        below = _POWER + 1
+        while level <= (own := _LEVELS.get(self.kind, 0)) < below:
+            signs, terms = list[str](), [made]
+            while _LEVELS.get(self.kind) == own and not (own in _SINGLE and signs):
+                signs.append(_ELEMENTWISE.get(self.kind, self.kind))
+                self.at += 1
+                terms.append(self._operation(own + 1))
+            made, below = chain(signs, terms), own
         return made
 
     def _primary(self) -> Expr:
         kind, text, line = self.tokens[self.at]
         if kind == "number":
             self.at += 1
+            if not math.isfinite(float(text)):
+                self.refuse(f"{text} is too large for a number.", line)
             return Expr("number", (float(text),), line)
         if kind == "string":
             self.at += 1
@@ -100,6 +85,9 @@ class Expressions(Tokens):
             return Expr("boolean", (text == "true",), line)
         if kind in ("name", "initial", "."):
             return self._named(line)
+        if kind == "end" and self.brackets:
+            self.at += 1
+            return Expr("name", (("end", ()),), line)
         if self.take("("):
             made = self.expression()
             if self.kind == ",":
@@ -169,12 +157,14 @@ class Expressions(Tokens):
     def subscripts(self) -> tuple[Expr, ...]:
         """Read indices or dimensions in brackets."""
         self.need("[")
+        self.brackets += 1
         made = []
         while not self.take("]"):
             line = self.line
             made.append(Expr("all", (), line) if self.take(":") else self.expression())
             if self.kind != "]":
                 self.need(",")
+        self.brackets -= 1
         return tuple(made)
 
     def iterators(self) -> tuple[tuple[str, Expr | None], ...]:

@@ -7,7 +7,7 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from modelica_like.modelica_text.tree import Expr
+from modelica_like.modelica_text.tree import Expr, joined
 
 _BINARY: dict[str, Callable[[float, float], float]] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "^": operator.pow,
@@ -22,6 +22,10 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "mod": lambda x, y: x - math.floor(x / y) * y, "div": lambda x, y: float(math.trunc(x / y)), "rem": math.fmod,
 }  # fmt: skip
 KNOWN = ("number", "boolean", "literal", "string")
+
+
+LONGEST = 100_000
+"""Elements of an array, and steps of an algorithm."""
 
 
 class Unfit(ValueError):
@@ -40,6 +44,29 @@ def known(expression: Expr) -> Expr:
 def number(value: float, line: int = 0) -> Expr:
     """Return a number as an expression."""
     return Expr("number", (float(value),), line)
+
+
+def count(number: float) -> int:
+    """Return the size of an array.
+
+    Raises:
+        Unfit: it is no whole number, negative, or too large.
+    """
+    if not (0 <= number <= LONGEST and number == int(number)):
+        raise Unfit(f"An array cannot have {number:g} elements: it has 0 to {LONGEST}")
+    return int(number)
+
+
+def row(start: float, step: float, stop: float, line: int) -> Expr:
+    """Return the numbers of a range.
+
+    Raises:
+        Unfit: the step is zero, or there are too many.
+    """
+    if step == 0:
+        raise Unfit(f"The range {start:g}:0:{stop:g} has a step of 0")
+    length = count(max(0.0, math.floor((stop - start) / step + 1e-9) + 1.0))  # rounding of a stop that is met
+    return Expr("array", tuple(number(start + k * step, line) for k in range(length)), line)
 
 
 def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
@@ -111,10 +138,7 @@ def _product(left: Expr, right: Expr, line: int) -> Expr:
 
 def total(items: list[Expr], line: int) -> Expr:
     """Return the sum of expressions."""
-    made = number(0, line)
-    for k, one in enumerate(items):
-        made = one if k == 0 else operation("+", (made, one), line)
-    return made
+    return joined(lambda one, other: operation("+", (one, other), line), items) if items else number(0, line)
 
 
 def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
@@ -124,11 +148,9 @@ def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
         Unfit: it has no value, or the number of arguments is wrong.
     """
     if name in ("min", "max") and len(args) == 1 and args[0].kind == "array":
-        items = list(args[0].args)
-        made = items[0]
-        for one in items[1:]:
-            made = function(name, (made, one), line)
-        return made
+        if not args[0].args:
+            raise Unfit(f"{name} of an array without elements has no value")
+        return joined(lambda one, other: function(name, (one, other), line), list(args[0].args))
     wanted = 2 if name in ("atan2", "mod", "rem", "div", "min", "max") else 1
     if len(args) != wanted:
         raise Unfit(f"{name} has {wanted} argument{'s' if wanted > 1 else ''}, not {len(args)}")

@@ -13,14 +13,13 @@ if TYPE_CHECKING:
     from modelica_like.modelica_text.resolve import Resolver
 
 _DEEPEST = 30
-_LONGEST = 100_000
 
 
 def _filled(value: Expr, shape: tuple[Expr, ...], line: int) -> Expr:
     for one in reversed(shape):
         if one.kind != "number":
             raise fold.Unfit("The size of an array must be known")
-        value = Expr("array", (value,) * int(one.args[0]), line)
+        value = Expr("array", (value,) * fold.count(one.args[0]), line)
     return value
 
 
@@ -29,7 +28,9 @@ def _line(args: tuple[Expr, ...], line: int) -> Expr:
         raise fold.Unfit("linspace needs three known numbers")
     start, stop, count = (one.args[0] for one in args)
     return Expr(
-        "array", tuple(fold.number(start + (stop - start) * k / (count - 1), line) for k in range(int(count))), line
+        "array",
+        tuple(fold.number(start + (stop - start) * k / max(count - 1, 1), line) for k in range(fold.count(count))),
+        line,
     )
 
 
@@ -105,7 +106,6 @@ class _Call:
         members = Instance(resolver.classes, text, Given()).members
         self.declared = {name: one.declaration for name, one in members.items()}
         self.local: dict[str, Expr] = {}
-        self.steps = 0
 
     def result(self, given: tuple[Expr, ...], named: Mapping[str, Expr], line: int) -> Expr:
         inputs = [name for name, one in self.declared.items() if "input" in one.prefixes]
@@ -137,9 +137,7 @@ class _Call:
 
     def run(self, statements: list[Statement]) -> None:
         for one in statements:
-            self.steps += 1
-            if self.steps > _LONGEST:
-                raise refused("an algorithm of so many steps", self.text, one.line)
+            self.resolver.classes.spend(5, self.text, one.line)
             if one.kind == ":=":
                 self.assign(one.parts[0], self.here()(one.parts[1]))
             elif one.kind == "if":
@@ -148,6 +146,7 @@ class _Call:
                 self.loop(list(one.parts[0]), one.parts[1])
             elif one.kind == "while":
                 while self.here()(one.parts[0]) == Expr("boolean", (True,), one.parts[0].line):
+                    self.resolver.classes.spend(5, self.text, one.line)
                     self.run(one.parts[1])
             elif one.kind != "call" or one.parts[0].args[0] not in ("assert", "Modelica.Utilities.Streams.print"):
                 raise refused(f"'{one.kind}' in a function", self.text, one.line)

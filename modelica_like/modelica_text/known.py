@@ -144,10 +144,10 @@ class _Part:
     def _read(self, name: str, one: Given) -> None:
         """Resolve a value; a formula that other names than the owner's use becomes a number."""
         unit = one.inner.get("displayUnit")
-        if unit is not None and unit.value is not None and unit.value.kind == "string":
-            self.notes.display[f"{self.owner.path}.{self.name}.{self.known.here(name)}".lstrip(".")] = unit.value.args[
-                0
-            ]
+        here = self.known.here(name)
+        if unit is not None and unit.value is not None and isinstance(self.fields.get(here), Input):
+            shown = Resolver(*unit.scope)(unit.value) if unit.scope else unit.value
+            self.notes.display[f"{self.owner.path}.{self.name}.{here}".lstrip(".")] = str(shown.args[0])
         if one.value is None or one.scope is None:
             return
         node = Resolver(*one.scope)(one.value)
@@ -165,7 +165,8 @@ class _Part:
         for name, value in self.known.default.items():
             here = self.known.here(name)
             has = here in self.fields or here in self.kind._structural or name in (*self.known.only, *self.used)
-            if name not in self.values and has:
+            demanded = name in self.known.only and name in self.entries and self.entries[name].value is not None
+            if name not in self.values and has and not demanded:
                 text = str(value).lower() if isinstance(value, bool) else str(value)
                 node = substituted(parse_expression(text), self.values)
                 self.values[name] = self._owners()(node)

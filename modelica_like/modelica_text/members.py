@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from modelica_like.errors import ModelicaTextError, UnknownName
-from modelica_like.modelica_text import resolve
+from modelica_like.modelica_text import fold, resolve
 from modelica_like.modelica_text.instance import Given, Instance, Member, given, refused, unknown_class
 from modelica_like.modelica_text.library import Known
 from modelica_like.modelica_text.tree import ClassText, Expr
@@ -31,13 +32,33 @@ def sizes(owner: Instance, member: Member) -> tuple[int, ...]:
     made: list[int] = []
     for k, one in enumerate(member.declaration.dimensions):
         if one.kind != "all":
-            made.append(int(resolver.number(one)))
+            made.append(resolver.count(one))
             continue
         value = value_of(owner, member.declaration.name, member.text, one.line)
         for _ in range(k):
-            value = value.args[0]
+            value = value.args[0] if value.args and isinstance(value.args[0], Expr) else value
+        if value.kind != "array":
+            raise refused(f"the size of {member.declaration.name} from this value", member.text, one.line)
         made.append(len(value.args))
+    if math.prod(made) > fold.LONGEST:
+        what = f"{member.declaration.name}, an array of {math.prod(made)} elements (at most {fold.LONGEST})"
+        raise refused(what, member.text, member.declaration.line)
     return tuple(made)
+
+
+def exists(owner: Instance, member: Member) -> bool:
+    """Return whether a conditional component is there.
+
+    Raises:
+        ModelicaTextError: constants and parameters do not determine it.
+    """
+    declared = member.declaration
+    if declared.condition is None:
+        return True
+    known = resolve.Resolver(owner, member.text, numeric=True)(declared.condition)
+    if known.kind != "boolean":
+        raise refused("a condition of a component that is not known before the run", member.text, declared.line)
+    return known.args[0]
 
 
 def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
@@ -82,6 +103,7 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
         ModelicaTextError: its class does not exist.
     """
     declared = member.declaration
+    owner.classes.spend(1, member.text, declared.line)
     found = owner.find(declared.type, member.text)
     if found is None:
         raise unknown_class(declared.type, member.text, declared.line)
@@ -118,6 +140,7 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
 
 def _instance(owner: Instance, member: Member, text: ClassText, name: str, given: Given) -> Instance:
     """Create the instance of a part; a record may be given as a whole."""
+    owner.classes.spend(50, member.text, member.declaration.line)
     depth, level = 0, owner
     while level.owner is not None:
         depth, level = depth + 1, level.owner

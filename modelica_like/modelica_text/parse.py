@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from modelica_like.errors import ModelicaTextError
 from modelica_like.modelica_text.expressions import Expressions
 from modelica_like.modelica_text.tokens import KINDS, SECTIONS
 from modelica_like.modelica_text.tree import (
@@ -20,7 +21,6 @@ from modelica_like.modelica_text.tree import (
 _BEFORE_KIND = {"partial", "encapsulated", "expandable", "pure", "impure", "final", "replaceable", "inner", "outer"}
 _PREFIXES = {"flow", "stream", "parameter", "constant", "discrete", "input", "output"}
 _BEFORE = {"redeclare", "final", "inner", "outer", "replaceable"}
-_DEEPEST = 100
 
 
 def parse_modelica(text: str, file: str) -> list[ClassText]:
@@ -33,7 +33,12 @@ def parse_modelica(text: str, file: str) -> list[ClassText]:
     Raises:
         ModelicaTextError: the text is not Modelica.
     """
-    return _Parser(text, file).stored()
+    parser = _Parser(text, file)
+    try:
+        return parser.stored()
+    except ModelicaTextError as error:
+        told = error if error.where else parser.error(error.what, parser.line)
+        raise told.with_traceback(None) from None  # hundreds of frames are no help, and too many for pickle
 
 
 def parse_expression(text: str) -> Expr:
@@ -68,6 +73,7 @@ class _Parser(Expressions):
 
     def class_text(self, owner: ClassText | None, within: str = "") -> ClassText:
         line, partial, unsupported = self.line, False, []
+        self.deeper()
         while self.text in _BEFORE_KIND:
             word = self.take(self.kind)
             partial = partial or word == "partial"
@@ -83,6 +89,7 @@ class _Parser(Expressions):
         made = ClassText(name, kind, line, self.file, owner, within, partial, unsupported=unsupported, lines=self.lines)
         if self.take("="):
             self._short(made)
+            self.depth -= 1
             return made
         if self.kind == "(":
             self.modification()
@@ -92,6 +99,7 @@ class _Parser(Expressions):
         if self.text != name:
             self.refuse(f"{kind} {name} of line {line} ends with 'end {self.text}'.", self.line)
         self.take("name")
+        self.depth -= 1
         return made
 
     def _short(self, made: ClassText) -> None:
@@ -132,7 +140,7 @@ class _Parser(Expressions):
                 self._section(made, bool(self.take("initial")), line)
             elif self.take("external"):
                 made.unsupported.append(("external functions", line))
-                while self.kind != ";":
+                while self.kind not in (";", "end of file"):
                     self.at += 1
                 self.need(";")
             elif self.kind == "end of file":
@@ -188,7 +196,7 @@ class _Parser(Expressions):
 
     def _import(self) -> Import:
         alias = ""
-        if self.tokens[self.at + 1][0] == "=":
+        if self.kind == "name" and self.tokens[self.at + 1][0] == "=":
             alias = self.need("name")
             self.need("=")
         path, names = self.dotted(), ()
@@ -237,10 +245,12 @@ class _Parser(Expressions):
     def modification(self) -> Modification:
         made = Modification()
         if self.take("("):
+            self.deeper()
             while not self.take(")"):
                 made.arguments.append(self._argument())
                 if self.kind != ")":
                     self.need(",")
+            self.depth -= 1
         if self.take("=", ":="):
             made.value = self.expression()
         return made
@@ -290,11 +300,8 @@ class _Parser(Expressions):
         return made
 
     def _statement(self) -> Statement:
-        line = self.line
-        self.depth += 1
-        if self.depth > _DEEPEST:
-            self.refuse("Equations are nested too deeply.", line)
-        made = self._one_statement(line)
+        self.deeper()
+        made = self._one_statement(self.line)
         self.depth -= 1
         return made
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from modelica_like.errors import ModelicaTextError
 from modelica_like.modelica_text.build import Notes, build_component
 from modelica_like.modelica_text.classes import Classes
 from modelica_like.modelica_text.instance import Given, Instance
@@ -29,9 +30,14 @@ def read_modelica(path: Path, name: str = "") -> tuple[Written, list[str]]:
     classes = Classes(path)
     text = classes.chosen(name)
     notes = Notes()
-    made = build_component(Instance(classes, text, Given()), notes)
+    try:
+        made = build_component(Instance(classes, text, Given()), notes)
+    except RecursionError:
+        raise ModelicaTextError(
+            "Classes, functions or formulas are nested too deeply.", where=text.place(text.line)
+        ) from None
     # A variable whose start value is not fixed starts at the start value of its class, which is zero.
-    settings = {"start": "rest"} | (
+    settings = {"start": "rest", "on_chattering": "rest"} | (
         {"until": f"{text.experiment['StopTime']:g} s"} if "StopTime" in text.experiment else {}
     )
     made.__dict__.update(_simulate=settings, _display=notes.display, _origin=f"{path.resolve()}:{text.path}")

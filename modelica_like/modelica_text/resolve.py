@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -23,6 +22,11 @@ KEPT = {
     "der", "pre", "noEvent", "smooth", "initial", "sample", "edge", "change", "reinit", "terminal", "delay",
     "Clock", "previous", "hold",
 }  # fmt: skip
+_ARGUMENTS = {
+    **dict.fromkeys(("der", "pre", "noEvent", "edge", "change", "previous", "hold"), (1, 1)), "initial": (0, 0),
+    **dict.fromkeys(("sample", "Clock", "size"), (1, 2)), "smooth": (2, 2), "reinit": (2, 2), "delay": (2, 3),
+}  # fmt: skip
+"""Least and largest number of arguments."""
 _REFUSED = {
     "spatialDistribution": "spatialDistribution", "cardinality": "cardinality(…)",
     "terminal": "terminal()",
@@ -32,7 +36,6 @@ _REFUSED = {
     "backSample": "a clock that follows another",
     "transition": "a state machine", "initialState": "a state machine",
 }  # fmt: skip
-_LONGEST = 100_000
 
 
 class Resolver:
@@ -75,17 +78,18 @@ class Resolver:
         if kind == "range":
             numbers = [self.number(one) for one in args]
             start, step, stop = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
-            count = math.floor((stop - start) / step + 1e-9) + 1
-            if count > _LONGEST:
-                raise refused(f"an array of {count} elements", self.text, line)
-            return Expr("array", tuple(Expr("number", (start + k * step,), line) for k in range(max(count, 0))), line)
-        return self._told(lambda: fold.operation(kind, tuple(self(one) for one in args), line), line)
+            return self._told(lambda: fold.row(start, step, stop, line), line)
+        values = tuple(map(self, args))
+        return self._told(lambda: fold.operation(kind, values, line), line)
 
     def _told(self, make: Callable[[], Expr], line: int) -> Expr:
         try:
             return make()
         except fold.Unfit as error:
             raise ModelicaTextError(f"{error}.", where=self.text.place(line)) from None
+        except ModelicaTextError as error:
+            error.where = error.where or (self.text.place(line),)
+            raise
 
     def _chosen(self, args: tuple[Expr, ...], line: int) -> Expr:
         """Resolve an `if`; branches that are known not to be taken are not looked at."""
@@ -133,6 +137,16 @@ class Resolver:
             )
         return value.args[0]
 
+    def count(self, expression: Expr) -> int:
+        """Return the value of an expression that is the size of an array.
+
+        Raises:
+            ModelicaTextError: it has none, or is no size.
+        """
+        size = self.number(expression)
+        self._told(lambda: fold.number(fold.count(size)), expression.line)
+        return int(size)
+
     def known(self) -> Resolver:
         """Return the same resolver with parameters as values."""
         return Resolver(self.instance, self.text, self.local, numeric=True, classes=self.classes, depth=self.depth)
@@ -157,18 +171,30 @@ class Resolver:
             if one.kind == "all":
                 rest = subscripts[k + 1 :]
                 return Expr("array", tuple(self.indexed(item, rest, line) for item in value.args), line)
-            chosen = self.known()(one)
-            if chosen.kind == "array":
+            chosen = self.index(one, len(value.args))
+            if isinstance(chosen, Expr):
                 rest = subscripts[k + 1 :]
                 found = tuple(self.indexed(value, (index, *rest), line) for index in chosen.args)
                 return Expr("array", found, line)
-            position = int(self.number(one))
-            if not 1 <= position <= len(value.args):
-                raise ModelicaTextError(
-                    f"The index {position} is outside 1 to {len(value.args)}.", where=self.text.place(line)
-                )
-            value = value.args[position - 1]
+            value = value.args[chosen - 1]
         return value
+
+    def index(self, expression: Expr, size: int) -> int | Expr:
+        """Return a subscript: a position, or an array of them; `end` is the size of the array.
+
+        Raises:
+            ModelicaTextError: it is no whole number from 1 to the size.
+        """
+        inside = self.known()
+        inside.local["end"] = fold.number(size)
+        chosen = inside(expression)
+        if chosen.kind == "array":
+            return chosen
+        position = inside.number(chosen)
+        if position != int(position) or not 1 <= position <= size:
+            what = f"The index {position:g} is {'outside' if position == int(position) else 'no whole number from'}"
+            raise ModelicaTextError(f"{what} 1 to {size}.", where=self.text.place(expression.line))
+        return int(position)
 
     def _member(self, owner: Instance, before: str, parts: tuple[Any, ...], line: int) -> Expr:
         """Resolve a path that begins with a member of an instance."""
@@ -182,9 +208,17 @@ class Resolver:
             if rest:
                 raise members.unknown_name(f"{name} is a number and has no '{rest[0][0]}'.", self.text, line)
             return self._scalar(owner, member, basic, before + name, subscripts, line)
-        chosen = "".join(f"[{int(self.number(one))}]" for one in subscripts)
-        part = members.part_of(owner, member, int(chosen[1:-1]) if chosen else 0)
-        path = f"{before}{name}{chosen}"
+        shape = members.sizes(owner, member)
+        if len(subscripts) > len(shape):
+            raise refused(f"a subscript of {name}, which is no array,", self.text, line)
+        whole = Expr("range", (fold.number(1), Expr("name", (("end", ()),), line)), line)
+        every = bool(shape) and (not subscripts or subscripts[0].kind == "all")
+        chosen = self.index(whole if every else subscripts[0], shape[0]) if shape else 0
+        if isinstance(chosen, Expr):
+            items = (((name, (one,)), *rest) for one in chosen.args)
+            return Expr("array", tuple(self._member(owner, before, one, line) for one in items), line)
+        part = members.part_of(owner, member, chosen)
+        path = f"{before}{name}[{chosen}]" if chosen else f"{before}{name}"
         if not rest:
             raise refused(f"{name}, a component, as a value", self.text, line)
         if isinstance(part, Instance):
@@ -270,10 +304,17 @@ class Resolver:
         short = name.removeprefix("Modelica.Math.").removeprefix("Math.")
         if short in _REFUSED:
             raise refused(_REFUSED[short], self.text, line)
-        if short in ("smooth", "homotopy", "noEvent"):
-            value = self(dict(named).get("actual", given[1 if short == "smooth" else 0] if given else expression))
-            plain = value.kind in ("number", "array") or short == "homotopy"
-            return value if plain else Expr("call", ("noEvent", (value,), ()), line)
+        least, most = _ARGUMENTS.get(short, (0, len(given)))
+        if not least <= len(given) <= most:
+            count = f"{least} to {most}" if most > least else str(least)
+            what = f"{short}(…) has {count} argument{'s' if most != 1 else ''}, not {len(given)}."
+            raise ModelicaTextError(what, where=self.text.place(line))
+        if short == "homotopy":
+            others = dict(named)
+            return self._homotopy([*given, *(others[key] for key in ("actual", "simplified") if key in others)], line)
+        if short in ("smooth", "noEvent"):
+            value = self(given[1 if short == "smooth" else 0])
+            return value if value.kind in ("number", "array") else Expr("call", ("noEvent", (value,), ()), line)
         if short in KEPT:
             return Expr("call", (short, tuple(self(one) for one in given), ()), line)
         if short == "size":
@@ -281,11 +322,22 @@ class Resolver:
             return functions.size(items, int(self.number(given[1])) if len(given) > 1 else 0, line)
         values = tuple(self(one) for one in given)
         if short in functions.OF_ARRAYS:
+            if not values or (short in ("sum", "product", "scalar", "transpose") and values[0].kind != "array"):
+                raise ModelicaTextError(f"{short}(…) needs an array.", where=self.text.place(line))
             return self._told(lambda: functions.OF_ARRAYS[short](values, line), line)
         if short in ELEMENTARY:
             return self._told(lambda: fold.function(short, values, line), line)
         others = {key: self(one) for key, one in named}
         return self._told(lambda: functions.called(self, expression, values, others), line)
+
+    def _homotopy(self, given: list[Expr], line: int) -> Expr:
+        """Resolve a homotopy; one of arrays, or of what is known, is its actual expression."""
+        if len(given) != 2:
+            what = f"homotopy(…) has 2 arguments, actual and simplified, not {len(given)}."
+            raise ModelicaTextError(what, where=self.text.place(line))
+        actual, simplified = map(self, given)
+        known = actual.kind in ("number", "array") or simplified.kind == "array"
+        return actual if known else Expr("call", ("homotopy", (actual, simplified), ()), line)
 
     def _sized(self, expression: Expr) -> Expr:
         """Resolve an array for its size; one of components counts, too."""

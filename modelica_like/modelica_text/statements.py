@@ -6,11 +6,15 @@ from dataclasses import dataclass, field
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.modelica_text import fold
-from modelica_like.modelica_text.instance import Instance, refused
+from modelica_like.modelica_text.instance import Instance, Member, refused
+from modelica_like.modelica_text.library import Known
+from modelica_like.modelica_text.members import element, exists, part_of, sizes
 from modelica_like.modelica_text.resolve import Resolver
 from modelica_like.modelica_text.tree import ClassText, Expr, Statement, calls_in
 from modelica_like.modelica_text.types import basic_type
-from modelica_like.modelica_text.written import Happening
+from modelica_like.modelica_text.written import MEMORY, TERMINATE, Happening
+
+_INSTANTS = ("sample", "edge", "change", "initial", "terminal")
 
 
 @dataclass
@@ -27,6 +31,7 @@ class Statements:
         happenings: whens and assertions.
         assigned: names that only events change.
         memory: values of discrete variables before the start, from initial equations of `pre(…)`.
+        outputs: Boolean signals with an equation, and whether they are true for instants only.
     """
 
     instance: Instance
@@ -36,6 +41,7 @@ class Statements:
     happenings: list[Happening] = field(default_factory=list)
     assigned: set[str] = field(default_factory=set)
     memory: dict[str, Expr] = field(default_factory=dict)
+    outputs: dict[str, bool] = field(default_factory=dict)
 
     def read(self) -> None:
         """Go through declarations with values, then all equations.
@@ -64,8 +70,9 @@ class Statements:
         sources = [source for _, _, source in (*self.equations, *self.initial) for _ in (0, 1)]
         for one in self.happenings:
             for conditions, new in one.branches:
-                values += [*conditions, *new.values()]
-                sources += [one.source] * (len(conditions) + len(new))
+                numbers = [*conditions, *(value for name, value in new.items() if name != TERMINATE)]
+                values += numbers
+                sources += [one.source] * len(numbers)
         for value, source in zip(values, sources, strict=True):
             if not _is_numeric(value):
                 raise ModelicaTextError("A text, an array or a choice stands where a number belongs.", where=source)
@@ -97,17 +104,36 @@ class Statements:
         """Collect declarations `Real x = …`."""
         for name, member in self.instance.members.items():
             declared, basic = member.declaration, basic_type(self.instance, member)
-            if {"parameter", "constant"} & declared.prefixes or basic is None:
+            if {"parameter", "constant"} & declared.prefixes:
                 continue
-            if member.given.value is not None and member.given.scope is not None:
+            if basic is None:
+                self._connector_bindings(name, member)
+            elif member.given.value is not None and member.given.scope is not None:
                 scope, text = member.given.scope
                 if scope is not self.instance:
                     raise refused(f"an equation for {name} in the modification of its component", text, declared.line)
                 left = Resolver(self.instance, text)(Expr("name", ((name, ()),), declared.line))
                 self._equate(left, Resolver(scope, text)(member.given.value), text, declared.line)
 
+    def _connector_bindings(self, name: str, member: Member) -> None:
+        """Collect `Flange_a flange(tau = …)`: values of a connector's variables are equations."""
+        shape = sizes(self.instance, member) if member.given.inner and exists(self.instance, member) else (0,)
+        for k in range(1, shape[0] + 1) if shape else (0,):
+            part = part_of(self.instance, member, k)
+            if isinstance(part, Known) or (isinstance(part, Instance) and part.text.kind != "connector"):
+                continue
+            for last, one in (element(member.given, k) if k else member.given).inner.items():
+                if one.value is None or one.scope is None:
+                    continue
+                if one.scope[0] is not self.instance:
+                    what = f"an equation for {name}.{last} in the modification of its component"
+                    raise refused(what, one.scope[1], one.line)
+                path = Expr("name", ((f"{name}[{k}].{last}" if k else f"{name}.{last}", ()),), one.line)
+                self._equate(path, Resolver(*one.scope)(one.value), one.scope[1], one.line)
+
     def _statement(self, one: Statement, text: ClassText, local: dict[str, Expr]) -> None:
         resolver = Resolver(self.instance, text, local)
+        self.instance.classes.spend(10, text, one.line)
         if one.kind == "=":
             self._equate(resolver(one.parts[0]), resolver(one.parts[1]), text, one.line)
         elif one.kind == "connect":
@@ -128,8 +154,14 @@ class Statements:
         """Resolve the subscripts of an end of a connection, and keep its names."""
         if end.kind != "name":
             raise refused("this end of a connection", resolver.text, end.line)
-        parts = tuple((name, tuple(resolver.known()(index) for index in subs)) for name, subs in end.args)
-        return Expr("name", parts, end.line)
+        parts: list[tuple[str, tuple[Expr, ...]]] = []
+        for k, (name, subs) in enumerate(end.args):
+            inside = resolver.known()
+            member = self.instance.members.get(name) if subs and not k else None
+            if member is not None:
+                inside.local |= {"end": fold.number(([*sizes(self.instance, member), 0])[0])}
+            parts.append((name, tuple(inside(index) for index in subs)))
+        return Expr("name", tuple(parts), end.line)
 
     def _loop(
         self, iterators: list[tuple[str, Expr | None]], body: list[Statement], text: ClassText, local: dict[str, Expr]
@@ -188,10 +220,18 @@ class Statements:
                 self._equate(one, other, text, line)
         elif left.kind == "condition":
             right = _condition(right)
-            basic = basic_type(self.instance, self.instance.members[left.args[0][0].partition("[")[0]])
+            member = self.instance.members.get(left.args[0][0].partition("[")[0])
+            if member is None:
+                raise refused(
+                    f"An equation for {left.args[0][0]}, a Boolean of a part", text, line, "Connect a signal."
+                )
+            basic = basic_type(self.instance, member)
             if basic is not None and basic.prefixes & {"input", "output"}:
-                right = Expr("if", (right, fold.number(1), fold.number(0)), line)
-                left = Expr("name", left.args, line)
+                path = left.args[0][0]
+                self.outputs[path] = any(call.args[0] in _INSTANTS for call in calls_in(right))
+                signal = Expr("if", (left, fold.number(1), fold.number(0)), line)
+                self.equations.append((Expr("name", left.args, line), signal, text.place(line)))
+                left = Expr("name", ((f"{path}{MEMORY}", ()),), line)
             self.equations.append((left, right, text.place(line)))
         else:
             if left.kind == "number" and right.kind == "name":
@@ -211,8 +251,8 @@ class Statements:
             conditions = known.args if known.kind == "array" else (known,)
             if any(each.kind in ("boolean", "number") for each in conditions):
                 raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
-            values = self._changes(body, conditions, text, local)
-            made |= {name for name in values if name not in self._states(body, resolver)}
+            values = self._changes(body, text, local)
+            made |= {name for name in values if name not in {TERMINATE, *self._states(body, resolver)}}
             branches.append((conditions, values))
         for name in made & self.assigned:
             raise ModelicaTextError(f"Two whens determine {name}.", where=source)
@@ -224,9 +264,7 @@ class Statements:
         calls = (one.parts[0] for one in body if one.kind == "call" and one.parts[0].args[0] == "reinit")
         return {resolver(call.args[1][0]).args[0][0] for call in calls}
 
-    def _changes(
-        self, body: list[Statement], conditions: tuple[Expr, ...], text: ClassText, local: dict[str, Expr]
-    ) -> dict[str, Expr]:
+    def _changes(self, body: list[Statement], text: ClassText, local: dict[str, Expr]) -> dict[str, Expr]:
         """Return the new values of a branch of a when."""
         resolver = Resolver(self.instance, text, local)
         values: dict[str, Expr] = {}
@@ -241,10 +279,7 @@ class Statements:
                 target, value = (resolver(side) for side in call.args[1])
                 values[target.args[0][0]] = value
             elif call is not None and call.args[0] == "terminate":
-                for each in conditions:
-                    holds = fold.operation("not", (each,), one.line)
-                    words = _words(call.args[1][0])
-                    self.happenings.append(Happening((((holds,), {}),), text.place(one.line), words))
+                values[TERMINATE] = Expr("string", (_words(call.args[1][0]),), one.line)
             elif call is None or call.args[0] != "assert":
                 raise refused(f"'{one.kind}' in a 'when'", text, one.line)
         return values

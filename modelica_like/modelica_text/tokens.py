@@ -10,7 +10,7 @@ from modelica_like.errors import ModelicaTextError, Source
 _TOKEN = re.compile(
     r"""(?P<skip>\s+|//[^\n]*|/\*.*?\*/)|(?P<number>\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)
     |(?P<string>"(?:[^"\\]|\\.)*")|(?P<name>[^\W\d]\w*|'(?:[^'\\]|\\.)*')
-    |(?P<sign>:=|<=|>=|==|<>|\.\*|\.\+|\.-|\./|\.\^|[-+*/^<>=(){}\[\],;:.])""",
+    |(?P<open>/\*|["'])|(?P<sign>:=|<=|>=|==|<>|\.\*|\.\+|\.-|\./|\.\^|[-+*/^<>=(){}\[\],;:.])""",
     re.VERBOSE | re.DOTALL,
 )
 KINDS = {"model", "block", "connector", "record", "function", "package", "type", "class", "operator"}
@@ -18,8 +18,21 @@ SECTIONS = {"public", "protected", "equation", "algorithm", "initial", "end", "a
 _KEYWORDS = SECTIONS | {
     "then", "else", "elseif", "elsewhen", "loop", "for", "if", "when", "while", "connect", "or", "and",
 }  # fmt: skip
+_OPEN = {"/*": "comment", '"': "text", "'": "quoted name"}
+_DEEPEST = 100
+_RESERVED = frozenset(
+    """algorithm and annotation block break class connect connector constant constrainedby der discrete each else elseif
+    elsewhen encapsulated end enumeration equation expandable extends external false final flow for function if import
+    impure in initial inner input loop model not operator or outer output package parameter partial protected public
+    pure record redeclare replaceable return stream then true type when while within time""".split()  # noqa: SIM905
+)
 Token = tuple[str, str, int]
 """Kind (a sign and a keyword are their own kind), text, line."""
+
+
+def identifier(path: str) -> str:
+    """Return a path with its reserved words in quotes."""
+    return re.sub(r"(?<![\w'])\w+", lambda word: f"'{word[0]}'" if word[0] in _RESERVED else word[0], path)
 
 
 class Tokens:
@@ -35,7 +48,7 @@ class Tokens:
         self.lines = text.split("\n")
         self.tokens = self._tokens(text)
         self.at = 0
-        self.depth = 0
+        self.depth = self.brackets = 0
 
     def _tokens(self, text: str) -> list[Token]:
         tokens: list[Token] = []
@@ -45,6 +58,8 @@ class Tokens:
             if match is None:
                 self.refuse(f"{text[position]!r} has no meaning in Modelica.", line)
             kind, found = match.lastgroup or "", match.group()
+            if kind == "open":
+                self.refuse(f"A {_OPEN[found]} has no end.", line)
             if (kind == "name" and (found in _KEYWORDS or found in KINDS)) or kind == "sign":
                 tokens.append((found, found, line))
             elif kind != "skip":
@@ -62,6 +77,12 @@ class Tokens:
     def refuse(self, what: str, line: int) -> NoReturn:
         """Raise an error with its line."""
         raise self.error(what, line)
+
+    def deeper(self) -> None:
+        """Count one level of brackets, statements, classes or modifications more."""
+        self.depth += 1
+        if self.depth > _DEEPEST:
+            self.refuse(f"This is nested more than {_DEEPEST} deep.", self.line)
 
     @property
     def kind(self) -> str:
@@ -93,7 +114,8 @@ class Tokens:
             wanted = f"a {kind}" if kind == "name" else f"'{kind}'"
             told = f"'{self.text}'" if self.text else "the end of the file"
             self.refuse(f"Expected {wanted} before {told}.", self.line)
-        return found
+        bare = found.strip("'")  # the name of a reserved word; 'time' is not the time
+        return bare if found != bare and bare in _RESERVED and bare != "time" else found
 
     def dotted(self) -> str:
         """Read a name with dots; one from the outermost level begins with a dot."""

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from modelica_like.errors import Source
+from modelica_like.errors import ModelicaTextError, Source
+
+_DEEPEST = 300
+"""Levels of an expression: all that reads it goes down in it by a few calls a level, of 1,000 that Python allows."""
+_LARGEST = 500_000
+CHAIN = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,11 +25,30 @@ class Expr:
         args: operands. A `name` has pairs of a name and its subscripts; a `call` the function's dotted name, the
             positional arguments and the pairs of named ones; an `if` conditions and values in turn, then a value.
         line: where it begins.
+        depth: levels below it.
+        size: numbers, names and operations in it.
+
+    Raises:
+        ModelicaTextError: it is too deep, or too large; the place is added where it is known.
     """
 
     kind: str
     args: tuple[Any, ...]
     line: int = 0
+    depth: int = field(default=0, init=False, compare=False, repr=False)
+    size: int = field(default=1, init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        inner = [*_children(self)]
+        if not inner:
+            return
+        depth, size = 1 + max(one.depth for one in inner), 1 + sum(one.size for one in inner)
+        if depth > _DEEPEST:
+            raise ModelicaTextError(f"A formula has more than {_DEEPEST} levels.")
+        if size > _LARGEST:
+            raise ModelicaTextError(f"A formula has more than {_LARGEST} numbers, names and operations.")
+        object.__setattr__(self, "depth", depth)
+        object.__setattr__(self, "size", size)
 
     @property
     def path(self) -> str:
@@ -187,6 +212,30 @@ def calls_in(expression: Expr) -> Iterator[Expr]:
         yield expression
     for one in _children(expression):
         yield from calls_in(one)
+
+
+def chain(signs: list[str], terms: list[Expr]) -> Expr:
+    """Return `a + b - c` of terms and the signs between them.
+
+    The tree of a long chain of products is as deep as it is long; sums, `and` and `or` are joined two by two.
+    """
+    made = terms[0]
+    if len(terms) <= CHAIN or signs[0] not in ("+", "-", "or", "and"):
+        for sign, term in zip(signs, terms[1:], strict=True):
+            made = Expr(sign, (made, term), made.line)
+        return made
+    pairs = zip(signs, terms[1:], strict=True)
+    items = [made, *(Expr("neg", (term,), term.line) if sign == "-" else term for sign, term in pairs)]
+    kind = "+" if signs[0] == "-" else signs[0]
+    return joined(lambda one, other: Expr(kind, (one, other), one.line), items)
+
+
+def joined(join: Callable[[Expr, Expr], Expr], items: list[Expr]) -> Expr:
+    """Return what joins expressions two by two; many are halved again and again, so that they are not as deep."""
+    while len(items) > CHAIN:
+        halves = [join(one, other) for one, other in zip(items[::2], items[1::2], strict=False)]
+        items = [*halves, *items[2 * len(halves) :]]
+    return functools.reduce(join, items)
 
 
 def _children(expression: Expr) -> Iterator[Expr]:

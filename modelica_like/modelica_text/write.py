@@ -15,16 +15,11 @@ from modelica_like.modelica_text import fold
 from modelica_like.modelica_text.library import Known, by_component, table
 from modelica_like.modelica_text.own_classes import class_of_equations, connector_class
 from modelica_like.modelica_text.parse import parse_expression
+from modelica_like.modelica_text.tokens import identifier
 from modelica_like.modelica_text.tree import calls_in, names_in
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.units import coherent, parse_unit, read_quantity, to_si
 
-_RESERVED = frozenset(
-    """algorithm and annotation block break class connect connector constant constrainedby der discrete each else elseif
-    elsewhen encapsulated end enumeration equation expandable extends external false final flow for function if import
-    impure in initial inner input loop model not operator or outer output package parameter partial protected public
-    pure record redeclare replaceable return stream then true type when while within time""".split()  # noqa: SIM905
-)
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "**": 4}
 _BLOCKS = "Modelica.Blocks.Interfaces.Real"
 
@@ -62,11 +57,11 @@ class _Writer:
                 value = assembly.value(key)
                 if value is None:
                     raise ModelicaTextError(f"{assembly.label}.{key} has no value.")
-                lines.append(f"  parameter Real {_name(key)}{_unit(value)} = {self._value(value, assembly)};")
-        lines += [f"  {connector_class(one)} {_name(key)};" for key, one in assembly.connectors.items()]
+                lines.append(f"  parameter Real {identifier(key)}{_unit(value)} = {self._value(value, assembly)};")
+        lines += [f"  {connector_class(one)} {identifier(key)};" for key, one in assembly.connectors.items()]
         for key, field in assembly.fields.items():
             if isinstance(field, Input | Output):
-                lines.append(f"  {_BLOCKS}{type(field).__name__} {_name(key)};")
+                lines.append(f"  {_BLOCKS}{type(field).__name__} {identifier(key)};")
         for key, part in assembly._parts.items():
             lines.append(f"  {self._declaration(assembly, key, part, joined)};")
         lines.append("equation")
@@ -82,7 +77,7 @@ class _Writer:
     def _declaration(self, owner: Assembly, name: str, part: Component | list[Component], joined: set[str]) -> str:
         if not isinstance(part, list):
             kind, values = self._part(owner, name, part, joined)
-            return f"{kind} {_name(name)}{_arguments(values)}"
+            return f"{kind} {identifier(name)}{_arguments(values)}"
         made = [self._part(owner, f"{name}[{k}]", one, joined) for k, one in enumerate(part, 1)]
         kinds = {kind for kind, _ in made}
         keys = {tuple(values) for _, values in made}
@@ -97,7 +92,7 @@ class _Writer:
             else (key, "{" + ", ".join(one[key] for _, one in made) + "}")
             for key in keys.pop()
         }
-        return f"{kinds.pop()} {_name(name)}[{len(part)}]{_arguments(dict(values.values()))}"
+        return f"{kinds.pop()} {identifier(name)}[{len(part)}]{_arguments(dict(values.values()))}"
 
     def _part(self, owner: Assembly, path: str, part: Component, joined: set[str]) -> tuple[str, dict[str, str]]:
         """Return the class of a part and the arguments of its modification."""
@@ -117,24 +112,33 @@ class _Writer:
             driven = frozenset(key for key in part.fields if f"{path}.{key}" in joined)
             text = class_of_equations(part, name, lambda formula: formula_text(formula, part), driven)
             self.made[name] = text
-            given = {key: self._value(value, owner) for key, value in part._values.items()}
+            given = {identifier(key): self._value(value, owner) for key, value in part._values.items()}
             return name, {**given, **self._starts(part, None, owner)}
         values = _Arguments(self, owner, path, part, known, joined)
         return known.path, {**values.read(), **self._starts(part, known, owner)}
 
     def _starts(self, part: Component, known: Known | None, owner: Assembly) -> dict[str, str]:
-        starts: dict[str, str] = {}
+        starts: dict[str, dict[str, Value]] = {}
         inside = [(f"{one.path.removeprefix(f'{part.path}.')}.", one) for one in part.walk() if one is not part]
         given = [(f"{path}{name}", value) for path, one in [("", part), *inside] for name, value in one._starts.items()]
         for name, value in given:
             there = known.there(name) if known else name
             if "." in there:
                 raise ModelicaTextError(f"The start value of {part.label}.{name} has no counterpart in Modelica text.")
-            fixed = ", fixed = true" if value.fixed else ""
-            starts[f"{there}(start = {self._value(value, owner)}{fixed})"] = ""
+            starts.setdefault(there.partition("[")[0], {})[there] = value
         if part._start_modes:
             raise ModelicaTextError(f"{part.label} has a start mode, which Modelica text does not say here.")
-        return starts
+        return dict.fromkeys((self._start(base, one, part, owner) for base, one in starts.items()), "")
+
+    def _start(self, base: str, given: dict[str, Value], part: Component, owner: Assembly) -> str:
+        """Return the modification of a start value, or of those of all elements of an array."""
+        if base in given:
+            fixed = ", fixed = true" if given[base].fixed else ""
+            return f"{identifier(base)}(start = {self._value(given[base], owner)}{fixed})"
+        elements = [given.get(name) for name in part.fields if name.startswith(f"{base}[")]
+        values = ", ".join("0" if one is None else self._value(one, owner) for one in elements)
+        fixed = ", ".join(str(one is not None and one.fixed).lower() for one in elements)
+        return f"{identifier(base)}(start = {{{values}}}, fixed = {{{fixed}}})"
 
     def _value(self, value: Value, owner: Component) -> str:
         return _number(value.number or 0.0) if value.formula is None else formula_text(value.formula, owner)
@@ -312,7 +316,7 @@ def formula_text(formula: Formula, owner: Component, outer: int = 0) -> str:
         path = operands[0] if isinstance(operands[0], str) else operands[0].name
         part, _, name = path.rpartition(".")
         known = by_component().get(type(owner.find(part)).__name__) if part else None
-        return f"{part}.{known.there(name) if known else name}" if part else _name(name)
+        return identifier(f"{part}.{known.there(name) if known else name}" if part else name)
     if kind == "neg":
         return f"(-{formula_text(operands[0], owner, 3)})"
     if kind not in _PRECEDENCE:
@@ -334,12 +338,12 @@ def _there(assembly: Assembly, end: Any) -> str:
     path = _path(assembly, end)
     owner, _, name = path.rpartition(".")
     if not owner:
-        return _name(name)
+        return identifier(name)
     head, *rest = owner.split(".")
     part = assembly.parts[head]
     known = by_component().get(type(part).__name__)
     inner = ".".join([*rest, name])
-    return f"{_name(head)}.{known.there(inner) if known and known.type is type(part) else inner}"
+    return identifier(f"{head}.{known.there(inner) if known and known.type is type(part) else inner}")
 
 
 def _path(assembly: Assembly, end: Any) -> str:
@@ -353,11 +357,6 @@ def _class_name(assembly: Assembly) -> str:
     )
     name = name or "drive"
     return name[:1].upper() + name[1:] if not name[0].isdigit() else f"Drive_{name}"
-
-
-def _name(name: str) -> str:
-    head = name.partition("[")[0]
-    return f"'{head}'{name[len(head) :]}" if head in _RESERVED else name
 
 
 def _arguments(values: Mapping[str, str]) -> str:

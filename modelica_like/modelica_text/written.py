@@ -24,16 +24,18 @@ from modelica_like.language import (
     edge,
     floor,
     hold,
-    if_,
+    homotopy,
     initial,
     mod,
     pre,
     previous,
     sample,
+    sign,
+    terminate,
     when,
     where,
 )
-from modelica_like.language.discrete import is_a
+from modelica_like.language.discrete import is_a, silent
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field
@@ -56,6 +58,12 @@ class Happening:
     text: str = ""
 
 
+TERMINATE = "terminate()"
+"""Among the new values of a `when`: it ends the run, with this text."""
+MEMORY = "_condition"
+"""Behind the name of a Boolean signal: the condition itself, which has a value before events."""
+
+
 class Written(Assembly):
     """A component whose class is Modelica text.
 
@@ -67,6 +75,7 @@ class Written(Assembly):
     _statements: tuple[tuple[Node, Node, Source], ...] = ()
     _initial: tuple[tuple[Node, Node, Source], ...] = ()
     _happenings: tuple[Happening, ...] = ()
+    _instants: frozenset[str] = frozenset()
 
     def __reduce__(self) -> Any:
         # The class is made for one text; another process makes it again.
@@ -102,26 +111,28 @@ class Written(Assembly):
             made = None
             for conditions, values in one.branches:
                 active = tuple(self.symbolic(condition) for condition in conditions)
-                new = {self._symbol(path): self.symbolic(value, silent=True) for path, value in values.items()}
+                numbers = {path: value for path, value in values.items() if path != TERMINATE}
+                new = {self._symbol(path): self.symbolic(value, events=None) for path, value in numbers.items()}
+                if TERMINATE in values:
+                    new |= terminate(f"says: {values[TERMINATE].args[0]}")
                 made = when(active, new) if made is None else made.elsewhen(active, new)
             if made is not None:
                 yield replace(made, source=one.source)
 
     def source_power(self) -> Expr | float:
         """Return minus the power that enters at own connectors, unless parts take it on."""
-        if self._parts:
-            return 0.0
+        joined = {end for ends in self.wires.values() for end in ends}
         total: Any = 0.0
-        for one in self.connectors.values():
-            total = total - one.power()
+        for name, one in self.connectors.items():
+            total = total if name in joined else total - one.power()
         return total
 
-    def symbolic(self, node: Node, silent: bool = False) -> Any:
+    def symbolic(self, node: Node, events: bool | None = True) -> Any:
         """Return a resolved expression in symbols.
 
         Args:
             node: the expression.
-            silent: whether its relations make no events.
+            events: whether its steps make events, as of `where`; None in what changes at events only.
         """
         kind, args = node.kind, node.args
         if kind == "number":
@@ -132,23 +143,25 @@ class Written(Assembly):
             return self._symbol(args[0][0])
         if kind == "condition":
             symbol = self._symbol(args[0][0])
+            if f"{symbol.name}{MEMORY}" in symbol.owner.fields:
+                symbol = symbol_of(symbol.owner, f"{symbol.name}{MEMORY}")
             discrete = isinstance(symbol.owner.fields[symbol.name], Discrete)
             return symbol if discrete else ca.SX(symbol) > 0.5
         if kind == "if":
-            choose = where if silent else if_
-            made = self.symbolic(args[-1], silent)
+            made = self.symbolic(args[-1], events)
             for condition, value in reversed(list(zip(args[:-1:2], args[1::2], strict=True))):
-                made = choose(self.symbolic(condition, silent), self.symbolic(value, silent), made)
+                made = where(self.symbolic(condition, events), self.symbolic(value, events), made, events=events)
             return made
         if kind == "call":
-            silent = silent or args[0] == "noEvent"
-            return self._called(args[0], [self.symbolic(one, silent) for one in args[1]], silent)
-        return _OPERATIONS[kind](*(self.symbolic(one, silent) for one in args))
+            events = False if args[0] == "noEvent" else events
+            return self._called(args[0], [self.symbolic(one, events) for one in args[1]], events)
+        made = _OPERATIONS[kind](*(self.symbolic(one, events) for one in args))
+        return silent(made) if events is False and kind in _RELATIONS else made
 
-    def _called(self, name: str, values: list[Any], silent: bool) -> Any:
+    def _called(self, name: str, values: list[Any], events: bool | None) -> Any:
         if name == "pre" and not (isinstance(values[0], Symbol) and is_a(values[0], Discrete)):
             return values[0]  # of a state: the value before the event, as in all new values
-        return _STEPPED[name](*values, not silent) if name in _STEPPED else FUNCTIONS[name](*values)
+        return _STEPPED[name](*values, events) if name in _STEPPED else FUNCTIONS[name](*values)
 
     def _symbol(self, path: str) -> Any:
         if path == "time":
@@ -171,28 +184,37 @@ class WrittenConnector(Connector):
     kind = ""
 
 
+_RELATIONS: dict[str, Callable[..., Any]] = {
+    "<": lambda a, b: a < b, "<=": lambda a, b: a <= b, ">": lambda a, b: a > b, ">=": lambda a, b: a >= b,
+    "==": lambda a, b: a == b, "<>": lambda a, b: a != b,
+}  # fmt: skip
 _OPERATIONS: dict[str, Callable[..., Any]] = {
     "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "/": lambda a, b: a / b,
     "^": lambda a, b: a**b, "neg": lambda a: -a,
-    "<": lambda a, b: a < b, "<=": lambda a, b: a <= b, ">": lambda a, b: a > b, ">=": lambda a, b: a >= b,
-    "==": lambda a, b: a == b, "<>": lambda a, b: a != b,
-    "and": ca.logic_and, "or": ca.logic_or, "not": ca.logic_not,
+    **_RELATIONS, "and": ca.logic_and, "or": ca.logic_or, "not": ca.logic_not,
 }  # fmt: skip
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(ca, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")},
-    **{name: getattr(ca, name) for name in ("tanh", "exp", "log", "log10", "sqrt", "sign")},
+    **{name: getattr(ca, name) for name in ("tanh", "exp", "log", "log10", "sqrt")},
     "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax, "noEvent": lambda x: x,
     "der": der, "pre": pre, "edge": edge, "change": change, "initial": initial,
     "delay": lambda value, time, most=None: delay(value, time),
     "sample": lambda value, period=None: sample(value) if period is None else clock(period, value),
-    "Clock": lambda period, parts=1: clock(period / parts), "previous": previous, "hold": hold,
+    "Clock": lambda period, parts=1: clock(period / parts), "previous": previous, "hold": hold, "homotopy": homotopy,
 }  # fmt: skip
+
+
+def _towards_zero(x: Any, events: bool | None) -> Any:
+    return sign(x, events=None if events else events) * floor(ca.fabs(x), events=events)
+
+
 _STEPPED: dict[str, Callable[..., Any]] = {
+    "sign": lambda x, events: sign(x, events=events),
     "floor": lambda x, events: floor(x, events=events), "integer": lambda x, events: floor(x, events=events),
     "ceil": lambda x, events: -floor(-x, events=events),
     "mod": lambda x, y, events: mod(x, y, events=events),
-    "div": lambda x, y, events: ca.sign(x / y) * floor(ca.fabs(x / y), events=events),
-    "rem": lambda x, y, events: x - y * ca.sign(x / y) * floor(ca.fabs(x / y), events=events),
+    "div": lambda x, y, events: _towards_zero(x / y, events),
+    "rem": lambda x, y, events: x - y * _towards_zero(x / y, events),
 }  # fmt: skip
 """Functions that jump, by their arguments and whether the jumps are events."""
 _IN_FORMULAS = {"sqrt", "abs", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh", "min", "max"}
@@ -231,7 +253,7 @@ def _formula(node: Node, prefix: str) -> Formula | None:
         return Formula("number", (args[0],))
     if kind == "name" and args[0][0] != "time":
         return Formula("name", (prefix + args[0][0],))
-    if kind == "call" and args[0] == "noEvent":
+    if kind == "call" and args[0] in ("noEvent", "homotopy"):
         return _formula(args[1][0], prefix)
     operation = {"^": "**"}.get(kind, kind) if kind in ("+", "-", "*", "/", "^", "neg") else ""
     operands = args

@@ -15,8 +15,8 @@ from modelica_like.native.library import BatchArguments
 from modelica_like.native.model import NativeModel
 from modelica_like.solve.options import Options
 
-Kind = Literal["end", "at", "max", "min", "area", "work", "change", "impact"]
-_KINDS: tuple[Kind, ...] = ("end", "at", "max", "min", "area", "work", "change", "impact")
+Kind = Literal["end", "at", "max", "integral", "first", "change", "impact"]
+_KINDS: tuple[Kind, ...] = ("end", "at", "max", "integral", "first", "change", "impact")
 _RECORD = np.dtype(
     [*((name, np.int32) for name in ("kind", "place", "before", "after", "number", "unused")), ("moment", float)]
 )
@@ -27,8 +27,8 @@ class Reading:
     """A number to read off a run.
 
     Attributes:
-        kind: value at the end or at a moment, largest and smallest result, integral over the results (`area`) or over
-            the integrator's steps (`work`), time of a mode change, energy in J lost in impacts.
+        kind: value at the end or at a moment, largest value, integral, first time above zero, time of a mode change,
+            energy in J lost in impacts.
         place: position of the variable, of the mode, or of the held motion.
         change: numbers of the modes before and after (-1: any), and which of several such changes.
         moment: in s.
@@ -46,7 +46,7 @@ class Batch:
     Args:
         model: the compiled model.
         readings: numbers to read off every run.
-        options: tolerances, number of results and largest number of events.
+        options: tolerances and largest number of events.
         span: start and end time in s.
         start: kind of start; by default that of the netlist.
 
@@ -81,7 +81,7 @@ class Batch:
         values, failed = np.empty((runs, len(self._readings))), np.ones(runs, np.uint8)
         numbers = [np.ascontiguousarray(one, float) for one in (parameters, inputs)]
         places = (one.ctypes.data for one in (self._readings, *numbers, values, failed))
-        counts = options.points, options.max_events, runs, len(self._readings)
+        counts = options.max_events, runs, len(self._readings)
         stops = ctypes.pointer(ctypes.c_int(0) if stop is None else stop)
         arguments = BatchArguments(*self._span, options.rtol, options.atol, *counts, *places, stops)
         if self._native.library.batch(self._native.address, ctypes.byref(arguments)) < 0:

@@ -11,12 +11,15 @@ import numpy as np
 from modelica_like.compile.compiled import Vector
 from modelica_like.native.library import MORE, PAUSED, Run
 from modelica_like.native.model import Instance
+from modelica_like.solve.dense import MOST_KEPT
 
 _COUNTED = {
     "points": ("times", "states", "outputs"), "segments": ("modes", "firsts"), "events": ("events",),
-    "impacts": ("impacts",),
+    "impacts": ("impacts",), "taken": ("steps_taken",),
 }  # fmt: skip
 _LEAST = 32
+_AT_ONCE = 2
+"""Rows that are written together."""
 _BREATH = 5000
 """Number of steps between two checks for an interrupt."""
 
@@ -30,7 +33,12 @@ class Buffers:
         points: number of equal intervals of the results.
         widths: arrays to write (of `NativeRun` in native.c), with the number of columns.
         outputs: value references of the outputs.
+
+    Attributes:
+        emptied: takes the steps for which there is no more room.
     """
+
+    emptied: Callable[[Vector], None]
 
     def __init__(
         self, instance: Instance, end: float, points: int, widths: Mapping[str, int], outputs: Any = ()
@@ -53,8 +61,16 @@ class Buffers:
             code = self.instance.library.run(*arguments)
             if not reached(self.run.last) or code not in (MORE, PAUSED):
                 return code
-            for counted, names in _COUNTED.items() if code == MORE else ():
-                self._make_room(counted, names, 2 * getattr(self.run, f"room_{counted}"))
+            rooms = {counted: getattr(self.run, f"room_{counted}") for counted in _COUNTED}
+            full = [counted for counted in rooms if getattr(self.run, f"n_{counted}") + _AT_ONCE > rooms[counted]]
+            # An instant may have more events than there is room for, and leaves none of them.
+            for counted in (full or rooms) if code == MORE else ():
+                names, room = _COUNTED[counted], 2 * rooms[counted]
+                if names == ("steps_taken",) and room * self._widths.get(names[0], 0) > MOST_KEPT:
+                    self.emptied(self["steps_taken"])
+                    self.run.n_taken = 0
+                else:
+                    self._make_room(counted, names, room)
 
     def __getitem__(self, name: str) -> Vector:
         """Written rows, shape (rows, columns)."""

@@ -105,6 +105,8 @@ class Native:
     def step(self, time: float) -> Vector:
         """Set `inputs`, step to a time in s through all events, and return `outputs`, shape (outputs,).
 
+        Where a component has ended the run before, it stays at that time: see `time`.
+
         Raises:
             SolveError: the run cannot continue; use `restore` or `reset`.
             ValueOutOfRange: an input cannot be set, or the time is not a whole number of fixed steps away.
@@ -116,6 +118,9 @@ class Native:
 
     def gradient(self) -> Vector:
         """Return the derivatives of `outputs` with respect to `by`, through all events since the start.
+
+        Where the run stays at a kink that changes no mode (an output limited to what it just is), they are those of one
+        side; `sensitivities` refuses that.
 
         Returns:
             Shape (outputs, by).
@@ -133,6 +138,34 @@ class Native:
     def time(self) -> float:
         """Present time in s."""
         return self._library.time(self._address)
+
+    @property
+    def states(self) -> Vector:
+        """States at the present point, shape (states,), in the order of `model.states` and in SI units.
+
+        Others can be set, also during a run; modes change if their events say so. What modes hold then, such as the
+        slip of a clutch that sticks, or whose slip was set to the other sign, is stopped as in an impact: momentum is
+        kept.
+
+        Raises:
+            ValueOutOfRange: a state is not finite, or their number is another one.
+            SolveError: the run cannot continue from there; use `restore` or `reset`.
+        """
+        return self._at_states(None)
+
+    @states.setter
+    def states(self, values: Any) -> None:
+        given = np.ascontiguousarray(values, dtype=float)
+        if given.shape != (self._instance.native.sizes[0],):
+            raise ValueOutOfRange(f"There are {self._instance.native.sizes[0]} states, not {given.size}.")
+        self._at_states(given)
+        self._read(self._references[1], self.outputs)
+
+    def _at_states(self, given: Vector | None) -> Vector:
+        found = np.zeros(self._instance.native.sizes[0])
+        place = None if given is None else given.ctypes.data
+        self._instance.check(self._library.states(self._address, place, found.ctypes.data))
+        return found
 
     def copy(self) -> Copy:
         """Return a copy of the state, to restore any number of times."""

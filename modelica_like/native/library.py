@@ -16,7 +16,7 @@ MESSAGE_LENGTH = 512
 _POINTER, _COUNT, _NUMBER, _CODE = c.c_void_p, c.c_int64, c.c_double, c.c_int
 
 
-_ARRAYS = ("times", "states", "outputs", "modes", "firsts", "events", "impacts", "references")
+_ARRAYS = ("times", "states", "outputs", "modes", "firsts", "events", "impacts", "steps_taken", "references")
 
 
 class Run(c.Structure):
@@ -25,8 +25,8 @@ class Run(c.Structure):
     _fields_ = [
         *((name, _POINTER) for name in _ARRAYS),
         *((name, _COUNT) for name in ("n_outputs", "steps")),
-        *((f"room_{name}", _COUNT) for name in ("points", "segments", "events", "impacts")),
-        *((f"n_{name}", _COUNT) for name in ("points", "segments", "events", "impacts")),
+        *((f"room_{name}", _COUNT) for name in ("points", "segments", "events", "impacts", "taken")),
+        *((f"n_{name}", _COUNT) for name in ("points", "segments", "events", "impacts", "taken")),
         *((name, _COUNT) for name in ("next", "first")),
         ("begin", _NUMBER),
         ("last", _NUMBER),
@@ -38,7 +38,7 @@ class BatchArguments(c.Structure):
 
     _fields_ = [
         *((name, _NUMBER) for name in ("start", "end", "rtol", "atol")),
-        *((name, _COUNT) for name in ("results", "most_events", "n_runs", "n_readings")),
+        *((name, _COUNT) for name in ("most_events", "n_runs", "n_readings")),
         *((name, _POINTER) for name in ("readings", "parameters", "inputs", "values", "failed")),
         ("stop", c.POINTER(c.c_int)),
     ]
@@ -51,11 +51,13 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "free": (None, [_POINTER]),
     "message": (c.c_char_p, [_POINTER]),
     "reset": (_CODE, [_POINTER, *4 * [_NUMBER]]),
+    "limit": (None, [_POINTER, _NUMBER]),
     "set": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),
     "set_all": (None, 3 * [_POINTER]),
     "get": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),
     "begin": (_CODE, [_POINTER]),
     "begin_at": (_CODE, 4 * [_POINTER]),
+    "states": (_CODE, 3 * [_POINTER]),
     "time": (_NUMBER, [_POINTER]),
     "step": (_CODE, [_POINTER, _NUMBER, _COUNT, _POINTER, _POINTER, _COUNT, _POINTER, _POINTER]),
     "copy": (_CODE, [_POINTER, c.POINTER(_POINTER)]),

@@ -35,8 +35,9 @@ from modelica_like.solve.options import Options
 
 _ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
     ("The integrator gave up|The step from", StepFailed),
-    ("Modes still switch|Discrete variables do not|Events follow each other", Chattering),
+    (r"Modes still switch|Discrete variables do not|Events follow each other|At \S+ s the condition of", Chattering),
     (r"At t = \S+ s no combination", NoValidModes),
+    (r"At t = \S+ s .* contradicts the rest of the circuit", NoValidModes),
     ("The Jacobian is singular|The derivative of .* is not finite", SingularAtStart),
     (r"t = \S+ s: ", LimitPassed),
     ("Two start values|A start value of", ContradictingStart),
@@ -127,6 +128,10 @@ class Instance:
         """Start again at a time in s, with the model's parameters and inputs; `end` may be infinite."""
         self.check(self.library.reset(self.address, t0, end, rtol, atol))
         self.library.set_all(self.address, _at(self.model.p), _at(self.model.u))
+
+    def limit(self, longest: float) -> None:
+        """Limit steps from now on, in s."""
+        self.library.limit(self.address, longest)
 
     def begin_at(self, point: Point) -> None:
         """Start at a consistent point, before its events."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import ctypes
 import gzip
+import hashlib
 import json
 import re
 import time
@@ -130,14 +131,23 @@ def page(
     folder = Path(__file__).parent
     # No text may contain the end of the script.
     data = json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
-    scripts = (HELPERS, runner, folder / "page.js")
+    script = joined_scripts(HELPERS, runner, folder / "page.js")
     parts = {
         "name": escape(name), "description": escape(description), "page": data, "more": more, "connect": connect,
-        "schematic": schematic,
-        "script": "\n".join(one.read_text(encoding="utf-8").rstrip() for one in scripts),
+        "schematic": schematic, "script": script, "hash": script_hash(script),
     }  # fmt: skip
     text = (folder / "page.html").read_text(encoding="utf-8")
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], text)
+
+
+def joined_scripts(*files: Path) -> str:
+    """Return the script of a page."""
+    return "\n".join(one.read_text(encoding="utf-8").rstrip() for one in files)
+
+
+def script_hash(script: str) -> str:
+    """Return how a content policy names a script: only this one runs, whatever else gets into the page."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 
 def page_content(model: CompiledDae, signals: Sequence[Signal], until: float, options: Options) -> dict[str, Any]:

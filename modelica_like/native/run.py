@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +13,40 @@ from modelica_like.errors import Chattering
 from modelica_like.initialize import Impact, Point
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.model import Instance
+from modelica_like.solve.dense import Dense
 from modelica_like.solve.events import Progress
+from modelica_like.solve.idas import Integrator
 from modelica_like.solve.instants import chattering, note_rest, note_sharing
 from modelica_like.solve.options import Options
+from modelica_like.solve.penetration import LET_IT_REST
 from modelica_like.solve.recorder import Recorder, Segment
+
+_PARTS = 100
+"""Parts of a run that may take `max_steps` each, if it has so many results."""
+_ROUNDING = 1e-9
+"""Relative one of the times of results."""
+
+
+class OfSteps(Dense):
+    """Dense output of the run-time's steps; `piece_at` in integrate.c has the same polynomial.
+
+    Args:
+        integrator: solves for implicit unknowns.
+        steps: rows of `steps_taken` in native.c.
+        modes: of the segments, shape (segments, nd).
+    """
+
+    def __init__(self, integrator: Integrator, steps: Vector, modes: Vector) -> None:
+        self._integrator, self._steps = integrator, steps
+        self.begins, self.ends, self.d = steps[:, 1], steps[:, 2], modes[steps[:, 0].astype(int)].T
+
+    def points(self, pieces: Any, times: Vector) -> tuple[Vector, Vector]:
+        """Evaluate the polynomials of degree four."""
+        rows, nx = self._steps[pieces], len(self._integrator.model.states)
+        s = ((times - rows[:, 1]) / (rows[:, 2] - rows[:, 1]))[:, None]
+        first, last, a, b, c = np.split(rows[:, 3:], 5, axis=1)
+        y = ((1 - s) * first + s * (last + (1 - s) * (a + s * (b + s * c)))).T
+        return y[:nx], self._integrator.polished(times, y[:nx], y[nx:], self.d[:, pieces])
 
 
 class NativeLoop:
@@ -22,7 +54,7 @@ class NativeLoop:
 
     Args:
         model: the compiled model.
-        options: tolerances and number of results; `max_steps` and `iterations` are IDAS's.
+        options: tolerances and number of results; `iterations` are IDAS's.
         start: consistent start.
         end: end time in s.
         progress: called with the time reached.
@@ -33,14 +65,25 @@ class NativeLoop:
     ) -> None:
         self.model, self.options, self.progress = model, options, progress
         self.record, self._span = Recorder(), end - start.t
+        self._part = self._span / min(options.points, _PARTS)
+        self._passed = (start.t, 0)  # time, and steps until then
         self._instance = Instance(model)
         self._instance.reset(start.t, end, options.rtol, options.atol)
+        if options.max_step < end - start.t:
+            self._instance.limit(options.max_step)
         self._instance.begin_at(start)
         widths = {
             "times": 1, "states": len(model.states) + len(model.implicit), "modes": model.discrete_size, "firsts": 1,
-            "events": 7, "impacts": 3,
+            "events": 7, "impacts": 3, "steps_taken": 3 + 5 * (len(model.states) + len(model.implicit)),
         }  # fmt: skip
         self._buffers = Buffers(self._instance, end, options.points, widths)
+        self._buffers.emptied = self.record.keeper.forget
+
+    @property
+    def dense(self) -> Callable[[Vector], Dense]:
+        """Returns the dense output of written steps, without keeping the instance and its buffers."""
+        model, options, modes = self.model, self.options, self._buffers["modes"].copy()
+        return lambda steps: OfSteps(Integrator(model, options), steps, modes)
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -60,30 +103,45 @@ class NativeLoop:
             self._read()
         if self._crowded:
             raise self._chattering(f"There were more than {self.options.max_events} events")
+        if self._stuck:
+            point = self.record.segments[-1].point(-1)
+            what = f"The run-time gave up at about t = {point.t:.6g} s: it took more than {self.options.max_steps:,}"
+            what += f" steps (max_steps) for {self._part:.3g} s."
+            raise Integrator(self.model, self.options).failure(what, point)
         try:
             self._instance.check(code)
         except Chattering as error:
             if not self.record.events:
                 raise
+            if "stays true" in error.what:
+                source = next(one.source for one in self.record.events[::-1] if f" {one.mode} stays" in error.what)
+                raise Chattering(error.what, where=[source], advice=LET_IT_REST) from None
             raise self._chattering(error.what.partition(" at t = ")[0]) from None
         note_rest(self.record, self.options, self._span)
         return self.record
 
     def _chattering(self, why: str) -> Chattering:
-        return chattering(self.record.events, why, self.options.on_chattering)
+        return chattering(self.model, self.record.events, why, self.options.on_chattering)
 
     @property
     def _crowded(self) -> bool:
         return self._buffers.run.n_events > self.options.max_events
 
+    @property
+    def _stuck(self) -> bool:
+        return bool(self.model.states) and self.counts[0] - self._passed[1] > self.options.max_steps
+
     def _reached(self, time: float) -> bool:
         if self.progress is not None:
             self.progress(time)
-        return not self._crowded
+        if time - self._passed[0] >= self._part * (1 - _ROUNDING):
+            self._passed = time, self.counts[0]
+        return not (self._crowded or self._stuck)
 
     def _read(self) -> None:
         """Copy the written results into the record."""
         record, model, written = self.record, self.model, self._buffers
+        record.keeper.stretches = written["steps_taken"].copy()
         times, states = written["times"][:, 0], np.ascontiguousarray(written["states"].T)
         firsts, modes, events = written["firsts"][:, 0].astype(int), written["modes"], written["events"]
         # Events before a segment, in order; the last ones follow it.

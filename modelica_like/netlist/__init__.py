@@ -11,8 +11,9 @@ from modelica_like.netlist.read import loads as loads
 from modelica_like.netlist.registry import find_type as find_type
 from modelica_like.netlist.registry import library_types as library_types
 from modelica_like.netlist.registry import type_name as type_name
+from modelica_like.trust import trusting as trusting
 
-__all__ = ["dumps", "find_type", "library_types", "load", "loads", "save", "schema", "type_name"]
+__all__ = ["dumps", "find_type", "library_types", "load", "loads", "save", "schema", "trusting", "type_name"]
 
 
 def dumps(component: Component, *, folder: str | Path = ".") -> str:

@@ -83,6 +83,11 @@ def read_text(path: Path) -> str:
         raise NetlistError(
             f"'{path.name}' is larger than {MAX_BYTES // 10**6} MB, the limit for netlists.", where=Source(str(path))
         )
+    if data.startswith(b"PK\3\4"):
+        raise NetlistError(
+            f"'{path.name}' is an archive, such as an FMU, and no netlist.",
+            advice="An FMU is run by run_fmu(…) in Python, and by `compare` and `report` on the command line.",
+        )
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,37 +21,45 @@ from modelica_like.language import Assembly, Component, Variable, guess
 from modelica_like.language.fields import Discrete
 from modelica_like.netlist.document import Document, check_part, parse, read_text
 from modelica_like.netlist.registry import find_type
+from modelica_like.trust import trusting
 from modelica_like.upper import upper
 
-_MAX_PARTS = 200_000
+_MAX_PARTS, _MAX_PARAMETERS, _MAX_DEPTH = 200_000, 10_000, 50
+"""Of a netlist with all that it uses; of one file; of netlists in netlists."""
 FMU_PART = "FMU"
 """Type `is` of parts that are FMUs."""
 
 
-def load(path: str | Path) -> Assembly:
+def load(path: str | Path, *, trust: bool = False) -> Assembly:
     """Read a netlist file and the netlists it uses.
 
     Args:
         path: a TOML file, or a Modelica text: `drive.mo`, with a class `drive.mo:Rotor`.
+        trust: run Python modules beside these netlists; by default only those in trusted folders, because a netlist is
+            data that others may have written. A module that the program has imported before needs no trust.
 
     Raises:
+        UntrustedModule: a module is in a folder that is not trusted.
         NetlistError: the file cannot be read, or is not a netlist.
         CyclicAssembly: it contains itself.
         ModelicaLikeError: types, values or paths in it are wrong; several errors come as `WiringErrors`.
     """
     if is_modelica(path):
         return upper("load_modelica")(path)
-    return _Loader().load(Path(path), ())
+    with trusting() if trust else nullcontext():
+        return _Loader().load(Path(path), ())
 
 
-def loads(text: str, file: str = "netlist.toml") -> Assembly:
+def loads(text: str, file: str = "netlist.toml", *, trust: bool = False) -> Assembly:
     """Read a netlist from text; see `load`.
 
     Args:
         text: TOML.
-        file: path for messages; netlists used as parts are searched in its folder.
+        file: path for messages; netlists and modules used as parts are searched in its folder.
+        trust: run Python modules in that folder.
     """
-    return _Loader().build(parse(text, file), (Path(file).resolve(),))
+    with trusting() if trust else nullcontext():
+        return _Loader().build(parse(text, file), (Path(file).resolve(),))
 
 
 def assemble(document: Document, file: Path) -> Assembly:
@@ -58,11 +67,16 @@ def assemble(document: Document, file: Path) -> Assembly:
     return _Loader().build(document, (file.resolve(),))
 
 
+class _Reported(Exception):
+    """The errors of a netlist that is used again have been collected where it was used first."""
+
+
 class _Loader:
     """Builds assemblies; every file is read once."""
 
     def __init__(self) -> None:
         self.assemblies: dict[Path, Assembly] = {}
+        self.failed: set[Path] = set()
         self.parts = 0
 
     def load(self, path: Path, chain: tuple[Path, ...]) -> Assembly:
@@ -70,12 +84,21 @@ class _Loader:
         if key in chain:
             names = " contains ".join(file.name for file in (*chain[chain.index(key) :], key))
             raise CyclicAssembly(f"A netlist contains itself: {names}.", advice="Remove one of them.")
+        if len(chain) > _MAX_DEPTH:
+            raise NetlistError(f"Netlists are in each other more than {_MAX_DEPTH} deep: '{path.name}' is the next.")
+        if key in self.failed:
+            raise _Reported
         if key not in self.assemblies:
+            self.failed.add(key)
             self.assemblies[key] = self.build(parse(read_text(path), str(path)), (*chain, key))
+            self.failed.remove(key)
         return self.assemblies[key]
 
     def build(self, document: Document, chain: tuple[Path, ...]) -> Assembly:
         """Build the assembly of one file; all its errors are raised together."""
+        if (number := len(document.parameters)) > _MAX_PARAMETERS:
+            name = Path(document.lines.file).name
+            raise NetlistError(f"'{name}' has {number} parameters, more than {_MAX_PARAMETERS}.")
         assembly = Assembly(
             document.name, connect=document.connect, series=document.series, free=document.free,
             description=document.description,
@@ -87,13 +110,18 @@ class _Loader:
         task.run()
         if task.errors:
             raise raise_together_or_one(task.errors)
+        if task.incomplete:
+            raise _Reported
         return assembly
 
     def count(self, number: int) -> None:
         """Refuse netlists that multiply without bounds."""
         self.parts += number
         if self.parts > _MAX_PARTS:
-            raise NetlistError(f"The netlist has more than {_MAX_PARTS} parts.")
+            raise NetlistError(
+                f"The netlist has more than {_MAX_PARTS} parts.",
+                advice="Its assemblies are counted with all that is in them.",
+            )
 
 
 class _Task:
@@ -105,12 +133,13 @@ class _Task:
         self.chain = chain
         self.loader = loader
         self.errors: list[ModelicaLikeError] = []
+        self.incomplete = False
 
     def run(self) -> None:
         """Go through the sections, in an order in which each finds its references."""
         self._each("parameters", self.document.parameters, partial(Assembly.add_parameter, self.assembly))
         self._each("parts", self.document.parts, self._add_part)
-        if not self.errors:
+        if not (self.errors or self.incomplete):
             self._each("start", self.document.start, self._start)
             self._each("guess", self.document.guess, lambda path, value: self._start(path, guess(value)))
             self._each("expose", self.document.expose, partial(Assembly.expose, self.assembly))
@@ -124,6 +153,8 @@ class _Task:
         for name, entry in entries.items():
             try:
                 action(name, entry)
+            except _Reported:
+                self.incomplete = True
             except CyclicAssembly as error:
                 error.where = (self.document.lines.source(section, name), *error.where)
                 raise
@@ -154,19 +185,24 @@ class _Task:
 
     def _part(self, name: str, table: Mapping[str, Any]) -> Component:
         values = {key: value for key, value in table.items() if key not in ("is", "count")}
-        kind = table["is"]
+        kind, folder, number = table["is"], Path(self.document.lines.file).parent, table.get("count", 1)
         if kind == FMU_PART:
             raise _among_equations(name)
         if is_modelica(kind):
-            part: Component = upper("load_modelica")(Path(self.document.lines.file).parent / kind).copy()
+            part = self._copied(upper("load_modelica")(folder / kind), number)
         elif kind.endswith(".toml"):
-            part = self.loader.load(Path(self.document.lines.file).parent / kind, self.chain).copy()
+            part = self._copied(self.loader.load(folder / kind, self.chain), number)
         else:
-            part = new_component(find_type(kind, Path(self.document.lines.file).parent), values)
+            part = new_component(find_type(kind, folder), values)
+            self.loader.count(number * sum(1 for _ in part.walk()))
         for key, value in values.items():
             self._give(part, key, value, f"{name}.{key}")
-        self.loader.count(table.get("count", 1) * sum(1 for _ in part.walk()))
         return part
+
+    def _copied(self, part: Component, number: int) -> Component:
+        """Copy a part, if netlists in netlists do not multiply it without bounds."""
+        self.loader.count(number * sum(1 for _ in part.walk()))
+        return part.copy()
 
     def _give(self, part: Component, key: str, value: Any, label: str) -> None:
         """Set a value, a replaceable part (a table with `is`), or values inside a part (a table without)."""
@@ -209,6 +245,8 @@ def new_component(kind: type[Component], values: dict[str, Any]) -> Component:
         kind.check_structural(key, value)
     try:
         return kind(**structural)
-    except (TypeError, ValueError, LookupError, ArithmeticError) as error:
+    except ModelicaLikeError:
+        raise
+    except (Exception, SystemExit) as error:  # code of users
         given = ", ".join(f"{key} = {value!r}" for key, value in structural.items())
-        raise NetlistError(f"{kind.__name__} cannot be created with {given}: {error}.") from error
+        raise NetlistError(f"{kind.__name__} cannot be created with {given or 'no values'}: {error}.") from error

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import importlib
+import shlex
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import lru_cache
-from importlib.machinery import PathFinder
+from importlib.machinery import ModuleSpec, PathFinder
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 
-from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.errors import NetlistError, UnknownName, UntrustedModule, did_you_mean
 from modelica_like.language import Component
+from modelica_like.trust import may_run
 
 GROUP = "modelica_like.libraries"
 """Entry-point group of libraries; each entry is a module with `__all__`."""
 _HOME = str(Path(__file__).parents[2])
 """Folder of this package, with the library that comes with it."""
-_FAILURES = (ImportError, SyntaxError, NameError, AttributeError, TypeError, ValueError, LookupError, ArithmeticError)
-"""Exceptions from the import of a module."""
+_own_folders: set[str] = set()
+"""Folders of netlists whose modules run in this process; they are at the end of `sys.path`, too."""
 
 
 @lru_cache(maxsize=1)
@@ -78,10 +81,8 @@ def _library_type(name: str) -> type[Component] | None:
 def _type_in(name: str, modules: Mapping[str, ModuleType]) -> type[Component] | None:
     kinds: list[type[Component]] = []
     for library, module in modules.items():
-        try:
+        with _importing(f"The library '{library}'"):
             kind = getattr(module, name)
-        except (ImportError, SyntaxError) as error:
-            raise _not_imported(f"The library '{library}'", error) from error
         if isinstance(kind, type) and issubclass(kind, Component) and not kind._partial and kind not in kinds:
             kinds.append(kind)
     if len(kinds) > 1:
@@ -107,14 +108,24 @@ def imported(module: str, what: str, folders: Sequence[str] = ()) -> ModuleType:
     before = list(sys.path)
     sys.path[:0] = folders
     try:
-        return importlib.import_module(module)
-    except _FAILURES as error:
-        raise _not_imported(what, error) from error
+        with _importing(what):
+            return importlib.import_module(module)
     finally:
         sys.path[:] = before
 
 
-def _not_imported(what: str, error: Exception) -> NetlistError:
+@contextmanager
+def _importing(what: str) -> Generator[None]:
+    """Tell any failure of a module's code in one sentence, also that it ends the program."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise _not_imported(what, error) from error
+
+
+def _not_imported(what: str, error: BaseException) -> NetlistError:
     if isinstance(error, ImportError | SyntaxError):
         return NetlistError(f"{what} cannot be imported: {error}.")
     frame = traceback.extract_tb(error.__traceback__)[-1]
@@ -131,10 +142,11 @@ def find_type(name: str, folder: Path | None = None) -> type[Component]:
 
     Args:
         name: a type of an installed library (`Clutch`), or a class of a module (`my_parts:Coupling`).
-        folder: of the netlist; modules are searched there, in the current directory, and among installed packages.
+        folder: of the netlist, by default the current directory; its module is searched there and above.
 
     Raises:
         UnknownName: there is no such type.
+        UntrustedModule: the folder is not trusted.
         NetlistError: the module cannot be imported, or the class is not a component.
     """
     if ":" in name:
@@ -154,8 +166,8 @@ def _class_of_module(name: str, folder: Path) -> type[Component]:
     module_name, _, class_name = name.partition(":")
     if not all(part.isidentifier() for part in module_name.split(".")):
         raise NetlistError(f"'{name}' is not a class of a module.", advice='Write "package.module:Class".')
-    module = _own_module(module_name, [str(one.resolve()) for one in (folder, Path())])
-    kind = getattr(module, class_name, None)
+    module = _named_module(module_name, folder.resolve())
+    kind = vars(module).get(class_name)
     if kind is None:
         known = [key for key, value in vars(module).items() if isinstance(value, type) and issubclass(value, Component)]
         raise UnknownName(
@@ -166,25 +178,56 @@ def _class_of_module(name: str, folder: Path) -> type[Component]:
     return kind
 
 
-def _own_module(name: str, folders: list[str]) -> ModuleType:
-    """Import a module that may be in the netlist's folder; a module loaded from elsewhere is refused."""
+def _named_module(name: str, folder: Path) -> ModuleType:
+    """Return a module of an installed library, of a trusted folder, or one that this program has imported itself."""
     _libraries()  # loaded first, they cannot be hidden
     importlib.invalidate_caches()
     top = name.partition(".")[0]
-    home = next((one for one in folders if PathFinder.find_spec(top, [one]) is not None), None)
-    known = sys.modules.get(top)
-    ours = {"modelica_like", *(entry.value.partition(".")[0] for entry in entry_points(group=GROUP))}
-    if home is None or top in ours:
+    if top in {entry.value.partition(".")[0] for entry in entry_points(group=GROUP)}:
         return imported(name, f"The module '{name}'")
-    if known is not None and Path(_place(known)).resolve().parent not in (Path(home), Path(home) / top):
+    for home in (folder, *folder.parents) if top != "modelica_like" else ():
+        spec = PathFinder.find_spec(top, [str(home)])
+        if spec is not None and (spec.origin is not None or home == folder):
+            return _own_module(name, home, spec)
+    module = sys.modules.get(name)
+    others = name != "__main__" and module is not None and str(Path(_place(module)).parent) in _own_folders
+    if module is None or others:
         raise NetlistError(
-            f"The module '{top}' of '{home}' cannot be used: '{_place(known)}' is loaded under this name.",
+            f"There is no module '{name}' beside the netlist, or in a folder above.",
+            advice="A module from elsewhere must be installed as a library.",
+        )
+    return module
+
+
+def _own_module(name: str, folder: Path, spec: ModuleSpec) -> ModuleType:
+    """Import a module of a trusted folder; one loaded from elsewhere is refused."""
+    top = spec.name
+    _check_home(top, folder)
+    if name not in sys.modules:
+        file = spec.origin or str(folder / top)
+        if not may_run(folder):
+            raise UntrustedModule(
+                f"'{name}' is a Python module, '{file}', in a folder that is not trusted.",
+                why="A module can do all that you can; a netlist without one only computes.",
+                advice="If you know who wrote it, trust the folder: "
+                f"`modelica-like trust {shlex.quote(str(folder))}`; or run it this once: `--trust`, in Python "
+                "load(…, trust=True).",
+            )
+        imported(name, f"The module '{name}'", [str(folder)])
+        _check_home(top, folder)
+        _own_folders.add(str(folder))
+        if str(folder) not in sys.path:
+            sys.path.append(str(folder))  # other processes get the path and also find it
+    return sys.modules[name]
+
+
+def _check_home(top: str, folder: Path) -> None:
+    known = sys.modules.get(top)
+    if known is not None and Path(_place(known)).resolve().parent not in (folder, folder / top):
+        raise NetlistError(
+            f"The module '{top}' of '{folder}' cannot be used: '{_place(known)}' is loaded under this name.",
             advice="Rename one of the two.",
         )
-    module = imported(name, f"The module '{name}'", [home])
-    if home not in sys.path:
-        sys.path.append(home)  # other processes get the path and also find it
-    return module
 
 
 def type_name(kind: type[Component]) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.console import Group, RenderableType
+from rich.markup import escape
 
 from modelica_like.report.sources import trajectories
 from modelica_like.report.tables import Listed, Shown, table
@@ -14,6 +15,7 @@ from modelica_like.solve.curves import Curves, compare_solutions
 from modelica_like.solve.trajectories import Trajectories
 
 _SHOWN = 20
+_STARTS = 5
 
 Source = str | Path | Trajectories
 
@@ -27,7 +29,7 @@ class Comparison(Curves):
 
 def compare(
     a: Source, b: Source, *, signals: Sequence[str] = (), until: float | None = None, points: int = 500,
-    tolerance: float | None = None,
+    tolerance: float | None = None, values: Mapping[str, Any] | None = None,
 ) -> Comparison:  # fmt: skip
     """Compare two trajectories of one system by the names of their signals.
 
@@ -41,14 +43,15 @@ def compare(
         until: end time of simulations in s; by default that of `a`.
         points: number of equal intervals of simulations.
         tolerance: relative tolerance of simulations.
+        values: to set in netlists by path, and in FMUs as numbers; tables and solutions stay as they are.
 
     Raises:
         UnknownName: nothing matches a pattern, or they have no signal in common.
         ValueOutOfRange: they have no time in common.
         ModelicaLikeError: a run fails.
     """
-    first = trajectories(a, until, points, tolerance)
-    second = trajectories(b, until if until is not None else float(first.time[-1]), points, tolerance)
+    first = trajectories(a, until, points, tolerance, values)
+    second = trajectories(b, until if until is not None else float(first.time[-1]), points, tolerance, values)
     labels = _label(a), _label(b)
     return Comparison(**vars(compare_solutions(first, second, signals, labels)))
 
@@ -62,6 +65,10 @@ def comparison_report(comparison: Comparison) -> RenderableType:
     parts: list[RenderableType] = [_deviation_table(comparison)]
     if comparison.events:
         parts += ["", _event_table(comparison)]
+    if starts := comparison.starts:
+        shown = [f"{row.signal} at {row.first:g} and {row.second:g} {row.unit}".removesuffix(" 1") for row in starts]
+        more = f", and {len(shown) - _STARTS} more" if len(shown) > _STARTS else ""
+        parts += ["", f"[yellow]They start differently: {escape(', '.join(shown[:_STARTS]) + more)}.[/]"]
     if comparison.interpolated:
         parts += ["", "[dim]Their results have different times; the second is interpolated linearly.[/]"]
     return Group(*parts)

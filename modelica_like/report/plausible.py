@@ -9,7 +9,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.draw.diagram import Diagram, diagram
-from modelica_like.errors import ModelicaLikeError
+from modelica_like.errors import MissingValue, ModelicaLikeError
 from modelica_like.language.component import Component
 from modelica_like.language.fields import Input, Output, Parameter
 from modelica_like.report.driven import driven_notes
@@ -147,15 +147,22 @@ def _unopened(drive: Component, run: Solution, hold: HeldMotion) -> Iterator[str
 
 
 def _beyond(run: Solution) -> Iterator[str]:
-    for one in run.model.flat_variables:
-        if one.min is None and one.max is None:
-            continue
-        values = run[one.path]
-        for bound, sign, verb in ((one.max, 1.0, "exceeds"), (one.min, -1.0, "falls below")):
-            worst = int(np.argmax(sign * values))
-            if bound is not None and sign * (values[worst] - bound) > _ROUNDING * max(abs(bound), one.nominal):
-                value = f"{values[worst]:.6g} {one.unit} at {run.time[worst]:.6g} s"
-                yield f"{one.path} {verb} its declared bound {bound:g} {one.unit}: it is {value}."
+    bounds = [
+        (one, bound, kind)
+        for one in run.model.flat_variables
+        for bound, kind in ((one.max, "max"), (one.min, "min"))
+        if bound is not None
+    ]
+    try:
+        worst = [(float(number), number.time) for number in run.read(*(f"{k}({one.path})" for one, _, k in bounds))]
+    except MissingValue:  # what lies beyond a bound among the results is told at least
+        places = [(run[one.path], int(getattr(np, f"arg{kind}")(run[one.path]))) for one, _, kind in bounds]
+        worst = [(float(values[k]), float(run.time[k])) for values, k in places]
+    for (one, bound, kind), (value, time) in zip(bounds, worst, strict=True):
+        beyond, verb = (value - bound, "exceeds") if kind == "max" else (bound - value, "falls below")
+        if beyond > _ROUNDING * max(abs(bound), one.nominal):
+            told = f"{value:.6g} {one.unit} at {time:.6g} s"
+            yield f"{one.path} {verb} its declared bound {bound:g} {one.unit}: it is {told}."
 
 
 def _is_source(part: Component) -> bool:

@@ -9,11 +9,13 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.markup import escape
 
+from modelica_like.errors import MissingValue
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.report.changes import changes
 from modelica_like.report.tables import Listed, Shown, table
 from modelica_like.solve.display import Display
-from modelica_like.solve.signals import evaluated, read_signals
+from modelica_like.solve.signals import Signal, evaluated, read_signals
+from modelica_like.solve.solution import Solution
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.units import parse_unit
 
@@ -49,7 +51,8 @@ def _head(solution: Trajectories, notices: Iterable[str], *, debug: bool = False
     span = f"{solution.time[0]:g} s to {solution.time[-1]:g} s"
     parts: list[RenderableType] = [f"[bold]{escape(solution.model.name)}[/]  {span}"]
     parts += ["", events_table(solution, debug=debug)] if solution.events else []
-    return parts + [f"[bold]{escape(notice)}[/]" for notice in notices]
+    ended = [str(solution.ended)] if solution.ended else []
+    return parts + [f"[bold]{escape(notice)}[/]" for notice in [*notices, *ended]]
 
 
 def events_table(solution: Trajectories, *, debug: bool = False) -> Listed:
@@ -71,24 +74,54 @@ def values_table(solution: Trajectories, words: Sequence[str], display: Mapping[
     """
     shown, signals = Display(solution.model, display), read_signals(solution.model, words)
     values, rows = evaluated(solution, signals), list[tuple[Any, ...]]()
+    extremes = _extremes(solution, signals)
     for one in signals:
         unit = one.shown_in(shown)
-        curve = shown.converted(values[one.name], one.unit, unit)
-        told = [float(value[k]) for k in (np.argmin(curve), np.argmax(curve)) for value in (curve, solution.time)]
-        rows.append((one.name, "" if unit in ("1", "*") else unit, float(curve[0]), float(curve[-1]), *told))
+        first, last, *told = shown.converted(
+            np.array([*values[one.name][[0, -1]], *extremes[one.name][0]]), one.unit, unit
+        )
+        low, high = extremes[one.name][1]
+        named = "" if unit in ("1", "*") else unit
+        rows.append((one.name, named, *map(float, (first, last, told[0], low, told[1], high))))
     heads = "first>.6g", "last>.6g", "smallest>.6g", "smallest at s>.6g", "largest>.6g", "largest at s>.6g"
-    return table("values", "name", "unit", *heads, rows=rows, most=_SHOWN, rest=", which --csv writes")
+    title = "values" if isinstance(solution, Solution) else "values at the results"
+    return table(title, "name", "unit", *heads, rows=rows, name="values", most=_SHOWN, rest=", which --csv writes")
+
+
+def _extremes(solution: Trajectories, signals: Sequence[Signal]) -> dict[str, tuple[list[float], list[float]]]:
+    """Return smallest and largest value with their times; of runs without equations those of the results."""
+    if isinstance(solution, Solution):
+        kinds = ("min", "max")
+        numbers = solution.read(*(f"{kind}({one.name})" for one in signals for kind in kinds))
+        pairs = zip(signals, numbers[::2], numbers[1::2], strict=True)
+        return {one.name: ([low, high], [low.time, high.time]) for one, low, high in pairs}
+    curves, time = evaluated(solution, signals), solution.time
+    places = {name: [int(np.argmin(curve)), int(np.argmax(curve))] for name, curve in curves.items()}
+    return {name: (curves[name][k].tolist(), time[k].tolist()) for name, k in places.items()}
 
 
 def notices(solution: Trajectories) -> list[str]:
-    """Return the notices of a run and its events: one sentence for each kind of event, with the time of the first."""
+    """Return the notices of a run and its events: one sentence for each kind of event, with the time of the first.
+
+    Of inputs a sentence tells the largest value; of a run that has not kept what happens between its results, the
+    least that it can be.
+    """
     told: dict[tuple[str, str], str] = {}
     for event in (one for one in solution.events if one.transition >= 0):
         notice, (component, dot, _) = solution.model.transitions[event.transition].notice, event.mode.rpartition(".")
-        if notice and (component, notice) not in told:
-            values = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: f"{solution[owner + name[1]][0]:g}", notice)
+        ends = solution.model.transitions[event.transition].ends
+        if notice and not ends and (component, notice) not in told:
+            path = component + dot
+            values = NAME_IN_NOTICE.sub(lambda name, path=path: _largest(solution, path + name[1]), notice)
             told[component, notice] = f"At {event.time:.9g} s {component or solution.model.name} {values}."
     return [*solution.notices, *told.values()]
+
+
+def _largest(solution: Trajectories, path: str) -> str:
+    try:
+        return f"{solution.read(f'max({path})')[0]:g}"
+    except MissingValue:
+        return f"at least {solution[path].max():g}"
 
 
 def energy_table(solution: Trajectories, display: Mapping[str, str] | None = None) -> Listed:

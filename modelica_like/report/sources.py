@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from modelica_like.cosimulation.files import describes_system
 from modelica_like.cosimulation.run import cosim
-from modelica_like.errors import NetlistError
+from modelica_like.errors import NetlistError, UnitError
 from modelica_like.fmi.run import run_fmu
-from modelica_like.simulation import build, simulate
+from modelica_like.netlist import load
+from modelica_like.simulation import simulate
 from modelica_like.solve.measured import read_csv
 from modelica_like.solve.trajectories import Trajectories
 
@@ -16,8 +19,9 @@ _POINTS = 500
 
 
 def trajectories(
-    source: str | Path | Trajectories, until: float | None = None, points: int = _POINTS, tolerance: float | None = None
-) -> Trajectories:
+    source: str | Path | Trajectories, until: float | None = None, points: int = _POINTS,
+    tolerance: float | None = None, values: Mapping[str, Any] | None = None,
+) -> Trajectories:  # fmt: skip
     """Return the trajectories of a netlist, an FMU, a system of FMUs or a CSV file; a solution is returned unchanged.
 
     Args:
@@ -25,6 +29,7 @@ def trajectories(
         until: end time of the run in s; by default that of the source.
         points: number of equal intervals of its results; a system has results at its communication points.
         tolerance: relative tolerance of its run; for a system, of its FMUs.
+        values: to set in a netlist by path, or parameters of an FMU: numbers in its units. Tables and solutions stay.
 
     Raises:
         NetlistError: the file is none of these, or the table is not one.
@@ -36,7 +41,10 @@ def trajectories(
     path = Path(source)
     kind = path.suffix.lower()
     if kind == ".fmu":
-        return run_fmu(path, stop=until, points=points, tolerance=tolerance)
+        texts = [f"{name} = {value!r}" for name, value in (values or {}).items() if isinstance(value, str)]
+        if texts:
+            raise UnitError(f"The FMU '{path.name}' cannot be given {texts[0]}.", advice="Give a number in its unit.")
+        return run_fmu(path, parameters=values, stop=until, points=points, tolerance=tolerance)
     if kind == ".csv":
         return read_csv(path)
     if kind not in (".toml", ".ssp"):
@@ -45,5 +53,10 @@ def trajectories(
             advice="Netlists and systems of FMUs (.toml), FMUs (.fmu), SSPs (.ssp) and tables (.csv) have.",
         )
     if describes_system(path):
+        if values:
+            raise NetlistError(f"No values can be set in the system '{path.name}'.", advice="Change the file.")
         return cosim(path, until, fmu_tolerance=tolerance)
-    return simulate(build(path), until, points=points, rtol=tolerance)
+    drive = load(path)
+    for name, value in (values or {}).items():
+        drive.set(name, value)
+    return simulate(drive, until, points=points, rtol=tolerance)

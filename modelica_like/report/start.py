@@ -16,6 +16,8 @@ from modelica_like.initialize import Point, StartKind, StartPlan, call, initiali
 from modelica_like.initialize.plan import matrix_and_values, start_name
 from modelica_like.language import Component
 from modelica_like.report.tables import table
+from modelica_like.solve.events import EventLoop
+from modelica_like.solve.options import Options
 
 _AT_ONCE = 64
 _NOTHING = 1e-9
@@ -24,7 +26,7 @@ _SHOWN = 4
 
 @dataclass(frozen=True)
 class StartValueRow:
-    """A start value in SI units, and its origin: `given in FILE:LINE`, `default`, `rest`, `follows from …`."""
+    """A start value in SI units, and its origin: `given in FILE:LINE`, `guess`, `default`, `rest`, `follows from …`."""
 
     path: str
     value: float
@@ -42,10 +44,15 @@ def start_report(drive: Component, model: CompiledDae) -> RenderableType:
 
 
 def start_notes(model: CompiledDae) -> list[str]:
-    """Return what a run would say about missing start values, in a list; of a drive with open inputs nothing."""
+    """Return what a run would say about missing start values, in a list; of a drive with open inputs nothing.
+
+    Raises:
+        ModelicaLikeError: a run would not begin: start values contradict each other, or what happens at once ends it.
+    """
     try:
         if not model.inputs:
-            initialize(model, start=model.settings.get("start", "given"))
+            first = initialize(model, start=model.settings.get("start", "given"))
+            EventLoop(model, Options(), first, first.t + 1.0).begin()
     except MissingStart as error:
         return [f"{error.what} {error.advice}"]
     return []
@@ -61,8 +68,8 @@ def start_values(drive: Component, model: CompiledDae, kind: StartKind = "given"
         path = start_name(model, entry)
         if entry.strength == "fixed":
             origins[path] = _given(drive, path)
-        elif entry.strength == "default" and (k in plan.rows or kind == "steady"):
-            origins.setdefault(path, "default")
+        elif k in plan.rows or (entry.strength == "default" and kind == "steady"):
+            origins.setdefault(path, entry.strength)
     for node in plan.resting:
         if node < len(model.flat_variables):
             origins.setdefault(model.flat_variables[node].path, "rest")

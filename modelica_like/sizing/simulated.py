@@ -2,64 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.runs.readings import read_output
 from modelica_like.sizing.formulas import Value
 from modelica_like.units import parse_unit
 
 if TYPE_CHECKING:
     from modelica_like.solve.solution import Solution
-    from modelica_like.solve.trajectories import Trajectories
 
-Vector = NDArray[np.float64]
-_Reader = Callable[[Vector, Vector], float]
-
-
-def _integral(times: Vector, values: Vector) -> float:
-    return float(np.sum(np.diff(times) * (values[1:] + values[:-1]) / 2))
-
-
-def _mean(times: Vector, values: Vector) -> float:
-    return _integral(times, values) / float(times[-1] - times[0])
-
-
-READERS: dict[str, _Reader] = {
-    "peak": lambda times, values: float(np.max(np.abs(values))),
-    "largest": lambda times, values: float(np.max(values)),
-    "smallest": lambda times, values: float(np.min(values)),
-    "final": lambda times, values: float(values[-1]),
-    "mean": _mean,
-    "rms": lambda times, values: _mean(times, values**2) ** 0.5,
-    "integral": _integral,
-}
-"""Readings of a trajectory: `peak` is the largest absolute value."""
-
-
+READERS = {
+    "peak": "peak({})", "largest": "max({})", "smallest": "min({})", "final": "{}", "mean": "mean({})",
+    "rms": "rms({})", "integral": "integral({})", "reading": "{}",
+}  # fmt: skip
+"""Readings of a variable: `peak` is the largest absolute value; `reading` is the name of any other one."""
 _KEYS = ("from", "until", "set", *READERS)
-_POWERS = {"stored_energy": "J", "loss_power": "W", "source_power": "W"}
 
 
-def load_of(run: Trajectories, key: Any, what: str = "peak") -> float:
-    """Return one number of a trajectory, as the load of a design check.
+def load_of(run: Solution, key: Any, what: str = "peak") -> float:
+    """Return one number of a run, as the load of a design check.
 
     Args:
         run: the simulation.
-        key: path of the variable, or `drive.clutch.tau`.
-        what: `peak` (largest absolute value), `largest`, `smallest`, `final`, `mean`, `rms` or `integral` over time.
+        key: path of the variable, a formula, or `drive.clutch.tau`.
+        what: `peak` (largest absolute value), `largest`, `smallest`, `final`, `mean`, `rms` or `integral` over time,
+            or `reading`: the key is one.
 
     Raises:
         UnknownName: there is no such variable or reading.
+        MissingValue: the run has not kept what happens between its results.
     """
+    return float(run.read(_name(key if isinstance(key, str) else run.path(key), what))[0])
+
+
+def _name(path: str, what: str) -> str:
     if what not in READERS:
         raise UnknownName(f"A load cannot be the '{what}' of a trajectory{did_you_mean(what, READERS) or '.'} "
                           f"It can be {', '.join(READERS)}.")  # fmt: skip
-    return READERS[what](run.time, np.asarray(run[key], dtype=float))
+    return READERS[what].format(path)
 
 
 class Simulations:
@@ -82,16 +65,12 @@ class Simulations:
                 f"{where} must be a value, or name a netlist and one variable of it.",
                 advice='Write { from = "drive.toml", peak = "clutch.tau" }.',
             )
-        run, path = self._run(table), table[wanted[0]]
-        unit = parse_unit(_POWERS.get(path.rpartition(".")[2]) or self._unit(run, path))
-        return Value(load_of(run, path, wanted[0]), unit * parse_unit("s") if wanted[0] == "integral" else unit)
+        name = _name(table[wanted[0]], wanted[0])
+        run = self._run(table, name)
+        unit = parse_unit(str(read_output(run.model, name).unit))
+        return Value(float(run.read(name)[0]), unit)
 
-    def _unit(self, run: Solution, path: str) -> str:
-        if path not in run.names:
-            raise UnknownName(f"{run.model.name} has no variable '{path}'{did_you_mean(path, run.names) or '.'}")
-        return run.unit_of(path)
-
-    def _run(self, table: Mapping[str, Any]) -> Solution:
+    def _run(self, table: Mapping[str, Any], name: str) -> Solution:
         values = table.get("set", {})
         if not isinstance(values, dict):
             raise NetlistError('`set` of a load must be a table: { "clutch.mu" = 0.3 }.')
@@ -101,10 +80,10 @@ class Simulations:
         key = f"{table['from']} {table.get('until')} {sorted(values.items())}"
         if key not in self.runs:
             from modelica_like.netlist import load
-            from modelica_like.simulation import simulate
+            from modelica_like.simulation import quick_run
 
             drive = load(self.folder / table["from"])
             for path, value in values.items():
                 drive.set(path, value)
-            self.runs[key] = simulate(drive, table.get("until"))
+            self.runs[key] = quick_run(drive, table.get("until"), readings=[name])
         return self.runs[key]

@@ -86,7 +86,8 @@ class Between:
             whole = pieces[number]
             those = whole.looks.intervals(whole.times) == k
             try:
-                looks = whole.looks.within(k) or self._closer(whole.looks, k)
+                looks = whole.looks.closer.get(k) or whole.looks.within(k) or self._closer(whole.looks, k)
+                whole.looks.closer[k] = looks
             except StepFailed:
                 if precisely:
                     raise

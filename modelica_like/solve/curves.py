@@ -25,6 +25,8 @@ _Marks = np.ndarray[Any, np.dtype[np.bool_]]
 
 _MOST_CURVES = 4
 _SAME_TIME = 1e-9
+_SAME_START = 1e-6
+"""Of the range: start values are solved to 1e-10, but tables have six digits."""
 _SAME_INSTANT = 1e-8
 """Time within which a mode that is left again counts as transient."""
 
@@ -46,6 +48,16 @@ class Deviation:
     largest: float
     relative: float
     time: float
+
+
+@dataclass(frozen=True)
+class StartDifference:
+    """A variable with two start values: `first` and `second`, in `unit`."""
+
+    signal: str
+    unit: str
+    first: float
+    second: float
 
 
 @dataclass(frozen=True)
@@ -99,6 +111,23 @@ class Curves(Shown):
     def largest_event_difference(self) -> float:
         """Largest difference of the times of an event, in s; infinite if an event is missing in one of them."""
         return max((abs(e.difference) if e.difference is not None else np.inf for e in self.events), default=0.0)
+
+    @property
+    def starts(self) -> tuple[StartDifference, ...]:
+        """Start values that differ, of states where the first has equations; none if the two begin at other times."""
+        if abs(self.first.time[0] - self.second.time[0]) > _SAME_TIME:
+            return ()
+        states = set(getattr(self.first.model, "states", ()))
+        rows = [row for row in self.deviations if row.relative and (row.signal in states or not states)]
+        names = [row.signal for row in rows]
+        ours, theirs = (run.together(*names) for run in (self.first, self.second))
+        # After the events at the start: what writes a table may leave out the values before.
+        k, n = (int(np.searchsorted(run.time, run.time[0], "right")) - 1 for run in (self.first, self.second))
+        found = (StartDifference(r.signal, r.unit, float(ours[r.signal][k]), float(theirs[r.signal][n])) for r in rows)
+        scales = (row.largest / row.relative for row in rows)
+        return tuple(
+            one for one, scale in zip(found, scales, strict=True) if abs(one.second - one.first) > _SAME_START * scale
+        )
 
     def __getitem__(self, signal: str) -> Deviation:
         return next(deviation for deviation in self.deviations if deviation.signal == signal)

@@ -139,7 +139,15 @@ class EnergyBalance(Shown):
 
     @property
     def closure(self) -> float:
-        """Largest residual of a component, and of all connections together, relative to the throughput."""
+        """How well the balance closes, relative to the throughput: the worse of `power_closure` and `drift`."""
+        return max(self.power_closure, self.drift)
+
+    @property
+    def power_closure(self) -> float:
+        """Largest residual of a component, and of all connections together, relative to the throughput.
+
+        It judges the equations of components, whatever the precision of the integration.
+        """
         residuals = [abs(row.residual) for row in self.rows]
         exchanged = abs(sum(row.inflow for row in self.rows))
         return max([*residuals, exchanged], default=0.0) / (self.throughput or 1.0)
@@ -187,7 +195,7 @@ class EnergyBalance(Shown):
             if any((row.inflow, row.source, row.stored, row.lost))
         ]
         total = f"{'total':{width}}  {'':12}  {self.source:12.6g}  {self.stored:12.6g}  {self.lost:12.6g}"
-        closes = f"closes to {self.closure:.1e} of {self.throughput:.6g} J (integration error {self.drift:.1e})"
+        closes = f"closes to {self.closure:.1e} of {self.throughput:.6g} J (powers to {self.power_closure:.1e})"
         return "\n".join([head, *lines, total, *self.impacts, closes, *self.notices])
 
     @property

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,22 +14,24 @@ from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 from modelica_like.solve.between import Between, Piece
 from modelica_like.solve.delays import Delays
+from modelica_like.solve.dense import Dense, OfLooks, Stretch
 from modelica_like.solve.guards import Candidate, Ends, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.instants import Instants, just_after, note_rest, note_sharing
 from modelica_like.solve.looks import Cell, Looks
 from modelica_like.solve.options import Options
-from modelica_like.solve.pace import Pace
+from modelica_like.solve.pace import Pace, foreseen
+from modelica_like.solve.passing import Passing
 from modelica_like.solve.recorder import Recorder
 from modelica_like.solve.ticks import Ticks
 
-_NEVER = 1e-12
-"""Rates, relative to the value and per second, that do not count as rising."""
 _NOTHING = 1e-25
 """Value of a guard, in SI units, below which it is rounding."""
 _CLOSER = 8
 """Number of closer looks into an interval between two looks."""
 _DEEPEST = 10
+_CUTS = 20
+"""How often a panel is cut at an edge before it is taken as it is: what switches without end runs as written."""
 _MAX_FAILURES = 40
 _FEW_FAILURES = 6
 _SAME = 1e-3
@@ -61,9 +65,10 @@ class EventLoop:
         self.progress = progress
         self.guards = Guards(model)
         self.record = Recorder()
-        timed = len(model.transitions) > self.guards.count or bool(model.delay_parts)
+        timed = len(model.transitions) > self.guards.count or bool(model.delay_parts or model.edges.count)
         self.pace = Pace(start.t, end, options, guarded=bool(self.guards.count), timed=timed)
         self.integrator = Integrator(model, options, whole=self.pace.on_grid)
+        self.passing = Passing(model, self.integrator)
         self.between = Between(self.integrator, self._closer)
         self.instants = Instants(model, options, self.guards, self.record, end - start.t)
         self.ticks = Ticks(model, self.instants)
@@ -73,6 +78,16 @@ class EventLoop:
     def counts(self) -> tuple[int, int, int]:
         """Steps, evaluations of the equations, and calls of the integrator so far."""
         return self.integrator.steps, self.integrator.evaluations, self.integrator.calls
+
+    def dense(self, stretches: list[Stretch]) -> Dense:
+        """Return the dense output of stretches."""
+        looks = sum({id(one.looks): one.looks.count for one in stretches}.values())
+        if self.pace.on_grid and self.integrator.steps > looks > 0:
+            # Results are no looks where there are fewer of them than steps.
+            more = math.ceil(2 * self.integrator.steps / looks)
+            finer = [self._integrate(o.looks.point(0), o.looks.span, more * o.looks.count) for o in stretches]
+            stretches = [replace(o, looks=f, last=f.count) for o, f in zip(stretches, finer, strict=True)]
+        return OfLooks(self.between, stretches)
 
     def run(self) -> Recorder:
         """Simulate.
@@ -89,11 +104,15 @@ class EventLoop:
                 self._write(precisely=False)
         return self.record
 
-    def _go(self) -> None:
+    def begin(self) -> None:
+        """Let happen what happens at the start, or raise what `Instants.settle` raises."""
         self.instants.settle(self.now, self._wanting(), begins=True)
+
+    def _go(self) -> None:
+        self.begin()
         note_sharing(self.record, self.model, self.now)
         self.record.begin(self.now)
-        while self.now.t < self.end:
+        while self.now.t < self.end and not self.record.ended:
             known = self._known()
             self._advance(min(self.ticks.stop(self.now), known, self.end))
             if self.between.many or self.record.many:
@@ -128,12 +147,12 @@ class EventLoop:
 
     def _advance(self, stop: float) -> None:
         """Integrate up to `stop` at most, ending earlier at an event or at the end of a panel."""
-        looks = self._panel(stop)
+        looks = self._whole_panel(stop)
         if not self.guards.count:
             self.pace.longer(looks.span, np.inf)
         if not self.guards.count or not self._search(looks):
             self._arrive(looks)
-        ends, due = just_after(self.now.t) >= stop, self.instants.due(self.now)
+        ends, due = just_after(self.now.t) >= stop and not self.record.ended, self.instants.due(self.now)
         if ends:
             self.now.t = stop
         if (ends or due) and self.record.last != self.now.t:
@@ -173,12 +192,14 @@ class EventLoop:
         self.delays.keep(first, looks, last, self.now.d)
         while just_after(tick := self.instants.next_moment(self.now)) < end:
             self._add(piece, self.pace.results(first, self.pace.before(tick)))
+            self.record.keeper.keep(Stretch(looks, first, tick, last, self.now.d))
             self._move(self.ticks.point(looks, tick, last, self._closer))
             self.record.add(np.array([tick]), self.now.x[:, None], self.now.z[:, None])
             if self._event(self.instants.due(self.now)):
                 return False
             times = self.pace.results(first := tick, until)
         self._add(piece, times)
+        self.record.keeper.keep(Stretch(looks, first, end, last, self.now.d))
         return True
 
     def _add(self, piece: Piece, times: Vector) -> None:
@@ -204,6 +225,16 @@ class EventLoop:
         z = np.concatenate([start.z[None], z.T]).T if len(z) else np.empty((0, len(times)))
         return Looks(self.integrator, self.guards, times, x, z, start.d)
 
+    def _whole_panel(self, stop: float) -> Looks:
+        """Integrate one panel that steps over no edge: where it does, it is cut there."""
+        looks = self._panel(stop)
+        for _ in range(_CUTS):
+            edge = self.passing.first(looks, self._in_sight(looks), self.now.t + time_resolution(self.now.t))
+            if edge is None or just_after(edge) >= looks.times[-1]:
+                break
+            looks = self._panel(edge)
+        return looks
+
     def _panel(self, stop: float) -> Looks:
         """Integrate one panel.
 
@@ -218,7 +249,8 @@ class EventLoop:
             except StepFailed:
                 if not self._go_on(self.now.t + span):
                     raise
-                self.pace.shorter(span, denser=True)
+                if self._failures:  # else the tolerance has been relaxed, and the pace begins again
+                    self.pace.shorter(span, denser=True)
                 continue
             if looks.count < count:
                 if not self._go_on(self.now.t + span):
@@ -226,21 +258,24 @@ class EventLoop:
                 return looks.every(1)
             steps = self.integrator.steps - before
             stride = 1 if self.pace.on_grid else self.pace.stride(steps, count, looks.width)
+            stride = self.pace.resolved(stride, self.passing.advance(looks, self._in_sight), looks.width)
+            if not stride and looks.width <= time_resolution(self.now.t):
+                stride = 1  # no wave is shorter than what times tell apart
             if not stride:
-                self.pace.shorter(self._in_sight(looks.every(1)))
+                self.pace.shorter(looks.width * self._in_sight(looks.every(1)))
                 continue
             looks = looks.every(stride)
             if just_after(self.now.t + span) >= stop:
                 looks.times[-1] = stop
             return looks
 
-    def _in_sight(self, looks: Looks) -> float:
-        """Time until all looks are passed, or the first event in sight.
+    def _in_sight(self, looks: Looks) -> int:
+        """Return the first look behind an event, or else the last one.
 
-        Behind an event the old mode's equations are not valid, so their cost says nothing about looks at guards.
+        Behind an event the old mode's equations are not valid, so what is there says nothing about steps and edges.
         """
         risen = (looks.seen[0][self.guards.active(looks.d), 1:] > 0).any(axis=0)
-        return looks.width * (int(np.argmax(risen)) + 1 if risen.any() else looks.count)
+        return int(np.argmax(risen)) + 1 if risen.any() else looks.count
 
     def _go_on(self, end: float) -> bool:
         """Count failures on the way to one place; True if another try makes sense (an event may be behind it).
@@ -258,6 +293,7 @@ class EventLoop:
         if not self.integrator.relax():
             return False
         self._failures = 0
+        self.pace.again(self._failed_before - self.now.t)
         self.record.notices.append(
             f"At {self.now.t:.9g} s the integrator gave up; from there on its tolerance is {self.integrator.rtol:g} "
             f"instead of {self.options.rtol:g}."
@@ -298,7 +334,7 @@ class EventLoop:
                 over = located.guards or [one.guard for one in group]
                 group = [one for one in group if one.guard not in over]
         if depth == 0:
-            self.pace.longer(looks.span, _foreseen(values[active, -1], rates[active, -1]))
+            self.pace.longer(looks.span, foreseen(values[active, -1], rates[active, -1]))
         return False
 
     def _locate(
@@ -357,7 +393,7 @@ class EventLoop:
         """Handle an event: close the segment, change modes until nothing fires, begin the next segment.
 
         Returns:
-            Whether anything that moves has changed.
+            Whether anything that moves has changed, or the run has ended.
         """
         self._close()
         before, self.now = self.now, self.now.copy()
@@ -369,10 +405,4 @@ class EventLoop:
             lasted, self._since = self.now.t - self._since, self.now.t
             self.pace.anew(before.d, lasted, self.now.d)
         self.record.begin(self.now)
-        return moved
-
-
-def _foreseen(values: Vector, rates: Vector) -> float:
-    """Time until the first guard rises, by linear extrapolation."""
-    rising = (values < 0) & (rates > -_NEVER * values)
-    return float(np.min(-values[rising] / rates[rising], initial=np.inf))
+        return moved or self.record.ended

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 import sys
 from typing import Any
@@ -130,9 +131,16 @@ class Integrator:
         self._relaxed = factor
         self.tolerances = self.options.rtol * factor, self.options.atol * factor * self.model.nominals
 
-    def _instance(self, outputs: int, steps: int, gentle: bool, first: float) -> BufferedFunction:
-        key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first, self._seconds
-        return self.model.fast(key, lambda: self._make(outputs, steps, gentle, first), results=(0, 1))
+    def _instance(self, outputs: int, steps: int, gentle: bool, first: float, longest: float) -> BufferedFunction:
+        key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first, self._seconds, longest
+        return self.model.fast(key, lambda: self._make(outputs, steps, gentle, first, longest), results=(0, 1))
+
+    def _longest(self, span: float, gentle: bool) -> float:
+        """Return the largest step in scaled time, a power of two so that intervals share instances; 0 for none."""
+        if self.options.max_step >= span:
+            return 0.0
+        # dt/ds is at most 2·span with `gentle`.
+        return 2.0 ** math.floor(math.log2(self.options.max_step / (2 * span if gentle else span)))
 
     def _first_step(self, start: Point, span: float) -> float:
         """Return a first step in scaled time that moves states by about their tolerances.
@@ -146,14 +154,16 @@ class Integrator:
             step *= _FIRST_STEP
         return step
 
-    def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
+    def _make(self, outputs: int, steps: int, gentle: bool, first: float, longest: float) -> ca.Function:
         length = self._seconds or 1.0
         problem, _ = scaled_problem(self.model, gentle=gentle, scaled=self._seconds is None)
         grid = np.arange(1, outputs + 1) / outputs
         grid = (np.sqrt(grid) if gentle else grid * length).tolist()
-        return ca.integrator("segment", "idas", problem, 0, grid, self._settings(steps, gentle, first * length))
+        return ca.integrator(
+            "segment", "idas", problem, 0, grid, self._settings(steps, gentle, first * length, longest * length)
+        )
 
-    def _settings(self, steps: int, gentle: bool, first: float) -> dict[str, Any]:
+    def _settings(self, steps: int, gentle: bool, first: float, longest: float) -> dict[str, Any]:
         nominal = self.model.nominals
         return {
             "reltol": self.rtol,
@@ -164,7 +174,8 @@ class Integrator:
             "suppress_algebraic": True,
             # By default, IDAS starts with a step of 1e-10 and needs thirty more to reach its usual step, after every
             # event.
-            "step0": first,
+            "step0": min(first, longest or first),
+            "max_step_size": longest,
             "calc_ic": not gentle,
             "linear_solver": linear_solver(len(self.model.states) + len(self.model.implicit)),
         }
@@ -222,7 +233,8 @@ class Integrator:
         """
         self._seconds = float(p[1]) if self._whole and not gentle else None
         first = self._first_step(start, p[1]) if gentle else _FIRST_STEP
-        instance, scaled = self._instance(outputs, steps, gentle, first), self._seconds is None
+        longest = self._longest(p[1], gentle)
+        instance, scaled = self._instance(outputs, steps, gentle, first, longest), self._seconds is None
         known = self.model.fast(
             ("known", gentle, scaled), lambda: scaled_problem(self.model, gentle=gentle, scaled=scaled)[1]
         )
@@ -295,11 +307,14 @@ class Integrator:
         reason = _FLAGS.get(flag, "it stopped without a known reason")
         reached = _reached(text) ** 2 if gentle else _reached(text) / (self._seconds or 1.0)
         self.reached = moment = start.t + span * reached
-        speed = np.abs(call(self.model, self.model.ode, start)) / self.weights(start.x)
-        worst = self.model.states[int(np.argmax(np.nan_to_num(speed)))]
+        return self.failure(f"IDAS gave up at about t = {moment:.6g} s: {reason}{f' ({flag})' if flag else ''}.", start)
+
+    def failure(self, what: str, point: Point) -> StepFailed:
+        """Return an error that names the state which changes fastest at a point."""
+        speed = np.abs(call(self.model, self.model.ode, point)) / self.weights(point.x)
         return StepFailed(
-            f"IDAS gave up at about t = {moment:.6g} s: {reason}{f' ({flag})' if flag else ''}.",
-            why=f"{worst} changes fastest relative to its tolerance.",
+            what,
+            why=f"{self.model.states[int(np.argmax(np.nan_to_num(speed)))]} changes fastest relative to its tolerance.",
             advice="Look for a stiff spring, a vanishing mass or a speed without bound; then try other tolerances.",
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import deque
 from collections.abc import Sequence
 
@@ -17,6 +18,7 @@ from modelica_like.initialize import (
     chosen_modes,
     holding,
     meet,
+    refuse_contradiction,
     share,
     sharing,
     solve_implicit,
@@ -25,6 +27,7 @@ from modelica_like.initialize import (
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.solve.guards import Guards
 from modelica_like.solve.options import OnChattering, Options
+from modelica_like.solve.penetration import check_turned_back
 from modelica_like.solve.recorder import IMPACT, Event, Recorder
 
 _CHATTER_EVENTS = 50
@@ -34,7 +37,13 @@ _TOGETHER = 6
 _ALONE = 6
 """Further rounds per holdable motion, in which only one fires."""
 _CHATTER_WINDOW = 1e-6
+_CONVERGES = 0.9
+"""Length of a crowd of instants over the one before: rebounds come to their end, chattering does not."""
 _HINT = "Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it."
+_STICK = (
+    "If this is friction, take a class that can stick, such as BearingFriction, Brake, Clutch or SupportFriction; "
+    "otherwise give the switching a hysteresis, or smooth what drives it."
+)
 _GO_ON = (
     ' Or go on: on_chattering = "slide" along the border of two modes, "rest" in contact after ever faster impacts.'
 )
@@ -74,11 +83,11 @@ class Instants:
         self.guards = guards
         self.record = record
         self.span = span
-        self._struck: Vector | None = None
+        self._struck: Point | None = None
         self._entered: set[int] = set()
         self._impacts = 0
         self._instants: deque[float] = deque(maxlen=_CHATTER_INSTANTS)
-        self._resting = False
+        self._crowd = 0.0
         self._round = 0
         self._modes = [one.mode for one in model.ideal.elements] if model.ideal else []
         self.timed = [t for t in model.transitions if t.timed]
@@ -126,11 +135,11 @@ class Instants:
         ideal, earlier = self._modes, now.d
         if not (wanting or (begins and (changes or ideal))):
             return
-        noted = len(self.record.events)
+        noted, first, begun = len(self.record.events), wanting, now.copy()
         if not begins:
             meet(self.model, now)  # the integration leaves the conditions of ideal elements within its tolerances
         if self._instants and now.t - self._instants[-1] >= _CHATTER_WINDOW * self.span:
-            self._resting = False
+            self._crowd = 0.0
         self._struck, self._entered = None, set()
         wanting = self._share_anew(now, wanting)
         alone = self.options.iterations + _ALONE * (len(self.model.holds) + len(ideal))
@@ -149,21 +158,25 @@ class Instants:
                     back = number and np.array_equal(now.d[ideal], earlier[ideal])
                     meet(self.model, now, keep=_GIVEN_BACK if back else 0.0)
                     earlier = before
+            jumping = call(self.model, self.model.guards, now) if self.model.update_rows else None
             changes = self._update(now)
-            wanting = [*self.due(now), *self.guards.wanting(now)]
+            wanting = [*self.due(now), *self.guards.wanting(now, jumping if changes else None)]
         else:
             raise self._endless(now, alone, changes=changes)
+        refuse_contradiction(self.model, now)
         note_sharing(self.record, self.model, now)
+        check_turned_back(self.model, first, begun, now)
         if len(self.record.events) > noted:
             self._limit(now)
 
     def _limit(self, now: Point) -> None:
         """Note an instant with events; too many, or too many in a short time, end the run."""
         self._instants.append(now.t)
-        if len(self._instants) == _CHATTER_INSTANTS and now.t - self._instants[0] < _CHATTER_WINDOW * self.span:
-            if self._resting or self.options.on_chattering != "rest":
+        length = now.t - self._instants[0]
+        if len(self._instants) == _CHATTER_INSTANTS and length < _CHATTER_WINDOW * self.span:
+            if self.options.on_chattering != "rest" or 0 < self._crowd * _CONVERGES <= length:
                 raise self._chattering("Events follow each other ever faster")
-            self._resting = True
+            self._crowd = max(length, sys.float_info.min)
             self._instants.clear()
         if len(self.record.events) > self.options.max_events:
             raise self._chattering(f"There were more than {self.options.max_events} events")
@@ -273,15 +286,14 @@ class Instants:
         entering = [k for k in holding(self.model, now) if k in begun] if begun else []
         if not entering:
             return
-        strike = Strike(self.model, now, entering, resting=self._resting)
+        strike = Strike(self.model, now, entering, resting=self._crowd > 0)
         if strike.hard:
             # All impacts at this instant are solved together, from the speeds before the first.
             self._entered.update(entering)
             if self._struck is None:
-                self._struck, self._impacts = now.x.copy(), len(self.record.impacts)
-            now.x = self._struck.copy()
-            self._hold_again(now)
-            strike = Strike(self.model, now, self._entered, resting=self._resting)
+                self._struck, self._impacts = now.copy(), len(self.record.impacts)
+            self._hold_again(now, self._struck)
+            strike = Strike(self.model, now, self._entered, resting=self._crowd > 0)
         strike.run()
         self._entered.difference_update(strike.knocked)
         if strike.impacts:
@@ -289,13 +301,23 @@ class Instants:
         if strike.loose:
             self._choose_again(now, list(dict.fromkeys(holds[k].mode for k in strike.loose)))
 
-    def _hold_again(self, now: Point) -> None:
-        """Hold again what finite forces have released since the first impact at this instant: they act after it."""
-        for k in sorted(self._entered):
-            one = self.model.holds[k]
-            if now.d[one.mode] != one.number:
-                self._note(now, one.mode, one.number, IMPACT)
-                now.d[one.mode] = one.number
+    def _hold_again(self, now: Point, struck: Point) -> None:
+        """Take the speeds before the first impact at this instant again, and hold what has met since, nothing else.
+
+        Finite forces may have released a motion: they act after the impact. Others may have come to rest by an impact
+        that is now solved anew.
+        """
+        now.x = struck.x.copy()
+        for k, one in enumerate(self.model.holds):
+            mode = int(now.d[one.mode])
+            if k in self._entered:
+                mode = one.number
+            elif mode == one.number:
+                mode = int(struck.d[one.mode])
+            if mode == now.d[one.mode]:
+                continue
+            self._note(now, one.mode, mode, IMPACT)
+            now.d[one.mode] = mode
         share(self.model, now)
         solve_implicit(self.model, now)
 
@@ -326,10 +348,10 @@ class Instants:
         self.record.note(self.model, float(now.t), number, (int(now.d[number]), target), transition, self._round)
 
     def _chattering(self, why: str) -> Chattering:
-        return chattering(self.record.events, why, self.options.on_chattering)
+        return chattering(self.model, self.record.events, why, self.options.on_chattering)
 
 
-def chattering(events: Sequence[Event], why: str, asked: OnChattering) -> Chattering:
+def chattering(model: CompiledDae, events: Sequence[Event], why: str, asked: OnChattering) -> Chattering:
     """Return the error of a run whose last events switch without end, whatever was `asked` to prevent that."""
     counts: dict[str, list[Event]] = {}
     for event in events[-_CHATTER_EVENTS:]:
@@ -338,11 +360,15 @@ def chattering(events: Sequence[Event], why: str, asked: OnChattering) -> Chatte
     names = " ⇄ ".join(dict.fromkeys(name for event in those for name in (event.before, event.after)))
     first, last = f"{those[0].time:.9g}", f"{those[-1].time:.9g}"
     when = f"at t = {last} s" if first == last else f"in t = {first}…{last} s"
+    owner, _, own = mode.rpartition(".")
+    hint = _STICK if own.startswith("relation[") else _HINT
+    if hysteresis := model.flat_discretes[model.discrete_position[mode]].hysteresis:
+        hint = f"{owner or model.name}: set {hysteresis}, or smooth what drives it."
     return Chattering(
         f"{mode} switched {len(those)} times {when} ({names}).",
         where=list(dict.fromkeys(event.source for event in those))[:3],
         why=f"{why}.{_CANNOT[asked]}",
-        advice=_HINT + (_GO_ON if asked == "stop" else ""),
+        advice=hint + (_GO_ON if asked == "stop" else ""),
     )  # fmt: skip
 
 

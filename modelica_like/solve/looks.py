@@ -116,6 +116,7 @@ class Looks:
         self.span = float(times[-1] - times[0])
         self.width = self.span / self.count
         self._all = all
+        self.closer: dict[int, Looks] = {}
 
     def every(self, stride: int) -> Looks:
         """Return looks with a multiple of the distance and polished implicit unknowns."""
@@ -135,6 +136,11 @@ class Looks:
         if len(z):
             z = np.concatenate([z[:, :1], self.integrator.polished(times[1:], x[:, 1:], z[:, 1:], self.d)], axis=1)
         return Looks(self.integrator, self.guards, times, x, z, self.d, all)
+
+    @property
+    def numbers(self) -> int:
+        """Count of the states at all looks."""
+        return (self._all or self).x.size
 
     @cached_property
     def seen(self) -> tuple[Vector, Vector, Vector]:

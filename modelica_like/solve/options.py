@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+import math
+import os
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 
+SMALLEST_ATOL = 1e-20
 OnChattering = Literal["stop", "slide", "rest"]
+OnEnergyDrift = Literal["stop", "note", "off"]
+
+_NUMBER = 2 * 8
+"""Bytes of a number, which is copied once when results are put together."""
+
+
+def memory() -> float:
+    """Return the memory of this machine in bytes; infinite where the system does not tell."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):  # Windows has no sysconf
+        return math.inf
 
 
 @dataclass(frozen=True)
@@ -18,12 +33,17 @@ class Options:
         rtol: relative tolerance of the integrator, per step.
         atol: absolute tolerance, in units of each variable's nominal value.
         points: number of equal intervals of the results.
-        max_steps: largest number of integrator steps between two results.
+        max_steps: largest number of integrator steps between two results, with the compiled run-time in a hundredth of
+            the run (or between two of fewer results).
         max_events: largest number of events in a run.
         iterations: largest number of event rounds at one instant.
         on_chattering: what happens where events follow each other without end: `stop` with an error; `slide`: two modes
             that lead back to their border are mixed such that the run stays on it; `rest`: impacts that follow each
             other ever faster end in contact.
+        max_step: largest step of the integrator in s.
+        on_energy_drift: what happens where the stored energy of a component does not follow its power, so that the
+            integrator has stepped over something, even with shorter steps: `stop` with an error, or `note` it without
+            repetition; with `off` no energy is looked at.
     """
 
     rtol: float = 1e-7
@@ -33,14 +53,36 @@ class Options:
     max_events: int = 100_000
     iterations: int = 20
     on_chattering: OnChattering = "stop"
+    max_step: float = math.inf
+    on_energy_drift: OnEnergyDrift = "stop"
 
     def __post_init__(self) -> None:
-        for name, low, high in (("rtol", 1e-14, 0.1), ("atol", 1e-20, 1.0), ("points", 1, 10_000_000)):
+        for name, low, high in (("rtol", 1e-14, 0.1), ("atol", SMALLEST_ATOL, 1.0), ("points", 1, 10_000_000)):
             value = getattr(self, name)
             if not low <= value <= high:
                 told, least, most = (f"{one:,}" if isinstance(one, int) else f"{one:g}" for one in (value, low, high))
                 raise ValueOutOfRange(f"{name} = {told} is out of range: it must be between {least} and {most}.")
-        kinds = get_args(OnChattering)
-        if self.on_chattering not in kinds:
-            what = f"There is no on_chattering '{self.on_chattering}'{did_you_mean(self.on_chattering, kinds) or '.'}"
-            raise UnknownName(what, advice=f"There are {', '.join(kinds)}.")
+        if not self.max_step > 0:
+            raise ValueOutOfRange(f"max_step = {self.max_step:g} s is out of range: it must be positive.")
+        for name, kinds in (("on_chattering", get_args(OnChattering)), ("on_energy_drift", get_args(OnEnergyDrift))):
+            value = getattr(self, name)
+            if value not in kinds:
+                what = f"There is no {name} '{value}'{did_you_mean(value, kinds) or '.'}"
+                raise UnknownName(what, advice=f"There are {', '.join(kinds)}.")
+
+    def check_memory(self, numbers: int) -> None:
+        """Check before a run that its results fit.
+
+        Args:
+            numbers: how many there are at a time: states and implicit unknowns.
+
+        Raises:
+            ValueOutOfRange: they do not.
+        """
+        needed, there = float(_NUMBER) * self.points * numbers, memory()
+        if needed > there:
+            raise ValueOutOfRange(
+                f"{self.points:,} results of {numbers:,} states and implicit unknowns take {needed / 1e9:.3g} GB, and "
+                f"this machine has {there / 1e9:.3g} GB.",
+                advice="Take fewer points; `readings` are read off every step, whatever is written.",
+            )

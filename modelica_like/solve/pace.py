@@ -30,6 +30,8 @@ _COST = 100.0
 """Overhead of a panel, in steps."""
 _GROWTH = 8
 _ON_GRID = 1e-7
+_NEVER = 1e-12
+"""Rates, relative to the value and per second, that do not count as rising."""
 
 
 class Pace:
@@ -52,14 +54,17 @@ class Pace:
         self._grid = begin + (end - begin) * (np.arange(options.points + 1) / options.points)
         self.on_grid = not (guarded or timed)
         self._even = -(-options.points // -(-options.points // _LARGEST))
-        self._density = 1 / self.step / _SPARE
-        self._span = _FIRST * self.step if guarded else np.inf
+        # Few results do not change where IDAS steps and looks.
+        self._look = min(self.step, (end - begin) / Options.points)
+        self._density = 1 / self._look / _SPARE
+        self._waves = 0.0
+        self._span = _FIRST * self._look if guarded else np.inf
         self._known: dict[bytes, tuple[float, float]] = {}
 
     def panel(self, t: float, stop: float) -> tuple[float, int]:
         """Return length in s and number of looks of the next panel."""
         if not self.on_grid:
-            density = max(_SPARE * self._density, 1 / self.step)
+            density = max(_SPARE * self._density, 1 / self._look, self._waves)
             # Most of a panel may lie behind an event; a start also costs some steps.
             span = min(self._span, _SIZES[-1] / density)
             if self._density:
@@ -97,9 +102,24 @@ class Pace:
         while (
             looks >= 2 * stride * _SIZES[0]
             and 2 * stride * each <= _STEPS_PER_LOOK
-            and 2 * stride * width <= self.step / _FEWEST
+            and 2 * stride * width <= self._look / _FEWEST
         ):
             stride *= 2
+        return stride
+
+    def resolved(self, stride: int, advance: float, width: float) -> int:
+        """Return a number of looks per look at guards with which these see all waves, at most `stride`.
+
+        Zero if there are too few looks; the next panel has more.
+
+        Args:
+            stride: as the steps ask for.
+            advance: largest advance of a phase from one look to the next, over the advance that is allowed.
+            width: distance of looks in s.
+        """
+        self._waves = _ROOM * advance / width
+        while stride and stride * advance > 1:
+            stride //= 2
         return stride
 
     def shorter(self, span: float, *, denser: bool = False) -> None:
@@ -107,8 +127,12 @@ class Pace:
         if denser:
             self.on_grid = False
             span /= _GROWTH
-            self._density = max(self._density, 1 / self.step / _SPARE) * _GROWTH
+            self._density = max(self._density, 1 / self._look / _SPARE) * _GROWTH
         self._span = span
+
+    def again(self, span: float) -> None:
+        """Try a panel of this length in s with looks as at the beginning: what made them close is no more."""
+        self._span, self._density = span, 1 / self._look / _SPARE
 
     def longer(self, span: float, ahead: float) -> None:
         """Make the next panel longer than one of this length in s, but not much longer than the time ahead."""
@@ -132,4 +156,10 @@ class Pace:
 
     def _shortest(self) -> float:
         """Length of a panel that costs little more than its start."""
-        return _STEPS_TO_START / max(self._density, 1 / self.step)
+        return _STEPS_TO_START / max(self._density, 1 / self._look)
+
+
+def foreseen(values: Vector, rates: Vector) -> float:
+    """Return the time in s until the first guard rises, by linear extrapolation from values and rates at one time."""
+    rising = (values < 0) & (rates > -_NEVER * values)
+    return float(np.min(-values[rising] / rates[rising], initial=np.inf))

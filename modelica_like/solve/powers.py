@@ -14,7 +14,7 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.options import Options
+from modelica_like.solve.options import SMALLEST_ATOL, Options
 from modelica_like.solve.quadrature import Places, rules
 from modelica_like.solve.recorder import Segment
 
@@ -40,6 +40,8 @@ _CANCELLED = 0.1
 """Share of the sizes of stored energies below which these cancel."""
 _MORE, _LEAST, _DEEPEST = 4, 4, 12
 """Finer results per interval, the smallest number of intervals for this, and the number of repetitions."""
+COARSE = _DEEPEST + 1
+"""Depth at which results are taken as they are."""
 _FAILURES = 20
 """Failures of IDAS in a piece of a run after which the given results must suffice."""
 _FEW = 4
@@ -137,14 +139,17 @@ class Powers:
         stored: the largest energy that all components stored at one time so far, in J.
         moved: that, or the largest energy that one component exchanged. The precision of an integral is relative to
             it: an oscillation exchanges its energy repeatedly.
+        unknown: differences in J between the stored energy of each component and the integral of its rate where no
+            results were fine enough; shape (components,).
     """
 
     def __init__(self, model: CompiledDae, options: Options, count: int) -> None:
         self.model, self.options = model, options
         self._share = min(_SHARE, _ALL / count)
         self.stored, self.moved, self._noise = 0.0, _NOTHING, np.zeros(2)
+        self.unknown = np.zeros(len(model.components))
         rtol = min(options.rtol, max(_FINER * options.rtol, _FINEST))
-        finer = replace(options, rtol=rtol, atol=options.atol * rtol / options.rtol)
+        finer = replace(options, rtol=rtol, atol=max(options.atol * rtol / options.rtol, SMALLEST_ATOL))
         self._integrator = Integrator(model, finer, counted=False)
 
     def integrals(self, every: Results, depth: int = 0) -> Vector:
@@ -160,6 +165,8 @@ class Powers:
         ends, places = kept[np.array([intervals, intervals + 1])], kept[places]
         powers = every.terms[1 : 1 + POWERS].reshape(-1, len(every.times))
         self._move(every.terms[0], powers, steps)
+        if depth == COARSE:
+            return _summed(powers, places, weights[:, 0]).reshape(POWERS, -1)
         if not depth:
             self._hear(every)
         bent, bends = intervals[:0], np.zeros((2, len(powers), 0))
@@ -172,10 +179,17 @@ class Powers:
             weights[bent, :, :2] = _BESIDE * np.diff(every.times[ends[:, bent]], axis=0)[0][:, None, None]
             coarse = self._coarse(every.terms, ends, places, weights, bent, bends, depth)
         again, finer = self._again(every, ends, _stretches(coarse, first) if depth < _DEEPEST else [])
+        self._miss(every, ends, places, weights, coarse & ~again)
         weights[again] = 0.0
-        total = powers @ np.bincount(places.ravel(), weights[:, 0].ravel(), len(every.times)) + bends[0] @ ~again[bent]
+        total = _summed(powers, places, weights[:, 0]) + bends[0] @ ~again[bent]
         parts = (self.integrals(some, depth + 1) for some in results(self.model, finer))
         return sum(parts, total.reshape(POWERS, -1))
+
+    def _miss(self, every: Results, ends: Places, places: Places, weights: Vector, missed: Places) -> None:
+        """Note what is unknown in intervals that remain too coarse."""
+        for k in missed.nonzero()[0]:
+            change = np.diff(every.terms[0][:, ends[:, k]])[:, 0]
+            self.unknown += np.abs(change - every.terms[POWERS][:, places[k]] @ weights[k, 0])
 
     def _again(self, every: Results, ends: Places, stretches: list[Places]) -> tuple[Places, list[Segment]]:
         """Return the intervals with finer results, and these; a stretch lies within one smooth piece.
@@ -213,6 +227,11 @@ class Powers:
     def cancelled(self) -> float:
         """Size in J of stored energies that cancel: a pendulum falling from the height of its pivot stores nothing."""
         return _CANCELLED * float(self._noise[0]) / (_ROUNDING * _DIGITS)
+
+    @property
+    def precision(self) -> float:
+        """Accepted error of an interval in J."""
+        return _ASTRAY * self.options.rtol * max(self.moved, self.cancelled)
 
     def _move(self, stored: Vector, powers: Vector, steps: Vector) -> None:
         """Update the energies that results store and exchange."""
@@ -264,6 +283,10 @@ class Powers:
         # A weight that exactly balances a motion leaves nothing but rounding, which no finer result makes smaller.
         noise = self._noise[0] + self._noise[1] * np.abs(weights[:, 0].sum(axis=1))
         return ~((errors <= np.maximum(self._share * allowed, noise)) & (known <= np.maximum(_ASTRAY * allowed, noise)))
+
+
+def _summed(powers: Vector, places: Places, weights: Vector) -> Vector:
+    return powers @ np.bincount(places.ravel(), weights.ravel(), powers.shape[1])
 
 
 def _slopes(model: CompiledDae) -> ca.Function:

@@ -76,13 +76,11 @@ class _Expressions:
     """Some results of a function of the model, as a function of their arguments only."""
 
     def __init__(self, model: CompiledDae, results: Any) -> None:
-        symbols = {one.element_hash() for one in ca.symvar(results)}
-        self._needed: list[Any] = []
-        arguments: list[Any] = []
-        for argument in model.arguments.values():
-            rows = [k for k in range(argument.numel()) if argument[k].element_hash() in symbols]
-            self._needed.append(rows)
-            arguments.append(argument[rows] if rows else ca.SX(0, 1))
+        self._needed: list[list[int]] = [[] for _ in model.arguments]
+        for number, row in sorted(model.symbol_places[one.element_hash()] for one in ca.symvar(results)):
+            self._needed[number].append(row)
+        given = zip(model.arguments.values(), self._needed, strict=True)
+        arguments = [argument[rows] if rows else ca.SX(0, 1) for argument, rows in given]
         self._function = Along(ca.Function("read", arguments, [ca.densify(results)], {"cse": True}))
 
     @staticmethod

@@ -76,7 +76,12 @@ class RecordedSolution(Trajectories):
         values: continuous variables, shape (variables, n).
         discretes: modes and discrete values, shape (discretes, n).
         seconds: wall time of the run.
+
+    Attributes:
+        advice: how to learn a number for which results are not enough.
     """
+
+    advice = "Ask before the run: run_fmu(…, readings=[…]), or simulate the netlist."
 
     def __init__(self, model: RecordedModel, time: Vector, values: Vector, discretes: Vector, seconds: float) -> None:
         self._time, self._values_table, self._discretes = time, values, discretes
@@ -88,6 +93,16 @@ class RecordedSolution(Trajectories):
     def time(self) -> Vector:
         """Times of the results in s."""
         return self._time
+
+    @property
+    def continuous(self) -> Vector:
+        """Values of the continuous variables, shape (variables, n)."""
+        return self._values_table
+
+    @property
+    def discretes(self) -> Vector:
+        """Values of modes and discrete variables, shape (discretes, n)."""
+        return self._discretes
 
     def __getitem__(self, key: str | Any) -> Vector:
         path, model = self.path(key), self.model

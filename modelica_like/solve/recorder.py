@@ -10,7 +10,10 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import Source
 from modelica_like.initialize import Impact, Point
+from modelica_like.solve.dense import Keeper
 
+TERMINATED = "has terminated it"
+"""The reason where an FMU ends a run: it cannot say more."""
 IMPACT = -1
 """Stands in the place of a transition where an impact has changed a mode."""
 
@@ -41,6 +44,24 @@ class Event:
 
     def __str__(self) -> str:
         return f"{self.time:.9g} s  {self.mode}: {self.before} → {self.after}"
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A regular end of a run, by a component.
+
+    Attributes:
+        time: in s.
+        component: its path; of a model without parts its name; the name of an FMU.
+        reason: goes on after the name of the component.
+    """
+
+    time: float
+    component: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"The run ended at {self.time:.9g} s: {self.component} {self.reason.rstrip('.')}."
 
 
 @dataclass(frozen=True)
@@ -76,12 +97,17 @@ _NOTHING = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
 
 @dataclass
 class Recorder:
-    """Collects points into segments, events and losses in impacts; `notices` are messages for the report."""
+    """Collects points into segments, events and losses in impacts, and dense output.
+
+    `notices` are messages for the report; `ended` is whether a component has ended the run.
+    """
 
     segments: list[Segment] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     impacts: list[Impact] = field(default_factory=list)
     notices: list[str] = field(default_factory=list)
+    ended: bool = False
+    keeper: Keeper = field(default_factory=Keeper)
     _open: list[Points] = field(default_factory=list)
     _closed: list[tuple[list[Points], Vector]] = field(default_factory=list)
 
@@ -120,6 +146,7 @@ class Recorder:
         known = transition
         if known < 0:
             known = next(k for k, one in enumerate(model.transitions) if one.mode == number)
+        self.ended |= transition >= 0 and model.transitions[transition].ends
         source, segment = model.transitions[known].source, len(self.segments) + len(self._closed)
         self.events.append(Event(time, mode.path, before, after, source, transition, segment, round))
 

@@ -88,10 +88,10 @@ def read_signals(model: Any, words: Iterable[str]) -> list[Signal]:
         try:
             paths = fitting(pool, [word], f"{model.name} has no variable")
         except UnknownName as error:
-            formula = _formula(word)
+            formula = formula_of(word)
             if formula is None:
                 raise error from None
-            found[word] = Signal(word, _unit(formula, known | _energies(terms), model.name), formula)
+            found[word] = Signal(word, unit_of(formula, known | _energies(terms), model.name), formula)
         else:
             units = known | _energies(terms)
             found |= {path: Signal(path, units[path], Formula("name", (path,)), signs.get(path, 1)) for path in paths}
@@ -120,7 +120,7 @@ def _energies(terms: Iterable[str]) -> dict[str, str]:
     return {path: "J" if path.endswith(ENERGY_TERMS[0]) else "W" for path in terms}
 
 
-def _formula(word: str) -> Formula | None:
+def formula_of(word: str) -> Formula | None:
     """Read a formula that names something; None if the text is a name or a pattern.
 
     Raises:
@@ -135,7 +135,14 @@ def _formula(word: str) -> Formula | None:
     return formula if formula.operation != "name" and any(True for _ in formula.names()) else None
 
 
-def _unit(formula: Formula, units: dict[str, str], model: str) -> str:
+def unit_of(formula: Formula, units: dict[str, str], model: str) -> str:
+    """Return the unit of a formula, by the units of its names.
+
+    Raises:
+        UnknownName: it names something else.
+        UnitError: the units do not fit together.
+    """
+
     def unit(name: str) -> Unit:
         if name not in units:
             raise UnknownName(f"'{formula}': {model} has no variable '{name}'{did_you_mean(name, units) or '.'}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,12 +11,14 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.initialize import Impact, Point, StartKind
+from modelica_like.language.transition import NAME_IN_NOTICE
+from modelica_like.solve.dense import Dense
 from modelica_like.solve.energy import EnergyBalance, energy_balance
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
 from modelica_like.solve.rates import differentiated, rate_along
 from modelica_like.solve.reading import TOGETHER, blocks, energy_term, variables
-from modelica_like.solve.recorder import Event, Segment
+from modelica_like.solve.recorder import Ended, Event, Segment
 from modelica_like.solve.trajectories import ENERGY_TERMS, Statistics, Trajectories, Values
 
 
@@ -33,6 +35,7 @@ class Solution(Trajectories):
         impacts: losses in impacts.
         notices: messages about the run.
         start: kind of its start.
+        dense: returns its dense output, or None if that was not kept.
     """
 
     model: CompiledDae
@@ -43,6 +46,8 @@ class Solution(Trajectories):
     impacts: tuple[Impact, ...] = ()
     notices: tuple[str, ...] = ()
     start: StartKind = "given"
+    readings: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    dense: Callable[[], Dense] | None = field(default=None, repr=False)
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -51,6 +56,17 @@ class Solution(Trajectories):
         if "time" not in self._cache:
             self._cache["time"] = np.concatenate([s.times for s in self.segments])
         return self._cache["time"]
+
+    @property
+    def ended(self) -> Ended | None:
+        """Where and why a component has ended the run, or None."""
+        ends = (one for one in self.events if one.transition >= 0 and self.model.transitions[one.transition].ends)
+        if (event := next(ends, None)) is None:
+            return None
+        component, dot, _ = event.mode.rpartition(".")
+        text = self.model.transitions[event.transition].notice
+        reason = NAME_IN_NOTICE.sub(lambda name: f"{self.final[component + dot + name[1]]:g}", text)
+        return Ended(event.time, component or self.model.name, reason)
 
     def __getitem__(self, key: str | Any) -> Vector:
         """Return a trajectory, shape (len(time),).
@@ -176,7 +192,7 @@ class Solution(Trajectories):
                 yield Segment(times[order], x[:, order], z[:, order], one.d)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_cache": {}}
+        return {**self.__dict__, "_cache": {}, "dense": None}
 
     def __repr__(self) -> str:
         span = f"t = {self.time[0]:g} … {self.time[-1]:g} s"

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from modelica_like.compile.compiled import Vector
@@ -14,7 +15,7 @@ from modelica_like.initialize import Point
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
 from modelica_like.solve.branches import member, next_names
-from modelica_like.solve.recorder import Event
+from modelica_like.solve.recorder import Ended, Event
 from modelica_like.upper import Shown, upper
 
 if TYPE_CHECKING:
@@ -74,13 +75,17 @@ class Trajectories(Shown, ABC):
         events: mode changes.
         statistics: of the run.
         notices: messages about the run.
+        readings: numbers that were asked for before the run, by name.
         measured: whether they are a table, to be drawn as dots.
     """
+
+    _ended: Ended | None = None
 
     model: Any
     events: tuple[Event, ...]
     statistics: Statistics
     notices: tuple[str, ...] = ()
+    readings: Mapping[str, Any] = MappingProxyType({})
     measured: bool = False
 
     def __getattr__(self, name: str) -> Any:
@@ -94,6 +99,11 @@ class Trajectories(Shown, ABC):
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self.names)
+
+    @property
+    def ended(self) -> Ended | None:
+        """Where and why a component or an FMU has ended the run, or None."""
+        return self._ended
 
     @property
     @abstractmethod
@@ -158,6 +168,19 @@ class Trajectories(Shown, ABC):
         """
         return {self.path(key): self[key] for key in keys}
 
+    def read(self, *names: str) -> list[Any]:
+        """Return numbers of the run: those asked for before it, others off the dense output that it has kept.
+
+        Those of a measured table are those of straight lines between its rows.
+
+        Raises:
+            UnknownName: a reading is not known.
+            MissingValue: its dense output was not kept, or is not known.
+        """
+        more = [name for name in names if name not in self.readings]
+        known = {**self.readings, **(dict(zip(more, upper("read_after")(self, more), strict=True)) if more else {})}
+        return [known[name] for name in names]
+
     def _check_within(self, t: float) -> None:
         first, last = float(self.time[0]), float(self.time[-1])
         if not first <= t <= last:
@@ -220,14 +243,15 @@ def matching(model: Any, patterns: Sequence[str]) -> list[str]:
 
 
 def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
-    """Return the names that match patterns; `missing` begins the message about a pattern without a match.
+    """Return the names that match patterns, a name itself before all; `missing` begins the message where none does.
 
     Raises:
         UnknownName: nothing matches a pattern.
     """
     names: dict[str, None] = {}
+    every = set(known)
     for pattern in patterns:
-        some = [name for name in known if name == pattern or fnmatchcase(name, pattern)]
+        some = [pattern] if pattern in every else [name for name in known if fnmatchcase(name, pattern)]
         if not some:
             raise UnknownName(f"{missing} '{pattern}'{did_you_mean(pattern, known) or '.'}")
         names.update(dict.fromkeys(some))

@@ -12,13 +12,12 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.errors import StructureError
+from modelica_like.flatten.steps import STEPS
 from modelica_like.structure.isolate import isolate
 
 SMALL = 3
 """Torn linear blocks up to this size are solved symbolically; larger ones stay implicit."""
 
-_STEPS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL}
-"""Operations whose slope is zero."""
 _UNIT = 1e-150
 """Keeps the relative size of a single coefficient defined where it is zero."""
 
@@ -67,7 +66,7 @@ def _decides(expression: Any, unknown: Any) -> bool:
     for k in range(function.n_instructions()):
         code, inputs = function.instruction_id(k), function.instruction_input(k)
         moves = code == ca.OP_INPUT or not moving.isdisjoint(inputs)
-        if moves and code in _STEPS:
+        if moves and code in STEPS:
             return True
         (moving.update if moves else moving.difference_update)(function.instruction_output(k))
     return False

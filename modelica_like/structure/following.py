@@ -22,6 +22,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.flatten.generic import spread
 from modelica_like.flatten.model import FlatDiscrete, Origin
 from modelica_like.structure.alias import PREFERENCES
 from modelica_like.structure.system import Level, System
@@ -127,6 +128,14 @@ def singular_groups(system: System, counts: list[int], states: list[int]) -> tup
     return tuple(found)
 
 
+def moving_chains(system: System, counts: list[int]) -> set[int]:
+    """Return the chains of constraints that share variables, where a slope moves: a ratio between them may vanish."""
+    entries = _entries(system, counts)
+    groups = [[pair for row in rows for pair in entries[row].items()] for rows in _connected(system, entries)]
+    moving = [group for group in groups if any(moves for _, moves in group)]
+    return {system.levels[level].chain for group in moving for level, _ in group}
+
+
 def _entries(system: System, counts: list[int]) -> dict[int, dict[int, bool]]:
     """Variables of every constraint, and whether its slope by them moves; of highest derivatives after all only."""
     rows = [k for k, count in enumerate(counts) if count]
@@ -167,11 +176,11 @@ def _vanishes(system: System, rows: list[int], dependent: list[int]) -> bool:
     """
     if len(rows) != len(dependent):
         return False
-    model, chance = system.model, np.random.default_rng(1)
+    model = system.model
     slopes = ca.densify(ca.jacobian(system.residual[rows], system.column(dependent)))
     function = ca.Function("slopes", [system.everything, model.p, model.d, model.time], [slopes])
     nominal = np.array([level.nominal for level in system.levels])[:, None]
-    points = nominal * chance.uniform(-np.pi, np.pi, (len(nominal), _SAMPLES))
+    points = nominal * spread(-np.pi, np.pi, (len(nominal), _SAMPLES))
     times = np.logspace(*_TIMES, _SAMPLES)[None]
     values = function.map(_SAMPLES)(points, *system.constants, times).full().T.reshape(_SAMPLES, len(rows), -1)
     found = np.linalg.det(values[[bool(np.isfinite(one).all()) for one in values]])
@@ -259,7 +268,7 @@ def _first_weights(system: System, slopes: Any) -> Any:
     found = function(values, *system.constants, 0.0).full()
     found = np.where(np.isfinite(found), found, 0.0)
     sizes = np.linalg.norm(found, axis=1, keepdims=True)
-    found += _OFF * np.where(sizes > 0, sizes, 1.0) * np.random.default_rng(2).uniform(-1, 1, found.shape)
+    found += _OFF * np.where(sizes > 0, sizes, 1.0) * spread(-1.0, 1.0, found.shape)
     return np.linalg.svd(found)[2][len(found) :]
 
 

@@ -23,6 +23,10 @@ from modelica_like.flatten.model import FlatModel, evaluate
 from modelica_like.structure.system import System
 
 _DEPENDENT = 1e-9
+_YIELDING = 1e-10
+"""In SI units: what passes a dead centre at 1e-3 m/s² meets 1e7 N. Blocks still count as regular, from 1e-12 on."""
+_NEAR = 1e-6
+"""Slope of a held motion, over that at another place, below which it counts as that of a dead centre."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +140,7 @@ def find_circuits(
     rigid = [k for k, one in enumerate(holds) if one.rigid and one.reaction >= 0]
     if len(rigid) < 2:
         return []
-    slopes = _slopes(system, [holds[k].motion for k in rigid], order, states)
+    slopes = system.generic(_slopes(system, [holds[k].motion for k in rigid], order, states)).full()
     sizes = np.linalg.norm(slopes, axis=1)
     moving = sizes > 0.0
     rigid = [k for k, moves in zip(rigid, moving, strict=True) if moves]
@@ -151,11 +155,11 @@ def find_circuits(
 
 
 def _slopes(system: System, nodes: list[int], order: list[tuple[Any, Any]], states: list[int]) -> Any:
-    """Slopes of variables by the states at a generic point, as numbers."""
+    """Slopes of motions by the states that move them: not by positions, on which the slopes of a linkage hang."""
     motions = system.node_values[nodes]
     if order:
         _, (motions,) = ca.substitute_inplace([s for s, _ in order], [e for _, e in order], [motions], False)
-    return system.generic(ca.jacobian(motions, system.column(states))).full()
+    return ca.jacobian(motions, system.column(level for level in states if system.derivative(level) not in states))
 
 
 def _groups(together: Any) -> list[list[int]]:
@@ -171,6 +175,40 @@ def _groups(together: Any) -> list[list[int]]:
         seen.update(group)
         groups += [sorted(group)] if len(group) > 1 else []
     return groups
+
+
+def let_yield(
+    system: System, holds: tuple[HeldMotion, ...], moving: set[int], order: list[tuple[Any, Any]], states: list[int],
+    residual: Any,
+) -> Any:  # fmt: skip
+    """Let motions yield to what holds them where a linkage passes its dead centre.
+
+    The speed of a ram vanishes there only for an instant, and no force on it changes that: none reaches the crank. With
+    der(motion) = `_YIELDING` * reaction the reaction grows beyond any capacity instead of being undetermined, and the
+    surfaces break away in the direction in which the motion goes on. Elsewhere they hold exactly.
+
+    Args:
+        system: the equations.
+        holds: the held motions.
+        moving: chains of constraints whose slopes move.
+        order: explicit unknowns (symbols) with their expressions in earlier ones.
+        states: levels that are states: they do not vanish by themselves.
+        residual: column of all equations, differentiated ones included.
+
+    Returns:
+        The residual, the same one if no motion yields.
+    """
+    rows = ca.vertsplit(residual)
+    for hold, gain in zip(holds, gains(system), strict=True):
+        level = system.node_level[hold.motion]
+        if not hold.rigid or hold.reaction < 0 or level is None or level[0] in states:
+            continue
+        if system.levels[level[0]].chain in moving:
+            slopes = ca.sumsqr(_slopes(system, [hold.motion], order, states))
+            near = 1 - slopes / (_NEAR**2 * system.generic(slopes))
+            rows[hold.row] -= gain * _YIELDING * ca.fmax(near, 0) * system.node_values[hold.reaction]
+            residual = ca.vertcat(*rows)
+    return residual
 
 
 def share_reactions(system: System, holds: tuple[HeldMotion, ...], circuits: list[Circuit], residual: Any) -> Any:

@@ -12,13 +12,23 @@ from modelica_like.flatten.model import FlatModel, Origin
 from modelica_like.structure.alias import Aliases, find_aliases
 from modelica_like.structure.blocks import Block, BlockSolver, Solved
 from modelica_like.structure.diagnose import check_solvable
-from modelica_like.structure.following import Choice, Following, Group, follow, prefer, singular_groups, write_choice
+from modelica_like.structure.following import (
+    Choice,
+    Following,
+    Group,
+    follow,
+    moving_chains,
+    prefer,
+    singular_groups,
+    write_choice,
+)
 from modelica_like.structure.holds import (
     Circuit,
     HeldMotion,
     add_approaches,
     find_circuits,
     held_rates,
+    let_yield,
     share_reactions,
 )
 from modelica_like.structure.ideal import IdealNetwork, complete, find_ideals
@@ -145,8 +155,11 @@ def reduce(flat: FlatModel) -> ReducedDae:
     solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
-    if circuits:
-        residual = share_reactions(system, holds, circuits, residual)
+    moving = moving_chains(system, counts) if holds else set[int]()
+    changed = let_yield(system, holds, moving, order, states, residual) if moving else residual
+    changed = share_reactions(system, holds, circuits, changed) if circuits else changed
+    if changed is not residual:
+        residual = changed
         solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
     own = len(counts) - sum(len(one.chains) for one in chosen.following)
     reduced = _assemble(system, counts[:own], states, unknowns, origins, solved)

@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.flatten.generic import spread
 from modelica_like.flatten.model import FlatModel, FlatVariable, Origin, evaluate
 from modelica_like.structure.alias import PREFERENCES, Aliases
 
@@ -88,8 +89,8 @@ class System:
         model = self.model
         function = ca.Function("generic", [self.everything, model.p, model.d, model.time], [expressions])
         # No two values are equal: the ends of a rod must not coincide.
-        chance = np.random.default_rng(1)
-        return function(chance.random(len(self.symbols)), *self.constants, chance.random())
+        *values, time = spread(0.0, 1.0, len(self.symbols) + 1)
+        return function(values, *self.constants, time)
 
     def add_level(self, chain: int) -> int:
         """Extend a chain by one derivative."""

@@ -2,6 +2,7 @@
 
 from modelica_like.units.atoms import BASE as BASE
 from modelica_like.units.quantity import in_unit as in_unit
+from modelica_like.units.quantity import plain_digits as plain_digits
 from modelica_like.units.quantity import read_quantity as read_quantity
 from modelica_like.units.quantity import to_si as to_si
 from modelica_like.units.unit import ANY as ANY

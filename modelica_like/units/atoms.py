@@ -95,7 +95,7 @@ def find_atom(name: str) -> Atom:
     """
     if name in ATOMS:
         return ATOMS[name]
-    if name in ("Nm", "Nms"):  # pint reads the first as a number of threads
+    if name in _MEANT:
         raise UnitError(f"Unknown unit '{name}'{_suggestion(name)}")
     return _ask_pint(name)
 
@@ -145,8 +145,14 @@ def simplify(exponent: Fraction) -> Exponent:
     return int(exponent) if exponent.denominator == 1 else exponent
 
 
+_MEANT = {
+    "Nm": "N.m", "Nms": "N.m.s", "U": "rev", "r": "rev", "tr": "rev", "Upm": "rpm", "RPM": "rpm", "upm": "rpm",
+}  # fmt: skip
+"""What is meant by names that pint does not know, or takes for threads (Nm) and enzymes (U)."""
+
+
 def _suggestion(name: str) -> str:
-    parts = _split(name)
+    parts = _MEANT.get(name) or _split(name)
     if name[:-1] in ATOMS and name.endswith("s"):
         parts = name[:-1]
     return f"; did you mean '{parts}'?" if parts else did_you_mean(name, ATOMS) or "."

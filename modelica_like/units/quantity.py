@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from fractions import Fraction
 from numbers import Real
 from typing import Any
@@ -17,6 +18,13 @@ _NUMBER = re.compile(
 )
 
 
+def plain_digits(text: str) -> str:
+    """Return a text with the digits of other scripts, such as full-width ones, as 0 to 9."""
+    if text.isascii():
+        return text
+    return "".join(char if (digit := unicodedata.decimal(char, -1)) < 0 else str(digit) for char in text)
+
+
 def read_quantity(text: str) -> tuple[float, Unit] | None:
     """Read `8.5 kg.cm2`, `6000 rpm`, `20 degC` or `1e-3`.
 
@@ -27,7 +35,7 @@ def read_quantity(text: str) -> tuple[float, Unit] | None:
     Raises:
         UnitError: the text after a number is not a unit.
     """
-    match = _NUMBER.fullmatch(text.strip())
+    match = _NUMBER.fullmatch(plain_digits(text.strip()))
     if match is None:
         return None
     number, unit = match.groups()
@@ -89,7 +97,7 @@ def _text_quantity(text: str, unit: Unit, name: str) -> tuple[float, Unit]:
         raise UnitError(f"{name} = '{text}': {error.what}", advice=error.advice) from None
     if read is None:
         raise UnitError(f"{name} expects {unit}; '{text}' is not a quantity.")
-    match = _NUMBER.fullmatch(text.strip())
+    match = _NUMBER.fullmatch(plain_digits(text.strip()))
     return read if match is not None and match.group(2) else (read[0], unit)
 
 

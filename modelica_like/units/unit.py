@@ -175,6 +175,7 @@ def _check_name(name: str, text: str) -> None:
             raise
         what = error.what.replace(f"'{name}'", f"'{name}' in '{text}'", 1)
         meant = re.sub(r"mean '(.*)'", lambda match: f"mean '{text.replace(name, match[1], 1)}'", what)
+        meant = meant.replace("'rev/min'", "'rpm'")
         raise UnitError(meant) from None
 
 

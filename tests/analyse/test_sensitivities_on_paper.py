@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components import Clutch, ConstantTorque, Fixed, Inertia, SpeedDependentLoad, SpringDamper
+from components import BearingFriction, Clutch, ConstantTorque, Fixed, Inertia, SpeedDependentLoad, SpringDamper
 from modelica_like import Assembly, Component, build, load, sensitivities, simulate
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities
 from modelica_like.language import Equations, Events, Mode, Parameter, Variable, der, guess, param, series, var, where
@@ -371,3 +371,33 @@ def test_a_steady_start_with_a_clutch_that_sticks() -> None:
     np.testing.assert_allclose(result.derivatives, [[1.0, -1.0, 0.0]] * 2, atol=1e-9)
     found = carried(Coupled(), ["rotor.w", "wheel.w"], ["push.tau_constant", "load.a", "rotor.J"], 1.0, start="steady")
     np.testing.assert_allclose(found, [[1.0, -1.0, 0.0]] * 2, atol=1e-9)
+
+
+class BeyondTheTable(Component):
+    """Friction of 1 N.m + s·w up to 50 rad/s, and as much as there beyond."""
+
+    push = ConstantTorque(tau_constant=35.0)
+    rotor = Inertia(J=1.0, w=0.0, phi=0.0)
+    bearing = BearingFriction(tau_pos=[[0.0, 1.0], [50.0, 1.75]])
+
+    def equations(self) -> Equations:
+        yield from series(self.push, self.rotor, self.bearing)
+
+
+@pytest.mark.parametrize("until", [1.0, 1.6, 2.0])
+def test_a_speed_that_leaves_its_table(until: float) -> None:
+    """The event that says so follows the kink within rounding."""
+
+    def paper(values: np.ndarray) -> np.ndarray:
+        push, J = values
+        slope, last, end = 0.015, 1.75, 50.0
+        left = -J / slope * np.log(1.0 - slope * end / (push - 1.0))
+        if until < left.real:
+            return np.array([(push - 1.0) / slope * (1.0 - np.exp(-slope / J * until))])
+        return np.array([end + (push - last) / J * (until - left)])
+
+    names = ["push.tau_constant", "rotor.J"]
+    result = sensitivities(BeyondTheTable(), ["rotor.w"], names, until=until)
+    expected = complex_step(paper, np.array([35.0, 1.0]))
+    assert relative_error(result, expected) < 1e-9
+    np.testing.assert_allclose(carried(BeyondTheTable(), ["rotor.w"], names, until), expected, rtol=1e-7)

@@ -6,6 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
+
+from modelica_like.cli import app
 
 DRIVE = """
 [parts]
@@ -73,3 +76,32 @@ def test_bad_input(text: str, line: int, message: str, tmp_path: Path) -> None:
     assert message in result.stderr
     assert "Traceback" not in result.stderr
     assert re.search(rf"in bad\.toml:{line} `" if line else r"in \w+\.(toml|py)", result.stderr)
+
+
+RIGID = changed(', "shaft"', "").replace("shaft = {", "#")
+NOT_BEGUN = {
+    "start values that contradict a source": (RIGID, 2, """\
+rotor.w = 0 cannot be met: rotor.w would be 10.472."""),
+    "a part that refuses its parameters": ("""
+[parts]
+u = { is = "Constant", k = 1 }
+block = { is = "PulseCounter", u_high = 1, u_low = 2 }
+[connect]
+u = ["u.y", "block.u"]
+[simulate]
+until = "1 s"
+""", 1, "At 0 s block has u_high below u_low."),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["check", "simulate"])
+@pytest.mark.parametrize(("text", "code", "message"), NOT_BEGUN.values(), ids=NOT_BEGUN.keys())
+def test_check_finds_what_a_run_refuses_at_its_start(
+    text: str, code: int, message: str, command: str, tmp_path: Path
+) -> None:
+    """`check` said "can be simulated" first."""
+    (tmp_path / "bad.toml").write_text(text)
+    result = CliRunner().invoke(app, [command, str(tmp_path / "bad.toml")])
+    assert result.exit_code == code
+    assert "can be simulated" not in result.stdout
+    assert result.stderr.startswith(message)

@@ -128,7 +128,7 @@ def test_a_failed_simulation_keeps_what_there_is(tmp_path: Path) -> None:
     """x = 1/(1 - t): the integrator gives up at 1 s; results up to there are those of the closed form."""
     (tmp_path / "drive.toml").write_text(FAILING)
     (tmp_path / "blow.py").write_text(BLOW)
-    result = command(tmp_path, "-m", "modelica_like", "simulate", "drive.toml", "--csv", "run.csv")
+    result = command(tmp_path, "-m", "modelica_like", "simulate", "drive.toml", "--trust", "--csv", "run.csv")
     assert result.returncode == 1
     assert result.stderr.startswith("IDAS gave up at about t = ")
     told = re.search(r"\nThe results up to t = ([0-9.]+) s are in run\.csv\.\n$", result.stderr)
@@ -242,3 +242,32 @@ def test_an_interrupted_calibration_is_no_failed_start() -> None:
     data = Interrupted({"J2.w": (1.0, 0.1)}, until=0.01)
     with pytest.raises(KeyboardInterrupt):
         calibrate(DRIVE, data, {"J1.J": (0.01, 0.03)}, starts=3)
+
+
+# Kills its own process when workers have done something, and says so before.
+KILLED = """
+import os, sys
+from modelica_like.report import progress
+def kill(self, reached, *of):
+    print("at work", flush=True)
+    os.kill(os.getpid(), number)
+progress.Bar.__call__ = kill
+from modelica_like.cli import main
+if __name__ == "__main__":  # workers import this module
+    number = int(sys.argv.pop(1))
+    main()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_workers_of_a_killed_sweep_end_with_it(tmp_path: Path, number: int) -> None:
+    """They have its standard output, too, which ends when the last of them has ended."""
+    (tmp_path / "killed.py").write_text(KILLED)
+    words = ["sweep", str(DRIVE), "--over", "J1.J=0.01:0.03:5000", "--of", "J2.w", "--solver", "idas"]
+    process = subprocess.Popen(
+        [sys.executable, "killed.py", str(int(number)), *words, "--processes", "2", "-o", "table.csv"],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+    assert process.wait(120) == -number
+    told, _ = process.communicate(timeout=20)
+    assert told == b"at work\n"

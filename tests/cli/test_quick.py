@@ -46,6 +46,7 @@ CALLS = [
     "library gear worm --group gears",
     "runtimes --platform all",
     "docs -o pages",
+    "trust drives --remove",
     "docs Clutch Gear --output pages --examples folder",
     "validate a.fmu --timeout 2.5s --json",
     "compare a.csv b.csv --until 2 --points 10 --rtol 1e-7 --signal *.w",

@@ -16,6 +16,7 @@ DIFFERENT = {
     "--set": {"PATH=VALUE", "FMU.PATH=VALUE"},
     "--at": {"WHEN", "TIME", "PLACE"},
     "--show": {"PATTERN", "NAME"},
+    "--inputs": {"FILE", None},
     "--open": {"PATH", "SIGNAL"},
 }
 """Names whose values are not the same for all commands, with what their values are."""
@@ -100,3 +101,12 @@ def test_completion_is_shown_for_the_shell():
     command = [sys.executable, "-m", "modelica_like", "--show-completion", "bash"]
     done = subprocess.run(command, env=named, capture_output=True, text=True, check=False)
     assert "complete" in done.stdout
+
+
+@pytest.mark.parametrize("command", ["from-modelica", "to-modelica"])
+@pytest.mark.parametrize("text", ["", ".", ".."])
+def test_a_folder_is_no_text(command: str, text: str) -> None:
+    """The empty text is this folder, which has no name to put an ending to."""
+    result = CliRunner().invoke(cli.app, [command, text])
+    assert result.exit_code == 2
+    assert result.stderr == f"The netlist '{text or '.'}' is a folder.\n"

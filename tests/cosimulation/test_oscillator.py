@@ -203,7 +203,7 @@ start = "rest"
     parts = split(tmp_path / "drive.toml", "shaft", tmp_path / "parts", check=False)
     with pytest.raises(FmuFailed, match=r"^push \(push.fmu\) failed") as told:
         cosim(parts.system, step=1e-4)
-    assert "It reported: t = 0.01 s: " in str(told.value)
+    assert "It reported: t = 0.010000001 s: push has no more rows" in str(told.value)  # a run may end with its table
 
 
 @pytest.mark.skipif(os.name != "posix", reason="processes are found and killed as in POSIX")

@@ -121,7 +121,7 @@ def compared(drive: Drive, number: int, run: Solution, exact: Run) -> Outcome:
     # A drive that stands still has no throughput; what rounding leaves is compared with next to nothing.
     throughput = max(balance.throughput, float(max(exact.stored)), abs(float(exact.work)), lost, NOTHING)
     loss = abs(balance.lost - lost) / throughput
-    closure = balance.closure * balance.throughput / throughput
+    closure = balance.power_closure * balance.throughput / throughput
     wrong = [
         f"wrong {name}"
         for name, error, most in (("speed", speed, SPEED), ("closure", closure, CLOSURE), ("loss", loss, LOSS))

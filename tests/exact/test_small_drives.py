@@ -45,6 +45,10 @@ SMALL = {
     "the first brake of three breaks away": drive(
         (1, 1), (0, 0), clutch("c", 0, 1, 0.25), brake("b", 0), brake("d", 1, 4), t0=2.0
     ),
+    # The second impact of the instant meets what the first one stopped, from the speeds before both.
+    "opposed freewheels, and one more": drive(
+        (1, 1, 1), (0, -55.375, -2.25), freewheel("c", 0, 1), freewheel("d", 2, 0), freewheel("e", 1, 0), until=1.0
+    ),
     # The least torques in measure of the capacities would be 1.06 and 0.07 N.m: too much for the brake of 1 N.m.
     "held, although the least split exceeds a capacity": drive(
         (1, 1), (0, 0), clutch("c", 0, 1, 0.25), brake("b", 0), brake("d", 1, 4), t0=1.125

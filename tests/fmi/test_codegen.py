@@ -147,7 +147,9 @@ def test_tangents_and_adjoints_are_those_of_casadi(inside, drive):
         scale = 1.0 + np.abs(exact) @ np.abs(dots[:given])
         assert np.max(np.abs(along - exact @ dots[:given]) / scale) < 1e-11
         scale = 1.0 + np.abs(weights) @ np.abs(exact)
-        assert np.max(np.abs(bars[:given] - weights @ exact) / scale) < 1e-11
+        # Adjoints of operations in between may be as large as the largest of all, and cancel in a small one.
+        rounding = 4 * np.finfo(float).eps * scale.max()
+        assert np.max((np.abs(bars[:given] - weights @ exact) - rounding) / scale) < 1e-11
 
 
 def test_dense_systems_are_solved(inside):

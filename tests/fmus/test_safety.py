@@ -1,5 +1,7 @@
 """What a foreign FMU does wrong becomes a sentence; nothing of it reaches this process."""
 
+import resource
+import sys
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +14,7 @@ from modelica_like.fmi.run import run_fmu
 
 Built = Mapping[tuple[str, str], Path]
 
-CRASH, HANG, LEAVE, FAIL, CRASH_AT_START = 1.0, 2.0, 3.0, 4.0, 5.0
+CRASH, HANG, LEAVE, FAIL, CRASH_AT_START, NOT_A_NUMBER, CRASH_AT_END, EAT = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0
 IN_ITS_OWN = "It ran in a separate process."
 
 MISDEEDS = {
@@ -43,6 +45,35 @@ def test_becomes_a_sentence(misdeed: str, hostile: Path) -> None:
     with pytest.raises(kind) as told:
         run_fmu(hostile, parameters={"misdeed": what}, timeout=3.0)
     assert str(told.value) == sentence
+
+
+def test_results_that_are_not_finite_are_told(hostile: Path) -> None:
+    with pytest.raises(FmuFailed) as told:
+        run_fmu(hostile, parameters={"misdeed": NOT_A_NUMBER})
+    assert str(told.value) == (
+        "hostile_fmi2.fmu: x is not finite at t = 0.5 s.\n"
+        "The run is on the error, as `run`. If this value does not matter, choose others by `outputs`."
+    )
+    run = told.value.run
+    np.testing.assert_array_equal(np.isnan(run["x"]), run.time >= 0.5 - 1e-9)
+
+
+def test_a_crash_after_the_run_is_told_and_its_results_are_kept(hostile: Path) -> None:
+    run = run_fmu(hostile, parameters={"misdeed": CRASH_AT_END})
+    assert run.final["x"] == pytest.approx(1.0)
+    assert run.notices == (
+        "hostile_fmi2.fmu crashed with SIGSEGV while it was freed, after its results were complete.",
+    )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere memory cannot be limited")
+def test_memory_is_limited(hostile: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It takes pages of 16 MB without looking whether it gets them."""
+    monkeypatch.setenv("MODELICA_LIKE_FMU_MEMORY", "700")
+    with pytest.raises(FmuCrashed) as told:
+        run_fmu(hostile, parameters={"misdeed": EAT})
+    assert str(told.value) == f"hostile_fmi2.fmu crashed with SIGSEGV after t = 0.49 s.\n{IN_ITS_OWN}"
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 1_200_000
 
 
 def test_noise_goes_nowhere(hostile: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -135,7 +135,8 @@ def hostile_from_the_start(builder: ModuleType, misdeed: int, target: Path) -> P
 
 def test_values_that_are_not_finite(builder: ModuleType, tmp_path: Path) -> None:
     check = validate_fmu(hostile_from_the_start(builder, 6, tmp_path))["FMPy CS"]
-    assert (check.verdict, check.sentence) == (FAILED, "There are values that are not finite.")
+    assert check.verdict == FAILED
+    assert check.sentence.startswith("hostile_fmi2.fmu: x is not finite at t = 0.5 s.")
 
 
 def test_crashes_in_every_importer_are_told(builder: ModuleType, tmp_path: Path) -> None:

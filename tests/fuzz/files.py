@@ -31,6 +31,7 @@ from modelica_like.errors import ModelicaLikeError
 from modelica_like.fmi.run import run_fmu
 from modelica_like.sizing import size
 from modelica_like.sizing.report import sizing_report
+from modelica_like.solve.measured import read_csv
 
 Case = tuple[str, Callable[[], object]]
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -90,6 +91,7 @@ def folder() -> Path:
     write_ssp(replace(parts.system, units=units), made / "system.ssp")
     shutil.copy(made / "whole" / "system.toml", made)
     shutil.copy(EXAMPLES / "two_mass.toml", made / "drive.toml")
+    (made / "here").mkdir()
     around = (EXAMPLES / "cosim" / "speed_control.toml").read_text(encoding="utf-8")
     around = around.replace("../../build/fmus/two_mass_fmi2.fmu", "wheel.fmu")
     around = around.replace("drive.motor.tau", "drive.J2_flange_a.tau").replace("drive.J1.w", "drive.J2.w")
@@ -247,3 +249,59 @@ def fmu(chance: random.Random) -> Case:
             run_fmu(file, stop=1e-4, timeout=4.0)
 
     return contents[name].decode(errors="replace"), run
+
+
+def table(chance: random.Random) -> Case:
+    """Read a mutated table, in any encoding."""
+    numbers = [["time", "motor.w [rpm]", "tau"], *([repr(chance.gauss(k, 1)) for k in range(3)] for _ in range(4))]
+    mark = chance.choice(",;\t")
+    text = "\n".join(mark.join(row) for row in numbers)
+    text = text.replace(".", ",") if mark != "," and chance.random() < 0.5 else text
+    for _ in range(chance.randrange(3)):
+        text = mutated_text(chance, text) or " "
+    data = bytearray(text.encode(chance.choice(("utf-8", "utf-8-sig", "utf-16", "cp1252")), "replace") or b" ")
+    for _ in range(chance.choice((0, 0, 1, 4))):
+        data[chance.randrange(len(data))] = chance.randrange(256)
+    file = folder() / "mutated.csv"
+
+    def run() -> None:
+        file.write_bytes(data)
+        read_csv(file)
+
+    return repr(bytes(data)), run
+
+
+def archive(chance: random.Random) -> Case:
+    """Read an archive whose structure is damaged: headers, directory and end, member by member."""
+    name = chance.choice(("motor.fmu", "system.ssp"))
+    data = bytearray((folder() / name).read_bytes())
+    places = [at for mark in (b"PK\3\4", b"PK\1\2", b"PK\5\6") for at in _places(data, mark)]
+    for _ in range(chance.randrange(1, 4)):
+        at = min(chance.choice(places) + chance.randrange(46), len(data) - 1)
+        data[at] = chance.choice((0, 1, 255, chance.randrange(256)))
+    match chance.randrange(8):
+        case 0:
+            data = data[: chance.randrange(len(data))]
+        case 1:
+            data = bytearray(chance.randbytes(chance.randrange(200))) + data
+        case 2:
+            data += chance.randbytes(chance.randrange(200))
+        case 3:
+            at = chance.choice(places)
+            data[at:at] = data[at : at + chance.randrange(100)]
+        case _:
+            pass
+    file = folder() / f"damaged{Path(name).suffix}"
+
+    def run() -> None:
+        file.write_bytes(data)
+        if name == "motor.fmu":
+            described(file)
+        else:
+            _loaded(file, 1.0)
+
+    return repr(bytes(data[-300:])), run
+
+
+def _places(data: bytearray, mark: bytes) -> list[int]:
+    return [at for at in range(len(data)) if data.startswith(mark, at)]

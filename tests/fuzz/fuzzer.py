@@ -1,12 +1,13 @@
 """Mutates netlists, formulas, units, options, sizing files, systems, SSPs and FMUs: does all end in a sentence?
 
-Run with `python tests/fuzz/fuzzer.py COUNT [FIRST]`; input number k is the same everywhere, and
+Run with `python tests/fuzz/fuzzer.py COUNT [FIRST [KIND]]`; input number k is the same everywhere, and
 `python tests/fuzz/fuzzer.py 1 K` repeats it with its traceback.
 """
 
 from __future__ import annotations
 
 import contextlib
+import inspect
 import io
 import os
 import random
@@ -18,18 +19,20 @@ import traceback
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
-from files import fmu, folder, sizing, ssp, system
+from drives import crossing, drive, examples
+from files import archive, fmu, folder, sizing, ssp, system, table
 from inputs import STRANGE, document, mutated_text, mutated_tree, pieces
+from modelica import modelica
 
 from components import Inertia
 from modelica_like import build, simulate
 from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
-from modelica_like.cli import _ran
+from modelica_like.cli import TASKS, __getattr__, _ran, command
 from modelica_like.cli.declare import WrongUse
+from modelica_like.cli.quick import _Parameter
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.netlist import library_types, loads
 from modelica_like.netlist.write import dumps
@@ -39,8 +42,6 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 SECONDS = 5
 """Time of the processor for one input."""
 PROGRESS = 5000
-LARGEST = 4000
-"""Characters of the netlists that are mutated."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +60,6 @@ class Hang(BaseException):
 
 class Touched(BaseException):
     """An input ran a command, or wrote a file where it had not to."""
-
-
-@cache
-def examples() -> list[tuple[Path, dict[str, Any], str]]:
-    """Return the netlists of examples/ that are not long."""
-    found = [(path, path.read_text(encoding="utf-8")) for path in sorted(EXAMPLES.rglob("*.toml"))]
-    return [(path, tomllib.loads(text), text) for path, text in found if "[parts" in text and len(text) < LARGEST]
 
 
 # -- what is done with them --------------------------------------------------------------------------------------------
@@ -162,13 +156,50 @@ def option(chance: random.Random) -> tuple[str, Callable[[], object]]:
     return " ".join(words), run
 
 
-KINDS = {netlist: 30, part: 20, formula: 7, unit: 7, option: 2, sizing: 12, system: 7, ssp: 8, fmu: 7}
+def words(chance: random.Random) -> tuple[str, Callable[[], object]]:
+    """Give any command any of its options, right and wrong words, and files of any kind."""
+    name = chance.choice([one for names in TASKS.values() for one in names if one not in NOT_HERE])
+    options = [
+        word for key, one in inspect.signature(command(name)).parameters.items()
+        for word in _Parameter(key, get_type_hints(command(name), include_extras=True)[key], one.default).words()
+        if not word.startswith("--no-") or word == "--no-such"
+    ]  # fmt: skip
+    files = [str(folder() / "drive.toml"), str(folder() / "motor.fmu"), str(folder() / "system.ssp"), "no.toml", "."]
+    values = [*files, "J1.w", "*", "1", "1e-5", "J1.J=1", "J1.J=1:2:2", "", "-", "x.png", "x.csv", pieces(chance)]
+    given = [chance.choice(files) for _ in range(chance.choice((0, 1, 1, 1, 2)))]
+    for _ in range(chance.randrange(4)):
+        value = chance.choice(values)
+        option = chance.choice([*options, "--until", "--no-such"]) if options else "--no-such"
+        given += chance.choice(([f"{option}={value}"], [option], [option, value], [value]))
+    line = [name, *(one.replace("\0", "") for one in given)]
+    return " ".join(line), lambda: _called(line)
 
 
-def attempt(number: int) -> Crash | None:
-    """Try one input."""
+def _called(line: list[str]) -> None:
+    here = os.getcwd()
+    os.chdir(folder() / "here")
+    try:
+        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+            if not _ran([*line, "--debug"]):
+                __getattr__("app")(args=line)
+    except SystemExit:
+        pass
+    finally:
+        os.chdir(here)
+
+
+NOT_HERE = {"explore", "demo", "runtimes", "trust", "export", "docs"}
+"""Commands that serve, compile, or take long."""
+KINDS = {
+    netlist: 30, part: 20, formula: 7, unit: 7, option: 2, sizing: 12, system: 7, ssp: 8, fmu: 7,
+    drive: 12, crossing: 8, words: 3, table: 8, archive: 8, modelica: 20,
+}  # fmt: skip
+
+
+def attempt(number: int, kind: str = "") -> Crash | None:
+    """Try one input, of any kind or of one."""
     chance = random.Random(number)
-    (make,) = chance.choices(list(KINDS), list(KINDS.values()))
+    (make,) = chance.choices(list(KINDS), [n if kind in ("", one.__name__) else 0 for one, n in KINDS.items()])
     given, run = make(chance)
     if hasattr(signal, "SIGPROF"):
         signal.signal(signal.SIGPROF, _hangs)
@@ -200,7 +231,7 @@ def watch() -> None:
     def look(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "open" and isinstance(arguments[1], str) and set(arguments[1]) & set("wax+"):
             # A number is a file that is open already: a pipe to the process that runs an FMU.
-            if not isinstance(arguments[0], int) and not str(arguments[0]).startswith(allowed):
+            if not isinstance(arguments[0], int) and not os.path.abspath(arguments[0]).startswith(allowed):
                 raise Touched(f"{arguments[0]} is written")
         elif event in ("os.system", "os.exec", "os.posix_spawn", "socket.connect", "webbrowser.open"):
             raise Touched(f"{event} {arguments}")
@@ -211,9 +242,10 @@ def watch() -> None:
 def main() -> None:
     """Try as many inputs as asked for."""
     count, first = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    only = sys.argv[3] if len(sys.argv) > 3 else ""
     seen: dict[str, int] = {}
     for number in range(first, first + count):
-        crash = attempt(number)
+        crash = attempt(number, only)
         if (number + 1 - first) % PROGRESS == 0:
             sys.stdout.write(f"{number + 1 - first} inputs\n")
             sys.stdout.flush()

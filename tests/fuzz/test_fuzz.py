@@ -206,3 +206,18 @@ def test_a_part_may_be_called_like_an_entry_of_the_file(name: str) -> None:
     assert list(again.parts) == [name]
     assert dumps(again) == dumps(drive)
     assert 'description = "two"' in dumps(again)
+
+
+@pytest.mark.parametrize("offset", [(8, 2), (16, 4), (42, 4)])
+def test_archives_whose_directory_leads_nowhere_are_told(offset: tuple[int, int], tmp_path: Path) -> None:
+    """The end of the directory or a member points before the beginning of the file: an OSError without a file."""
+    path, (place, size) = tmp_path / "bad.fmu", offset
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in ("a.txt", "modelicaDescription.xml", "b.txt"):
+            archive.writestr(name, "x" * 999)
+    data = bytearray(path.read_bytes())
+    at = data.rfind(b"PK\1\2" if place == 42 else b"PK\5\6") + place
+    data[at : at + size] = b"\xff" * size
+    path.write_bytes(data)
+    with pytest.raises(FmuRefused, match=r"bad\.fmu is not an FMU"):
+        described(path)

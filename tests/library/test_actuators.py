@@ -62,7 +62,7 @@ def test_magnet_moves_as_scipy_says() -> None:
     reference = solve_ivp(rates, (0, 1), [0, 0, start], rtol=1e-11, atol=1e-13, events=landing, method="DOP853")
     assert events[1] - events[0] == pytest.approx(reference.t[-1], rel=1e-6)
     assert run.impacts[0].energy == pytest.approx(0.5 * 0.02 * reference.y[1, -1] ** 2, rel=1e-6)
-    assert run.energy().closure < 1e-10
+    assert run.energy().power_closure < 1e-10
 
 
 def test_remanence_holds_the_armature_after_switching_off() -> None:
@@ -104,7 +104,7 @@ def test_air_flows_as_iso_6358_says() -> None:
         lambda t, p: rate * (1 - ((p / 6e5 - 0.3) / 0.7) ** 2) ** 0.5, (0, 0.5), [0.3 * 6e5], rtol=1e-10
     )
     assert run.at(choked + 0.5)["piston.p"] == pytest.approx(reference.y[0, -1], rel=1e-6)
-    assert run.energy().closure < 1e-9
+    assert run.energy().power_closure < 1e-9
 
 
 def slipping(clutch: Clutch, **parts: Component) -> Assembly:
@@ -156,7 +156,7 @@ def test_air_into_a_vacuum() -> None:
     piston = PneumaticActuator(p_in=0.0, A=3e-3, V_0=1e-4, C=1e-8, travel=2e-3, m=0.8, f_spring=300.0)
     run = simulate(Assembly("d", parts={"piston": piston}), 0.5, **TIGHT)
     assert run.final["piston.p"] == pytest.approx(1e5 * exp(-5.0), rel=1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("i_off", [1.0, 1.5])

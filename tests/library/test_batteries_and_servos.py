@@ -47,7 +47,7 @@ def test_a_battery_is_discharged() -> None:
     assert run.at(10)["b.v_1"] == pytest.approx(-0.02 * (1 - exp(-0.5)), rel=1e-7)
     assert run.final["b.v"] == pytest.approx(10 * (3.85 - 0.04 - 0.02), rel=1e-8)
     energy = run.energy()
-    assert energy.closure < 1e-8
+    assert energy.power_closure < 1e-8
     slow = 0.01 * 4 * (900 - 2 * 20 + 20 / 2)  # of R_1·i²·(1 - exp(-t/T))²
     assert energy["b"].lost == pytest.approx(20 * (0.02 * 4 * 900 + slow), rel=1e-6)
     given = 20 * 7200 * 0.25 * (4.2 + 3.85) / 2
@@ -80,7 +80,7 @@ def test_a_wattmeter_and_heat_by_signals() -> None:
     assert run.final["meter.power"] == pytest.approx(3 * 4**2, rel=1e-8)
     settled = 290 + 50 / 4
     assert run.final["body.T"] == pytest.approx(settled + (300 - settled) * exp(-4 * 2 / 200), rel=1e-9)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 MOTOR: dict[str, Any] = {"k": 0.5, "R": 0.8, "L": 4e-3, "J": 1e-3, "J_total": 3e-3, "I_max": 30.0, "V_max": 150.0}
@@ -127,4 +127,4 @@ def test_a_servo_against_an_independent_solver() -> None:
         got = [run.at(t)[n] for n in ("load.phi", "load.w", "m.motor.ia")]
         assert got == pytest.approx(wanted, rel=1e-6, abs=1e-6)
     assert 29.99 < max(run["m.motor.ia"]) < 30.0
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8

@@ -1,5 +1,6 @@
 """What tables do beyond their rows: hold, go on, or end the run; and what they cannot contain."""
 
+from collections.abc import Callable
 from math import log
 
 import numpy as np
@@ -9,19 +10,23 @@ from components import (
     BearingFriction,
     Brake,
     Clutch,
+    CombustionEngine,
     ConstantForce,
     ConstantSpeed,
     ConstantTorque,
     ConstantVoltage,
+    Fixed,
     Ground,
     Inertia,
     LossyGear,
     MappedDrive,
     Mass,
+    Sine,
     SupportFriction,
     Table,
     TorqueConverter,
     TranslationalBrake,
+    ViscousClutch,
 )
 from modelica_like import Assembly, Component, ModelicaLikeError, Solution, simulate
 from modelica_like.errors import LimitPassed
@@ -147,6 +152,66 @@ def test_an_open_brake_does_not_slide_beyond_its_rows() -> None:
 def test_a_signal_beyond_its_table(how: str, expected: float, smooth: bool) -> None:
     run = simulate(Assembly("d", parts={"s": Table(table=((0, 0), (1, 2)), extrapolate=how, smooth=smooth)}), 2.0)
     assert run.final["s.y"] == pytest.approx(expected, rel=1e-12)
+
+
+def pressed(command: Component, **more: object) -> Assembly:
+    parts = {"command": command, "motor": ConstantSpeed(w_fixed=100.0), "clutch": Clutch(capacity=10.0)}
+    parts["load"] = Inertia(J=1.0, phi=0.0, w=0.0)
+    #: Inertia(J=1.0, phi=0.0, w=0.0)}
+    wires = {"press": ["command.y", "clutch.f_normalized"]}
+    return Assembly("d", parts=parts, series={"s": ["motor", "clutch", "load"]}, connect=wires)
+
+
+COMMAND = ((0, 0), (0.2, 0.4), (0.3, 1))
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_command_holds_behind_its_table(solver: str) -> None:
+    """10 N.m on 1 kg m²: 1.1 rad/s until 0.3 s, then 17 rad/s more until 2 s."""
+    run = simulate(pressed(Table(table=COMMAND)), 2.0, solver=solver, **TIGHT)
+    assert run.final["load.w"] == pytest.approx(10 * (0.04 + 0.07 + 1.7), rel=1e-9)
+    assert notices(run) == ["At 0.300000001 s command has no more rows: its last value holds."]
+
+
+def test_a_table_that_ends_flat_or_with_the_run_tells_nothing() -> None:
+    assert notices(simulate(pressed(Table(table=(*COMMAND, (0.4, 1)))), 2.0)) == []
+    assert notices(simulate(pressed(Table(table=COMMAND)), 0.3)) == []
+
+
+def test_a_table_that_begins_late() -> None:
+    run = simulate(pressed(Table(table=((0.5, 0.2), (1, 0.4), (2, 0.4)))), 1.0)
+    assert notices(run) == ["At 0 s command has no rows yet: its first value counts."]
+    assert run.final["load.w"] == pytest.approx(10 * (0.1 + 0.15), rel=1e-6)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_command_above_one_is_told(solver: str) -> None:
+    """A slope of 6/s from 1 at 0.3 s makes 11.2 at 2 s."""
+    first, second = notices(simulate(pressed(Table(table=COMMAND, extrapolate="linear")), 2.0, solver=solver))
+    assert first == "At 0.300000001 s command has no more rows: its last slope goes on."
+    assert second == "At 0.300000167 s clutch gets a command above 1: f_normalized reaches 11.2."
+
+
+def test_the_largest_command_is_none_of_the_results() -> None:
+    """1 + 0.5 sin(2 pi t) is 1 at all three results."""
+    (told,) = notices(simulate(pressed(Sine(amplitude=0.5, offset=1.0, f=1.0)), 1.0, points=2))
+    assert told.endswith("clutch gets a command above 1: f_normalized reaches 1.5.")
+
+
+@pytest.mark.parametrize("name", ["f_normalized", "pedal", "fill"])
+def test_every_normalised_command_is_told_above_one(name: str) -> None:
+    """By a value of the part itself, too; 1 itself is no excess."""
+    made: dict[str, Callable[[float], Component]] = {
+        "f_normalized": lambda u: Brake(capacity=1.0, f_normalized=u),
+        "pedal": lambda u: CombustionEngine(
+            speeds=(0, 400), pedals=(0, 1), torque=((0, 100), (0, 100)), drag=((0, 1), (400, 1)), J=0.1, pedal=u
+        ),
+        "fill": lambda u: ViscousClutch(tau_nominal=1.0, w_nominal=10.0, fill=u),
+    }
+    for value, told in ((1.0, []), (1.5, [f"At 0 s part gets a command above 1: {name} reaches 1.5."])):
+        far = [Fixed()] if name == "fill" else []
+        parts = {"source": ConstantSpeed(w_fixed=10.0), "part": made[name](value), **dict(zip("f", far, strict=False))}
+        assert notices(simulate(shaft(**parts), 0.1)) == told
 
 
 def test_a_signal_that_ends_the_run() -> None:

@@ -62,7 +62,7 @@ def test_mean_voltage_and_switching_times(u: float, unipolar: bool) -> None:
         wanted.append(current)
     ours = [run.at(0.01 * (k + 1))["L.i"] for k in range(10)]
     assert ours == pytest.approx(wanted, rel=1e-6, abs=1e-8)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_bridge_without_switching_gives_the_mean() -> None:
@@ -70,7 +70,7 @@ def test_bridge_without_switching_gives_the_mean() -> None:
     assert run.final["L.i"] == pytest.approx(24 / 2.4, rel=1e-6)
     assert run.final["U.i"] == pytest.approx(-24 / 2.4, rel=1e-6)
     assert run["part.loss_power"][-1] == pytest.approx(0.4 * 10**2, rel=1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_the_outputs_of_a_bridge_lie_around_the_middle_of_its_supply() -> None:
@@ -101,7 +101,7 @@ def test_fast_switching_drives_a_motor_like_the_mean() -> None:
         }  # fmt: skip
         run = simulate(Assembly("d", parts=parts, connect=connect), 0.4, **TIGHT)
         finals.append(run.final["motor.w"])
-        assert run.energy().closure <= 1e-8
+        assert run.energy().power_closure <= 1e-8
     ripple = 100 * 0.6 / (32 * 500**2 * 1.5e-3 * 0.15)
     assert abs(finals[1] - finals[0]) <= 4 * ripple
 
@@ -115,7 +115,7 @@ def test_electronic_load_stops_at_zero_voltage() -> None:
     assert run.events[0].time == pytest.approx((10 - 0.1 * 1e-3) / 100, rel=1e-9)
     assert np.min(run["C.v"]) >= -1e-8
     assert (run.final["C.v"], run.final["sink.i"]) == pytest.approx((0.0, 0.0), abs=1e-7)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_electronic_load_on_a_generator_that_is_stopped_and_started_again() -> None:
@@ -142,7 +142,7 @@ def test_electronic_load_on_a_generator_that_is_stopped_and_started_again() -> N
         "sinking",
     ]
     assert np.min(run["sink.v"] * run["sink.i"]) >= 0
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_limiter() -> None:
@@ -192,7 +192,7 @@ def test_cascade_at_its_limits() -> None:
     assert run.at(0.15)["machine.w"] == pytest.approx(4.0, rel=1e-4)
     assert np.max(run["machine.phi"]) <= 1.0 + 1e-4
     assert run.final["machine.phi"] == pytest.approx(1.0, rel=1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_full_current_of_the_cascade() -> None:

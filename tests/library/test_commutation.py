@@ -42,7 +42,7 @@ def test_a_motor_that_ripples() -> None:
         rate = factor * 0.0467**2 / 0.8
         end = (0.0467 * 24 / 0.8 - 0.2) / rate
         assert motor.final["machine.w"] == pytest.approx(end + (300 - end) * exp(-rate / 0.01 * 0.5), rel=2e-4)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
     assert run.final["machine.loop"] == pytest.approx(run.final["machine.phi"] * 2 * 3 / pi, abs=0.5)
 
 

@@ -40,7 +40,7 @@ def test_universal_joint_after_hooke() -> None:
     np.testing.assert_allclose(np.sin(a) * np.cos(b), np.cos(a) * np.sin(b) * cos(beta), atol=1e-9)
     assert np.max(np.abs(b - a)) < pi / 4
     np.testing.assert_allclose(run["J.w"], 7 * cos(beta) / (1 - (np.sin(beta) * np.cos(a)) ** 2), rtol=1e-7)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_universal_joint_in_a_free_shaft_keeps_the_energy() -> None:
@@ -70,7 +70,7 @@ def test_housing_of_a_universal_joint_carries_the_difference() -> None:
     both = run["part.flange_a.tau"] + run["part.flange_b.tau"]
     assert np.ptp(both) > 0.1
     np.testing.assert_allclose(run["part.support.tau"], -both, atol=1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_torque_converter_starts_a_vehicle() -> None:
     )
     for t in (0.2, 1.0, 2.5, 4.0):
         assert [run.at(t)["J1.w"], run.at(t)["J2.w"]] == pytest.approx(list(oracle.sol(t)), rel=1e-5)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def bristles(**more: float) -> LuGreFriction:
@@ -155,7 +155,7 @@ def test_break_away_with_bristles_against_an_independent_solver() -> None:
         theirs = oracle.sol(run.time)[row]
         assert np.max(np.abs(run[name] - theirs)) <= 1e-5 * np.ptp(theirs)
     assert np.min(run["part.loss_power"]) >= -1e-9
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_a_centrifugal_clutch_without_springs_starts_softly() -> None:

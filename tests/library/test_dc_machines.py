@@ -58,7 +58,7 @@ def test_series_resonance() -> None:
     decay, w = R / (2 * L), sqrt(1 / (L * C) - (R / (2 * L)) ** 2)
     np.testing.assert_allclose(run["L.i"], V / (w * L) * np.exp(-decay * run.time) * np.sin(w * run.time), atol=1e-8)
     balance = run.energy()
-    assert balance.closure <= 1e-8
+    assert balance.power_closure <= 1e-8
     assert balance["source"].source == pytest.approx(
         balance["R"].lost + balance["C"].stored + balance["L"].stored, rel=1e-8
     )
@@ -95,7 +95,7 @@ def test_resistance_rises_with_its_temperature() -> None:
     # C·der(theta) = V²/(R·(1 + alpha·theta)): theta + alpha·theta²/2 = V²/(R·C)·t
     rise = run["copper.T"] - 293.15
     np.testing.assert_allclose(rise + 0.002 * rise**2, 400.0 / 400.0 * run.time, rtol=1e-7, atol=1e-7)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_a_winding_of_copper_at_any_temperature() -> None:
@@ -129,7 +129,7 @@ def test_switch_and_current_sources() -> None:
     run = simulate(drive, "1 s", points=10)
     assert run.at(0.25)["R.v"] == pytest.approx(1.5 * 5.0, rel=1e-4)
     assert run.at(0.75)["R.v"] == pytest.approx(0.0, abs=1e-4)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_a_switch_is_closed_above_one_half() -> None:
@@ -201,7 +201,7 @@ def test_nominal_operating_point(name: str, quasi_static: bool) -> None:
     )
     assert run.final["machine.loss_power"] == pytest.approx(lost, rel=1e-9)
     assert current == pytest.approx(100.0, rel=3e-2)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("w", [300.0, 0.2, 0.075, 0.0, -0.03, -40.0])
@@ -312,4 +312,4 @@ def test_machine_on_a_moving_stand() -> None:
     )  # fmt: skip
     run = simulate(drive, "0.5 s", rtol=1e-9)
     np.testing.assert_allclose(run["machine.support.tau"], run["machine.tau_electrical"], atol=1e-8)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8

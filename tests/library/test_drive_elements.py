@@ -68,7 +68,7 @@ def test_belt_oscillates_as_a_spring_of_two_strands() -> None:
     np.testing.assert_allclose(run["wheel.phi"], np.exp(-decay * run.time) * np.sin(w * run.time) / w, atol=1e-9)
     np.testing.assert_allclose(run["belt.F_1"] + run["belt.F_2"], 200.0, atol=1e-9)
     np.testing.assert_allclose(run["belt.F_1"] - run["belt.F_2"], run["belt.f"], atol=1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_a_belt_that_turns_with_its_housing_rests_in_it() -> None:
@@ -100,7 +100,7 @@ def test_belt_slips_by_eytelwein(direction: float) -> None:
     grips = next(event.time for event in run.events if event.after == "sticking")
     assert grips == pytest.approx(100.0 * 0.5 / (force * r_b / 0.2), rel=1e-2)
     assert np.all(run["belt.loss_power"] >= -1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize(("torque", "slack"), [(4.0, False), (12.0, True), (-12.0, True)])
@@ -167,7 +167,7 @@ def test_screw_by_direction_of_power(efficiency: float, holds: bool) -> None:
     )
     run = simulate(free, "0.05 s", rtol=1e-8)
     assert (abs(run.final["table.v"]) < 1e-6) == holds
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_backlash_of_a_screw_is_lost_motion() -> None:
@@ -182,7 +182,7 @@ def test_backlash_of_a_screw_is_lost_motion() -> None:
     wanted = 0.01 * 10.0 * 0.5 / (2 * pi)
     assert abs(wanted - run.final["table.s"]) == pytest.approx(1e-4, rel=0.05)
     assert free.value("lead") is not None
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
     with pytest.raises(LanguageError, match=r"^BallScrewDrive: backlash has a value, but the nut has none\.\nAdd has_"):
         build(shaft(screw=BallScrewDrive(lead=0.01, J=1e-4, c=1e8, backlash=2e-4), table=Mass(m=5.0)))
 
@@ -202,7 +202,7 @@ def test_flexible_shaft_has_the_frequencies_of_its_pieces(n: int) -> None:
     w = 2 * n * sqrt(c / J) * np.sin(pi / (4 * n))
     np.testing.assert_allclose(run["tip.phi"], np.cos(w * run.time), atol=1e-4)
     assert w == pytest.approx(pi / 2 * sqrt(c / J), rel=(pi / (2 * n)) ** 2 / 24 * 1.05)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_stribeck_bearing_slows_down_as_scipy_says() -> None:
@@ -219,7 +219,7 @@ def test_stribeck_bearing_slows_down_as_scipy_says() -> None:
     reference = solve_ivp(rates, (0, 25), [20.0], rtol=1e-11, atol=1e-12, events=rest)
     assert run.events[0].time == pytest.approx(reference.t_events[0][0], rel=1e-7)
     assert run.final["wheel.w"] == 0.0
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 # -- control -----------------------------------------------------------------------------------------------------------

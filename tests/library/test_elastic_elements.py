@@ -146,7 +146,7 @@ def test_disc_of_an_oldham_coupling_is_an_inertia() -> None:
     run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 1.0, **TIGHT)
     assert run.final["load.w"] == pytest.approx(6 / (0.3 + 20 * 0.1**2 + 0.5), rel=1e-9)
     assert run.energy()["disc"].stored == pytest.approx(0.5 * (0.3 + 20 * 0.1**2) * 6**2, rel=1e-7)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_filling_of_a_viscous_clutch() -> None:
@@ -181,7 +181,7 @@ def test_pendulum_loses_what_its_damping_takes() -> None:
     # Small swings decay with d/(2·m·l²): that is 10 per second.
     w = sqrt(300**2 - 10**2)
     assert run.at(4 * pi / w)["pendulum.theta"] == pytest.approx(0.01 * exp(-10 * 4 * pi / w), rel=1e-4)
-    assert run.energy().closure < 1e-9
+    assert run.energy().power_closure < 1e-9
 
 
 def test_rope_pulls_with_spring_and_damper_and_slackens_faster_than_it_can_follow() -> None:

@@ -305,7 +305,7 @@ def test_energy_closes(kind: type[Component]) -> None:
     assert balance.throughput > 0.1
     for row in balance:
         assert abs(row.residual) <= CLOSES * balance.throughput, row
-    assert balance.closure <= CLOSES
+    assert balance.power_closure <= CLOSES
     assert sum(row.inflow for row in balance) == pytest.approx(0.0, abs=CLOSES * balance.throughput)
 
 
@@ -324,7 +324,7 @@ def test_the_balance_would_notice_a_wrong_sign() -> None:
             return -super().stored_energy()
 
     result = simulate(through(WrongSpring(c=30.0)), 1.0)
-    assert result.energy().closure > 1e-5
+    assert result.energy().power_closure > 1e-5
 
 
 def test_a_component_that_is_not_there() -> None:

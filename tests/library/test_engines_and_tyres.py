@@ -16,11 +16,13 @@ from components import (
     ConstantTorque,
     ConstantVelocity,
     Driver,
+    Fixed,
     Force,
     Gain,
     Inertia,
     Mass,
     RoadLoad,
+    Spring,
     TorqueStep,
     Tyre,
     VelocitySensor,
@@ -49,7 +51,7 @@ def test_an_engine_accelerates_against_its_drag() -> None:
     run = alone(CombustionEngine(**MAP, pedal=1.0, w_0=1e-9, phi=0.0, w=0.0), 1.0)
     assert run.final["engine.w"] == pytest.approx(1800 * (1 - exp(-0.1)), rel=1e-7)
     energy = run.energy()
-    assert energy.closure < 1e-8
+    assert energy.power_closure < 1e-8
     assert energy["engine"].source == pytest.approx(100 * run.final["engine.phi"], rel=1e-7)
 
 
@@ -84,6 +86,19 @@ def test_an_engine_stalls_and_is_started_again() -> None:
     assert notices(alone(slow, 0.1)) == ["At 0 s engine stalls."]
 
 
+def test_an_engine_that_turns_back_goes_out_once() -> None:
+    """w = 5·cos(20·t) on a spring: it turns back at pi/40 s, and 5 rad/s do not start it again."""
+    parts = {
+        "engine": CombustionEngine(**MAP | {"drag": ((0.0, 0.0),)}, phi=0.0, w=5.0),
+        "spring": Spring(c=200.0),
+        "wall": Fixed(),
+    }
+    for solver in ("native", "idas"):
+        run = simulate(Assembly("d", parts=parts, series={"s": list(parts)}), 2.0, solver=solver, **TIGHT)
+        ((time, before, after),) = ((event.time, event.before, event.after) for event in run.events)
+        assert (time, before, after) == (pytest.approx(np.pi / 40, rel=1e-7), "given", "out")
+
+
 def test_the_firing_orders() -> None:
     engine = CombustionEngine(**MAP, pedal=1.0, orders=((2.0, 0.6, 0.3), (4.0, 0.25, -1.0)))
     run = alone(engine, 0.1, load=ConstantSpeed(w_fixed=100.0))
@@ -115,7 +130,7 @@ def test_the_magic_formula(w: float, v: float) -> None:
     assert [run.final["t.f"], run.final["t.flange_r.tau"]] == pytest.approx([force, 0.3 * force], rel=1e-9)
     assert run.final["t.loss_power"] == pytest.approx(force * (0.3 * w - v), rel=1e-9)
     assert run.final["t.loss_power"] >= 0
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 @pytest.mark.parametrize(("slip", "force"), [(0.05, 0.5), (-0.05, -0.5), (0.3, 1.0), (-0.3, -1.0)])
@@ -130,7 +145,7 @@ def test_the_relaxation_length() -> None:
     slip = 0.04 * (1 - exp(-8 * 0.1 / 0.4))
     assert run.final["t.slip"] == pytest.approx(slip, rel=1e-8)
     assert run.final["t.stored_energy"] == pytest.approx(0.5 * 0.4 * 1e4 * slip**2, rel=1e-6)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 def test_a_wheel_brakes_a_car_against_an_independent_solver() -> None:
@@ -148,7 +163,7 @@ def test_a_wheel_brakes_a_car_against_an_independent_solver() -> None:
     oracle = solve_ivp(rates, (0, 1), [100.0, 30.0], rtol=1e-10, atol=1e-10, dense_output=True)
     for t in (0.1, 0.5, 1.0):
         assert [run.at(t)["wheel.w"], run.at(t)["car.v"]] == pytest.approx(list(oracle.sol(t)), rel=1e-6)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 @pytest.mark.parametrize(("driven", "lag"), [("front", None), ("rear", None), ("rear", 0.1)])

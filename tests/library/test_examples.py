@@ -25,4 +25,4 @@ def test_closed_form(name: str) -> None:
 def test_energy_closes(name: str) -> None:
     energy = run_of(name).energy()
     assert energy.throughput > 0
-    assert energy.closure < 1e-8
+    assert energy.power_closure < 1e-8

@@ -215,7 +215,7 @@ def test_two_brakes_on_one_shaft_share_the_torque() -> None:
         np.testing.assert_allclose(run["one.tau"][held], 1.5, rtol=1e-9)
         np.testing.assert_allclose(run["two.tau"][held], 0.5, rtol=1e-9)
         assert np.all(run["mass.w"][held] == 0.0)
-        assert run.energy().closure < 1e-12
+        assert run.energy().power_closure < 1e-12
 
 
 def test_two_brakes_give_way_where_both_can_bear_no_more() -> None:
@@ -329,7 +329,7 @@ def test_friction_only_ever_dissipates_and_stays_below_its_limit(
                 assert abs(tau) == pytest.approx(limit, rel=1e-9)
     balance = run.energy()
     assert balance["brake"].lost >= -1e-9
-    assert balance.closure < 1e-8
+    assert balance.power_closure < 1e-8
 
 
 @pytest.mark.parametrize("load", [3.6, -3.6])

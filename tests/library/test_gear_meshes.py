@@ -55,7 +55,7 @@ def test_waves_of_stiffness_and_error_as_scipy_has_them() -> None:
     for t in (0.005, 0.015, 0.03):
         found = [run.at(t)[name] for name in ("pinion.phi", "wheel.phi", "pinion.w", "wheel.w")]
         assert found == pytest.approx(list(reference.sol(t)), rel=1e-5)
-    assert run.energy().closure < 1e-9
+    assert run.energy().power_closure < 1e-9
     assert np.min(run["mesh.loss_power"]) > -1e-9
 
 
@@ -95,7 +95,7 @@ def test_housing_of_a_differential_carries_the_reaction_of_the_final_drive() -> 
     run = simulate(drive, 3.0, **TIGHT)
     # 10 N.m go in, 40 N.m come out: 30 N.m turn the housing back.
     assert run.final["mount.tau"] == pytest.approx(-30.0, rel=1e-5)
-    assert run.energy().closure < 1e-10
+    assert run.energy().power_closure < 1e-10
 
 
 def test_vehicle_and_screw_on_their_housings() -> None:
@@ -105,7 +105,7 @@ def test_vehicle_and_screw_on_their_housings() -> None:
         15.0, **TIGHT,
     )  # fmt: skip
     assert run.final["mount.tau"] == pytest.approx(90 * 1000 / (1000 + 2 / 0.09), rel=1e-4)
-    assert run.energy().closure < 1e-10
+    assert run.energy().power_closure < 1e-10
     parts: dict[str, Component] = {
         "push": ConstantForce(f_constant=-400.0), "table": Mass(m=20.0, s=0.0, v=0.0),
         "guide": TranslationalSpringDamper(c=1e6, d=1e4), "bed": TranslationalFixed(),
@@ -117,7 +117,7 @@ def test_vehicle_and_screw_on_their_housings() -> None:
         "r": ["rail.flange_b", "guide.flange_b"], "b": ["guide.flange_a", "bed.flange"],
     }  # fmt: skip
     run = simulate(mounted(BallScrew(lead=0.01), "support_r", connect, parts), 1.0, **TIGHT)
-    assert run.energy().closure < 1e-9
+    assert run.energy().power_closure < 1e-9
     force = 0.8 * 2 * pi / 0.01
     # The nut pushes the table forwards, so its guide is pushed backwards.
     assert run.final["guide.f"] == pytest.approx(-force, rel=1e-6)

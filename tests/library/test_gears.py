@@ -72,7 +72,7 @@ def test_housing_carries_the_difference_of_the_torques() -> None:
     housing = run["housing.phi"]
     np.testing.assert_allclose(run["motor.phi"] - housing, 3.0 * (run["load.phi"] - housing), atol=1e-9)
     assert np.max(np.abs(housing)) > 1e-4
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 # -- planetary sets ----------------------------------------------------------------------------------------------------
@@ -161,4 +161,4 @@ def test_ball_screw(lead: float) -> None:
     np.testing.assert_allclose(2 * pi * run["screw.flange_r.tau"], -lead * run["screw.flange_t.f"], rtol=1e-12)
     mass, d, push = 200.0 + 0.001 * (2 * pi / lead) ** 2, 100.0, 2.0 * 2 * pi / lead
     np.testing.assert_allclose(run["table.v"], push / d * (1 - np.exp(-d / mass * run.time)), rtol=1e-6, atol=1e-9)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8

@@ -146,7 +146,7 @@ def test_what_moves_against_its_stop_at_the_start_meets_it(start: str, solver: S
     found = simulate(drive, 1e-6, solver=solver)
     assert found[f"part.{name}"][-1] == pytest.approx(after, abs=1e-3)
     assert sum(one.energy for one in found.impacts) == pytest.approx(lost, rel=1e-9)
-    assert found.energy().closure <= 1e-8
+    assert found.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("solver", ["idas", "native"])

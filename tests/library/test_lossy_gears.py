@@ -46,7 +46,7 @@ def test_loss_table_in_all_quadrants(ratio: float, speed: float, load: float) ->
     expected = eta1 * tau_a - sign * bf1 if a_drives else tau_a / eta2 - sign * bf2
     assert passed == pytest.approx(expected, rel=1e-9)
     assert run.final["gear.loss_power"] > 0
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize(("efficiency", "back"), [(0.9, None), (0.8, 0.6), (0.45, None), (0.3, -0.4)])
@@ -69,7 +69,7 @@ def test_start_against_and_with_a_load(efficiency: float, back: float | None) ->
         assert run.final["gear.self_locking"] == (reverse <= 0)
         if tau == 0.0:
             assert (run.final["rotor.w"] == 0.0) == (reverse <= 0)
-        assert run.energy().closure <= 1e-8
+        assert run.energy().power_closure <= 1e-8
 
 
 def test_gear_without_loss_is_ideal() -> None:
@@ -101,7 +101,7 @@ def test_loss_of_a_gear_heats_its_oil() -> None:
     lost = 50.0 * 20.0 * (1 / 0.95 - 1)
     np.testing.assert_allclose(run["oil.T"], 293.15 + lost / 2000.0 * run.time, rtol=1e-9)
     assert run.energy()["gear"].lost == 0.0
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_gear_carried_by_a_moving_housing() -> None:
@@ -120,7 +120,7 @@ def test_gear_carried_by_a_moving_housing() -> None:
     drive.set("load.phi", 0.0)
     run = simulate(drive, "1 s", rtol=1e-8)
     np.testing.assert_allclose(run["gear.phi_a"], 3.0 * (run["load.phi"] - run["housing.phi"]), atol=1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 # -- differential, wheel -----------------------------------------------------------------------------------------------
@@ -140,7 +140,7 @@ def test_differential_splits_the_torque_in_halves() -> None:
     assert run.final["left.w"] == pytest.approx(10.0, rel=1e-9)
     assert run.final["right.w"] == pytest.approx(10.0 / 3, rel=1e-9)
     assert run.final["engine.phi"] == pytest.approx(2 * (run.final["left.phi"] + run.final["right.phi"]), rel=1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("radius", [0.3, -0.3])
@@ -151,7 +151,7 @@ def test_rolling_wheel(radius: float) -> None:
     )
     run = simulate(drive, "1 s")
     assert run.final["car.v"] == pytest.approx((6.0 / radius - 2.0) / (20.0 + 0.9 / radius**2), rel=1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_a_gear_without_losses_is_free() -> None:

@@ -170,7 +170,7 @@ def test_flanks_never_pull_and_close_their_energy(x: float, v: float, d: float, 
     run = simulate(drive, "0.4 s", points=200)
     assert np.all(run["gap.tau"] * np.sign(run["gap.phi_rel"]) >= -1e-9)
     assert np.all(run["gap.loss_power"] >= -1e-6)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 def test_backlash_starts_on_the_flank_where_it_is() -> None:

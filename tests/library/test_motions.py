@@ -44,7 +44,7 @@ def test_fastest_way(begin: float, duration: float) -> None:
     assert (run["J.phi"][0], run.final["J.phi"], run.final["J.w"]) == pytest.approx((begin, 3.0, 0.0), abs=1e-12)
     assert np.max(np.abs(run["turn.qd"])) <= 2 + 1e-12
     assert set(np.round(np.abs(run["turn.qdd"]), 9)) <= {0.0, 5.0}
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_move_follows_without_differentiating() -> None:
@@ -61,7 +61,7 @@ def test_move_follows_without_differentiating() -> None:
     for other in ("J2", "J3"):
         np.testing.assert_allclose(run["J.phi"], run[f"{other}.phi"], atol=1e-7)
         np.testing.assert_allclose(run["J.w"], run[f"{other}.w"], atol=1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("turning", [True, False])
@@ -89,7 +89,7 @@ def test_start_from_signals(use_phi: bool, use_w: bool) -> None:
     run = simulate(Assembly("d", parts=parts, series={"s": list(parts)}), "2 s", rtol=1e-9)
     wanted = 0.3 * use_phi * cos(4) + 0.5 * use_w * sin(4)
     assert run.final["J.phi"] == pytest.approx(wanted, rel=1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_start_with_an_acceleration() -> None:
@@ -115,7 +115,7 @@ def test_slides_start_and_move_from_signals() -> None:
     assert run.final["m.s"] == pytest.approx(0.3 * cos(4) + 0.5 * sin(4), rel=1e-6)
     assert run.final["table.s"] == pytest.approx(2.0, rel=1e-7)
     assert run.at(0.5)["drive.flange.f"] == pytest.approx(-3 * 2, rel=1e-4)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_relative_states() -> None:
@@ -132,4 +132,4 @@ def test_relative_states() -> None:
     other = simulate(Assembly("d", parts=apart, series=series), "2 s", rtol=1e-9)
     assert {"rel.s_rel", "rel.v_rel"} < set(other.model.states)
     assert other.final["rel.s_rel"] == pytest.approx(0.1 * cos(3 * 2), rel=1e-6)
-    assert max(run.energy().closure, other.energy().closure) <= 1e-8
+    assert max(run.energy().power_closure, other.energy().power_closure) <= 1e-8

@@ -69,7 +69,7 @@ def test_a_freewheel_a_stop_and_a_clutch(clutch: float, stop: float) -> None:
     assert run.energy()["mass"].at_events == pytest.approx(-2.0, rel=1e-7)
     assert run.final["mass.s"] == pytest.approx(1.5, abs=1e-8)
     assert run.final["mass.v"] == 0.0
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-12, -1e-12])
@@ -95,7 +95,7 @@ def test_mirrored_freewheels_catch_together(offset: float) -> None:
     assert run.final["middle.w"] == pytest.approx(-1.0, rel=1e-9)
     assert run.final["engine1.w"] == pytest.approx(-1.0, rel=1e-9)
     assert run.energy()["wheel1"].lost == pytest.approx(0.0, abs=1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-12, -1e-12])

@@ -59,7 +59,7 @@ def test_freewheel_is_complementary() -> None:
     assert np.max(speed) > 1
     assert np.max(torque) > 1
     assert run.energy()["coupling"].lost == 0.0
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_freewheel_releases_and_catches_when_the_closed_form_says() -> None:
@@ -79,7 +79,7 @@ def test_freewheel_releases_and_catches_when_the_closed_form_says() -> None:
     # From 0.5 s on the engine has der(w) = 16·sin(2·pi·t): it is as fast again at 1 s, never faster before.
     assert run.at(0.9)["engine.w"] == pytest.approx(top - 16 / (2 * pi) * (1 + np.cos(2 * pi * 0.9)), rel=1e-6)
     assert run.at(1.1)["engine.w"] == pytest.approx(run.at(1.1)["load.w"], abs=1e-9) or sin(2 * pi * 1.1) > 0
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_two_freewheels_in_series() -> None:
@@ -94,7 +94,7 @@ def test_two_freewheels_in_series() -> None:
     for wheel in ("first", "second"):
         assert np.min(run[f"{wheel}.w_rel"]) >= -1e-9
         assert np.max(run[f"{wheel}.tau"]) <= 1e-6
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_unpressed_one_way_clutch_is_a_freewheel() -> None:
@@ -108,7 +108,7 @@ def test_pressed_one_way_clutch_brakes_overrunning() -> None:
     slipping = run["coupling.w_rel"] > 1e-6
     np.testing.assert_allclose(run["coupling.tau"][slipping], 0.5 * 4.0, atol=1e-9)
     assert np.min(run["coupling.w_rel"]) >= -1e-9
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_a_one_way_clutch_that_is_pushed_from_rest_holds_from_the_start() -> None:
@@ -157,7 +157,7 @@ def test_freewheel_stop_and_clutch_in_one_instant() -> None:
     assert run.final["wheel.w_rel"] >= -1e-9
     # After the lock-up all three turn together: momentum -1 at 1 s, then -2 N.m on 3 kg.m2.
     assert run.final["third.w"] == pytest.approx((2.0 - 1.0 - 2.0 * 3.0) / 3.0, rel=1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 # -- where sticking alone leaves the torque open -----------------------------------------------------------------------
@@ -181,7 +181,7 @@ def test_prescribed_motion_passes_through_zero(name: str) -> None:
     moving = np.abs(run["mass.w"]) > 1e-3
     np.testing.assert_allclose(torque[moving], 2.0 * np.sign(run["mass.w"][moving]), atol=1e-9)
     assert run.energy()["friction"].lost == pytest.approx(2.0 * 10.0 * 4 / pi, rel=1e-5)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_two_brakes_on_one_shaft() -> None:
@@ -247,7 +247,7 @@ def test_friction_work_heats_the_lining() -> None:
     assert run.final["lining.T"] == pytest.approx(300.0 + work / 50.0, rel=1e-9)
     assert run["clutch.loss_power"].max() == 0.0
     assert run.energy()["lining"].stored == pytest.approx(work, rel=1e-8)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_body_cools_down_exponentially() -> None:
@@ -263,4 +263,4 @@ def test_body_cools_down_exponentially() -> None:
     run = simulate(drive, "60 s", rtol=1e-9)
     steady = 290.0 + 5.0 / 2.0
     np.testing.assert_allclose(run["body.T"], steady + (350.0 - steady) * np.exp(-run.time / 20.0), rtol=1e-8)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8

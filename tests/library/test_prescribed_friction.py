@@ -94,7 +94,7 @@ def test_a_prescribed_speed_meets_the_sliding_friction(name: str, motion: str) -
     np.testing.assert_allclose(changes, reversals, atol=1e-9)
     loss = np.trapezoid((2 + 3 * np.abs(speed(fine := np.linspace(0, 1, 20001)))) * np.abs(speed(fine)), fine)
     assert run.energy()["element0"].lost == pytest.approx(loss, rel=1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("name", FRICTION)
@@ -134,7 +134,7 @@ def test_other_ways_to_prescribe() -> None:
         moving = np.abs(w) > 1e-3
         np.testing.assert_allclose(run["element0.tau"][moving], 3 * np.sign(w[moving]), rtol=1e-9)
         assert len([event for event in run.events if event.after in ("forward", "backward")]) in (2, 3)
-        assert run.energy().closure <= 1e-8
+        assert run.energy().power_closure <= 1e-8
 
 
 def test_a_clutch_between_two_prescribed_shafts() -> None:

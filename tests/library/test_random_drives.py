@@ -48,4 +48,4 @@ def test_random_clutches(seed: int) -> None:
         assert np.min(run[f"c{k}.loss_power"]) >= -1e-6
         slip = run[f"c{k}.w_rel"][run[f"c{k}.mode"] == stuck]
         assert np.all(np.abs(slip) < 1e-10)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8

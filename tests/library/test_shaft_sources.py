@@ -77,7 +77,7 @@ def test_sign_torque_and_torque_between_shafts() -> None:
     left, motor, right = Inertia(J=2.0, phi=0.0, w=0.0), Torque2(tau=6.0), Inertia(J=3.0, phi=0.0, w=0.0)
     run = simulate(shaft(left=left, motor=motor, right=right), "1 s")
     assert (run.final["left.w"], run.final["right.w"]) == pytest.approx((-3.0, 2.0), rel=1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_a_filtered_speed_rises_exponentially() -> None:
@@ -86,7 +86,7 @@ def test_a_filtered_speed_rises_exponentially() -> None:
     run = simulate(Assembly("d", parts=parts, series={"s": ["drive", "mass"]}, connect=wires), 0.05, rtol=1e-9)
     rises = 1 - np.exp(-100 * np.pi * np.maximum(run.time - 0.01, 0))
     np.testing.assert_allclose(run["mass.w"], 30 * rises, atol=1e-7)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("exact", [True, False])
@@ -104,7 +104,7 @@ def test_position_source(exact: bool) -> None:
     run = simulate(drive, "1 s", rtol=1e-8)
     np.testing.assert_allclose(run["mass.phi"], 0.5 * np.sin(2 * pi * run.time), atol=1e-9 if exact else 2.5e-2)
     np.testing.assert_allclose(run["drive.flange.tau"], -0.2 * run["meter.a"], atol=1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_prescribed_acceleration_and_relative_sensor() -> None:
@@ -130,7 +130,7 @@ def test_gearbox_turns_after_its_backlash() -> None:
     lag = run.final["box.gear.flange_b.phi"] - run.final["load.phi"]
     assert lag == pytest.approx(0.01 + 50.0 / 1e5, rel=1e-3)
     assert run.final["box.flange_a.tau"] == pytest.approx(50.0 / 4.0 / 0.9, rel=1e-3)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("has_backlash", [True, False])
@@ -147,7 +147,7 @@ def test_gearbox_on_an_elastic_stand(has_backlash: bool) -> None:
     )  # fmt: skip
     run = simulate(drive, "0.5 s", rtol=1e-8)
     assert np.max(np.abs(run["housing.phi"])) > 1e-3
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_drive_cut_into_parts_that_exchange_signals() -> None:
@@ -176,4 +176,4 @@ def test_drive_cut_into_parts_that_exchange_signals() -> None:
     cut = Assembly("cut", parts={**whole, **ends}, series=series, connect=wires)
     together, apart = simulate(one, "1 s", rtol=1e-9), simulate(cut, "1 s", rtol=1e-9)
     np.testing.assert_allclose(apart["right.w"], together["right.w"], atol=1e-6)
-    assert apart.energy().closure <= 1e-8
+    assert apart.energy().power_closure <= 1e-8

@@ -41,7 +41,8 @@ def torque_of(signal: Component, until: float = 2.0, **options: Any) -> Solution
 
 
 def moments(run: Solution, part: str = "signal") -> list[float]:
-    return [event.time for event in run.events if event.mode.startswith(f"{part}.")]
+    """Times of its events, but for the one that tells that its table has ended."""
+    return [one.time for one in run.events if one.mode.startswith(f"{part}.") and one.mode != f"{part}.end"]
 
 
 def pulse(t: float) -> float:
@@ -97,10 +98,15 @@ CASES = [
     (TimeFormula(formula="time**2", scale="1 N.m", time_scale="0.1 s"), lambda t: 100 * t**2, []),
     (
         Table(table=((0, 0), (0.5, 2), (1.5, -1)), scale="1 N.m"),
-        lambda t: np.interp(t, [0, 0.5, 1.5, 2.0], [0, 2, -1, -2.5]),
+        lambda t: np.interp(t, [0, 0.5, 1.5, 2.0], [0, 2, -1, -1]),
         [0, 0.5, 1.5],
     ),
-    (Table(table=((0, 1), (500, 3)), scale="2 N.m", time_scale="1 ms"), lambda t: 2 + 8 * t, [0, 0.5]),
+    (Table(table=((0, 1), (500, 3)), scale="2 N.m", time_scale="1 ms"), lambda t: 2 + 8 * min(t, 0.5), [0, 0.5]),
+    (
+        Table(table=((0, 1), (500, 3)), scale="2 N.m", time_scale="1 ms", extrapolate="linear"),
+        lambda t: 2 + 8 * t,
+        [0, 0.5],
+    ),
 ]
 
 

@@ -93,7 +93,7 @@ def test_bouncing_against_scipy(n: float | None, d: float) -> None:
     # Contact begins at 0.8 m/s, and is located to 1e-13 s.
     assert np.all(run["gap.f"] <= 2e4 * 0.8 * 1e-13)
     assert np.all(run["gap.loss_power"] >= -1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 # -- stops -------------------------------------------------------------------------------------------------------------
@@ -117,7 +117,7 @@ def test_stop_catches_the_mass_and_lets_it_go() -> None:
     assert run.at(there + 1e-6)["mass.s"] == pytest.approx(-0.9, abs=1e-9)
     assert modes(run, "mass.stop") == ["none", "right", "none", "left"]
     balance = run.energy()
-    assert balance.closure <= 1e-8
+    assert balance.power_closure <= 1e-8
     assert balance["mass"].at_events == pytest.approx(-0.5 * 2.0 * (before**2 + (8.5 * (there - 0.5)) ** 2), rel=1e-6)
 
 
@@ -146,7 +146,7 @@ def test_sliding_to_a_stop(name: str) -> None:
     assert run.final["mass.s"] == pytest.approx(9.0 * 2.0 / (2 * 4.0), rel=1e-8)
     assert run.final["mass.v"] == 0.0
     assert run.energy()["friction"].lost == pytest.approx(9.0, rel=1e-8)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("name", FRICTIONS)
@@ -186,7 +186,7 @@ def test_stick_slip_on_a_belt() -> None:
     run = simulate(drive, "3 s", rtol=1e-9)
     breaks = next(event.time for event in run.events if event.after == "start_backward")
     assert breaks == pytest.approx(1.5 * 2.0 / (100.0 * 0.1), rel=1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 # -- sources and sensors -----------------------------------------------------------------------------------------------
@@ -240,7 +240,7 @@ def test_a_filtered_velocity_rises_exponentially(support: bool) -> None:
     late = np.maximum(run.time - 0.01, 0)
     np.testing.assert_allclose(run["drive.v"], 1 + 3 * (1 - np.exp(-40 * np.pi * late)), atol=1e-7)
     np.testing.assert_allclose(run["mass.v"], run["drive.v"] + 5.0 * support, atol=1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("exact", [True, False])
@@ -249,7 +249,7 @@ def test_position_source(exact: bool) -> None:
     run = simulate(following(Sine(amplitude="0.1 m", f=0.5), source), "2 s", rtol=1e-8)
     wanted = 0.1 * np.sin(np.pi * run.time)
     np.testing.assert_allclose(run["mass.s"], wanted, atol=1e-9 if exact else 2e-3)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_position_source_filters_a_jump() -> None:
@@ -279,7 +279,7 @@ def test_sensors_measure_and_load_nothing() -> None:
     np.testing.assert_allclose(run["power.power"], 6.0 * run["left.v"], atol=1e-9)
     np.testing.assert_allclose(run["multi.power"], 6.0 * run["left.v"], atol=1e-9)
     np.testing.assert_allclose(run["force.f"], 6.0, atol=1e-12)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_force_between_two_masses() -> None:
@@ -307,5 +307,5 @@ def test_masses_stand_on_their_slope_or_slide(kind: str, angle: float, moves: bo
     pull = 8 * 9.80665 * np.sin(np.radians(angle))
     assert run.final["m.v"] == pytest.approx(-(pull - 40) / 8 if moves else 0.0, rel=1e-8)
     assert run.final["m.f"] == pytest.approx(-40 if moves else -pull, rel=1e-8)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
     assert run.energy()["m"].lost == pytest.approx(0.5 * (pull - 40) / 8 * 40 if moves else 0.0, rel=1e-6, abs=1e-9)

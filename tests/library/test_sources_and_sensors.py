@@ -125,7 +125,7 @@ def test_prescribed_velocity_of_a_slide() -> None:
     np.testing.assert_allclose(
         -run["source.flange.f"], np.pi * np.cos(np.pi * run.time) + 6 * np.sin(np.pi * run.time), atol=1e-8
     )
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 def test_the_housing_of_a_source_feels_the_reaction() -> None:
@@ -139,7 +139,7 @@ def test_the_housing_of_a_source_feels_the_reaction() -> None:
     assert run.final["rotor.w"] == pytest.approx(3.0, rel=1e-9)
     assert run.final["stator.w"] == pytest.approx(-1.5, rel=1e-9)
     assert run.final["motor.phi"] == pytest.approx(1.5 + 0.75, rel=1e-7)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 # -- sensors -----------------------------------------------------------------------------------------------------------
@@ -185,7 +185,7 @@ def test_sensors_of_a_shaft() -> None:
     }.items():
         np.testing.assert_allclose(run[measured], expected, atol=1e-9, err_msg=measured)
     assert np.all(run["tau.tau"][1:] > 0), "power flows from flange_a to flange_b"
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 def test_sensors_of_a_slide() -> None:

@@ -47,7 +47,7 @@ def test_the_formula_of_kloss(slip: float) -> None:
     wanted = 2 * 200 / 3 / (slip / 0.2 + 0.2 / slip) if slip else 0.0
     assert run.final["m.tau"] == pytest.approx(wanted, rel=1e-9, abs=1e-9)
     assert run.final["m.loss_power"] == pytest.approx(wanted * slip * w_s, rel=1e-9, abs=1e-9)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 def test_the_time_of_a_start() -> None:
@@ -80,7 +80,7 @@ def test_the_steady_state_is_that_of_the_equivalent_circuit(slip: float) -> None
     torque = 1.5 * induced**2 * 0.3 / slip / (2 * pi * 50 / 2)
     assert [run.final["m.i_ds"], run.final["m.i_qs"]] == pytest.approx([current.real, current.imag], rel=1e-6)
     assert run.final["m.tau"] == pytest.approx(torque, rel=1e-6)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 def test_a_start_against_complex_vectors_at_rest() -> None:
@@ -98,7 +98,7 @@ def test_a_start_against_complex_vectors_at_rest() -> None:
     oracle = solve_ivp(rates, (0, 0.6), [0j, 0j, 0j], rtol=1e-10, atol=1e-11, dense_output=True)
     for t in (0.02, 0.1, 0.3, 0.6):
         assert run.at(t)["load.w"] == pytest.approx(oracle.sol(t)[2].real, rel=1e-5)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 # -- synchronous -------------------------------------------------------------------------------------------------------
@@ -120,7 +120,7 @@ def test_a_synchronous_machine_in_the_steady_state() -> None:
     i_d, i_q = np.linalg.solve([[0.05, -w * 0.6e-3], [w * 0.3e-3, 0.05]], [-3.0, 25.0 - w * 0.08])
     assert [run.final["m.i_d"], run.final["m.i_q"]] == pytest.approx([i_d, i_q], rel=1e-6)
     assert run.final["m.tau"] == pytest.approx(1.5 * 4 * (0.08 + (0.3e-3 - 0.6e-3) * i_d) * i_q, rel=1e-6)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 def supplied(drive: Component, load: Component, until: float, supply: Component | None = None) -> Solution:
@@ -154,7 +154,7 @@ def test_a_synchronous_drive_takes_its_power_from_the_supply() -> None:
     run = supplied(drive, speed(300.0), 0.1)
     current = 60 / (1.5 * 4 * 0.08)
     assert run.final["m.i_dc"] == pytest.approx((60 * 300 + 1.5 * 0.05 * current**2) / 0.97 / 400, rel=1e-8)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
     braking = supplied(PMSynchronousDrive(**PM, I_max=250.0, tau_ref=-60.0, eta=0.97), speed(300.0), 0.1)
     assert braking.final["m.i_dc"] == pytest.approx((1.5 * 0.05 * current**2 - 60 * 300) * 0.97 / 400, rel=1e-8)
 
@@ -173,7 +173,7 @@ def test_a_drive_by_its_map(wanted: float, tau: float) -> None:
     assert run.final["m.tau"] == pytest.approx(tau, rel=1e-8)
     power = tau * 450 / eta if tau > 0 else tau * 450 * eta
     assert run.final["m.i_dc"] == pytest.approx(power / 400, rel=1e-7)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
     assert np.min(run["m.loss_power"]) >= 0
 
 
@@ -197,7 +197,7 @@ def test_a_drive_on_a_battery() -> None:
     run = supplied(MappedDrive(**MAP, tau_ref=80.0), speed(450.0), 0.5, cells)
     power = 80 * 450 / run.final["m.efficiency"]
     assert run.final["m.i_dc"] == pytest.approx((400 - sqrt(400**2 - 4 * 0.2 * power)) / 0.4, rel=1e-6)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 def test_a_drive_whose_battery_cannot_give_the_power() -> None:

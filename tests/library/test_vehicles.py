@@ -47,7 +47,7 @@ def test_vehicle_in_wind_on_a_slope_against_an_independent_solver() -> None:
     oracle = solve_ivp(rates, (0, 20), [0.0, 2.0], rtol=1e-10, atol=1e-10, dense_output=True)
     for t in (5.0, 12.0, 20.0):
         assert [run.at(t)["car.s"], run.at(t)["car.v"]] == pytest.approx(list(oracle.sol(t)), rel=1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
     assert np.min(run["car.loss_power"]) >= 0
 
 
@@ -78,7 +78,7 @@ def test_housings_feel_the_reaction(part: Component) -> None:
     # The rolling force F: der(v_rel) = F·(1/2 + 1/5) = 0.1·(40 - 0.1·F·(1/0.05 + 1/0.1))
     force = 4.0 / (0.7 + 0.01 * 30)
     assert final["m.v"] == pytest.approx(force / 2.0, rel=1e-9)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_eddy_current_brake_on_a_slide() -> None:
@@ -91,7 +91,7 @@ def test_eddy_current_brake_on_a_slide() -> None:
     v = run["m.v"]
     np.testing.assert_allclose(np.log(v) + v**2 / 18, np.log(8) + 64 / 18 - 2 * 30 / (2 * 3) * run.time, atol=1e-7)
     assert np.max(run["brake.f"]) == pytest.approx(30.0, rel=1e-4)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8
 
 
 def test_warm_brake_has_its_peak_at_a_higher_velocity() -> None:
@@ -105,4 +105,4 @@ def test_warm_brake_has_its_peak_at_a_higher_velocity() -> None:
     run = simulate(Assembly("d", parts=parts, series={"s": ["drive", "m", "brake"]}, connect=connect), 1.0)
     assert run.final["brake.f"] == pytest.approx(30.0, rel=1e-6)
     assert run.final["m.v"] == pytest.approx(4.2, rel=1e-6)
-    assert run.energy().closure <= 1e-8
+    assert run.energy().power_closure <= 1e-8

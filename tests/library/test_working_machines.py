@@ -88,7 +88,7 @@ def test_chain_pulls_in_both_directions_and_is_as_fast_as_its_teeth() -> None:
         stretch = abs(2.0 * speed / 3) / (0.0127 / (2 * sin(pi / 45))) / 2e5
         assert abs(turned - speed * 2 / 3) < 1.2 * stretch / 0.0908 + 1e-3
         assert np.min(run["chain.loss_power"]) > -1e-9
-        assert run.energy().closure < 1e-9
+        assert run.energy().power_closure < 1e-9
 
 
 def test_a_chain_on_a_frame_that_turns_does_not_notice() -> None:

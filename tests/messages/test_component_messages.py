@@ -13,6 +13,7 @@ from components import (
     BearingFriction,
     Clutch,
     ClutchActuator,
+    CombustionEngine,
     ConstantSpeed,
     Fixed,
     Freewheel,
@@ -25,7 +26,19 @@ from modelica_like import build, simulate, simulation_function
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.flatten import flatten
 from modelica_like.initialize import initialize
-from modelica_like.language import Assembly, Component, Equations, Events, Mode, Parameter, Variable, der, param, var
+from modelica_like.language import (
+    Assembly,
+    Component,
+    Equations,
+    Events,
+    Mode,
+    Parameter,
+    Variable,
+    der,
+    param,
+    sign,
+    var,
+)
 from modelica_like.language.formula import parse_formula
 from modelica_like.report.run import notices
 from modelica_like.report.types import library_table
@@ -41,6 +54,14 @@ class Twist(Component, partial=True):
         yield self.phi_rel == self.flange_b.phi - self.flange_a.phi  # twist
         yield self.flange_a.tau == -self.tau
         yield self.flange_b.tau == self.tau
+
+
+def revving() -> CombustionEngine:
+    """An engine that reaches its rev limit, below which its speed need not fall."""
+    return CombustionEngine(
+        speeds=(0, 400), pedals=(0, 1), torque=((0, 100), (0, 100)), drag=((0, 10),), J=0.5, pedal=1, w_max=190,
+        w_band=0, phi=0, w=180,
+    )  # fmt: skip
 
 
 class Forgetful(Twist):
@@ -115,6 +136,15 @@ class Relay(Component):
     def events(self) -> Events:
         yield self.state.go("up", "down", when=self.x > 0)  # relay up
         yield self.state.go("down", "up", when=self.x < 0)  # relay down
+
+
+class Rubbing(Component):
+    m: Parameter = param("kg", "mass", default=1.0)
+    F_c: Parameter = param("N", "friction", default=2.0)
+    v: Variable = var("m/s", "speed", default=10.0)
+
+    def equations(self) -> Equations:
+        yield self.m * der(self.v) == -self.F_c * sign(self.v)  # rubbing
 
 
 class Alarm(Component):
@@ -304,7 +334,7 @@ case(
     "a notice names what is no parameter",
     lambda: flatten(Alarm(bell="xmax")),
     """\
-Alarm: the notice of an event names xmax, which is not a parameter; did you mean 'x_max'?
+Alarm: the notice of an event names xmax, which is not a parameter or input; did you mean 'x_max'?
   in test_component_messages.py:{alarm} \
 `yield self.alarm.go("quiet", "ringing", when=self.x > self.x_max, notice=notice)`""",
 )
@@ -346,6 +376,32 @@ state switched 20 times at t = 0.5 s (up ⇄ down).
   in test_component_messages.py:{relay down} `yield self.state.go("down", "up", when=self.x < 0)`
 Modes still switch after 20 rounds at one instant.
 Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it. \
+Or go on: on_chattering = "slide" along the border of two modes, "rest" in contact after ever faster impacts.""",
+)
+case(
+    errors.Chattering,
+    "a rev limit without a band",
+    lambda: simulate(Assembly("bed", parts={"engine": revving()}), 1.0),
+    """\
+engine.fuel switched 20 times at t = 0.0555555556 s (given ⇄ cut).
+  in engines.py:{engines.py:because="the rev limit is reached")} \
+`yield fuel.go("given", "cut", when=w > self.w_max, because="the rev limit is reached")`
+  in engines.py:{engines.py:because="the speed is below the rev limit")} \
+`yield fuel.go("cut", "given", when=w < self.w_max - self.w_band, because="the speed is below the rev limit")`
+Modes still switch after 20 rounds at one instant.
+engine: set w_start well above w_stall, and w_band well above zero, or smooth what drives it. \
+Or go on: on_chattering = "slide" along the border of two modes, "rest" in contact after ever faster impacts.""",
+)
+case(
+    errors.Chattering,
+    "an ideal friction comes to rest",
+    lambda: simulate(Rubbing(), 10.0),
+    """\
+relation[1] switched 20 times at t = 5 s (true ⇄ false).
+  in test_component_messages.py:{rubbing} `yield self.m * der(self.v) == -self.F_c * sign(self.v)`
+Modes still switch after 20 rounds at one instant.
+If this is friction, take a class that can stick, such as BearingFriction, Brake, Clutch or SupportFriction; \
+otherwise give the switching a hysteresis, or smooth what drives it. \
 Or go on: on_chattering = "slide" along the border of two modes, "rest" in contact after ever faster impacts.""",
 )
 case(

@@ -20,7 +20,10 @@ SHAFT = '{ is = "SpringDamper", c = 1, d = 1 }'
 PARTS = {"J1": J, "shaft": SHAFT, "J2": J}
 STARTS = '[start]\n"J1.phi" = 0\n"J1.w" = 0\n"shaft.phi_rel" = 0\n"shaft.w_rel" = 0'
 CHAIN = '[series]\nmain = ["J1", "shaft", "J2"]'
-PLACES = "Name a part (it is cut behind it), one of its ends (shaft.flange_a), or an entry of [connect]."
+PLACES = (
+    "A name is a part (it is cut behind it), one of its ends (shaft.flange_a), or an entry of [connect].\n"
+    "It can be cut at J1, shaft, J2, as in --at J1."
+)
 WHERE_TO_CUT = "Cut where a spring or damper on one side meets an inertia on the other."
 
 
@@ -46,7 +49,7 @@ METER = netlist(
 )
 
 CUTS: dict[str, tuple[Assembly, list[str], str]] = {
-    "nothing": (DRIVE, [], "drive: there is nothing to cut.\nName a shaft, e.g. --at shaft."),
+    "nothing": (DRIVE, [], "drive: it is not said where to cut.\nIt can be cut at J1, shaft, J2, as in --at J1."),
     "unknown": (DRIVE, ["shft"], f"drive has no shaft 'shft'; did you mean 'shaft'?\n{PLACES}"),
     "free end": (DRIVE, ["J2.flange_b"], f"drive has no shaft 'J2.flange_b'; did you mean 'J2.flange_a'?\n{PLACES}"),
     "series": (
@@ -320,7 +323,6 @@ FAILURES: dict[str, tuple[dict[str, Any], str]] = {
         "bench: after t = 0.25 s no step is short enough for the tolerance of the coupling.\n"
         "Give a larger tolerance, or a fixed step.",
     ),
-    "ends": ({"kind": "ends", "unit": "a", "time": 0.25}, "a (a.fmu) asks to end the run after t = 0.25 s."),
     "failed": (
         {"kind": "failed", "unit": "a", "text": "fmi2DoStep failed.", "messages": ["giving up"]},
         "a (a.fmu) failed: fmi2DoStep failed.\nIt reported: giving up\n"

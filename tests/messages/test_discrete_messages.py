@@ -4,11 +4,13 @@ Lines of this file are written as {marker}, the line that ends in `# marker`.
 """
 
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from modelica_like import build, simulate
-from modelica_like.errors import Chattering, LanguageError, ModelicaLikeError, StructureError, UnitMismatch
+from modelica_like import build, export_fmu, run_fmu, simulate
+from modelica_like.errors import Chattering, FmuFailed, LanguageError, ModelicaLikeError, StructureError, UnitMismatch
 from modelica_like.language import (
     Component,
     Discrete,
@@ -28,6 +30,7 @@ from modelica_like.language import (
     pre,
     previous,
     sample,
+    terminate,
     var,
     when,
 )
@@ -44,6 +47,28 @@ class Basis(Component, partial=True):
 
     def events(self) -> Events:
         yield when(self.x > 0.5, {self.n: pre(self.n) + 1})  # basis
+
+
+class Rebound(Component):
+    units_checked = False
+    h: Variable = var("m", "height", default=1.0)
+    v: Variable = var("m/s", "velocity", state="always", default=0.0)
+    e: Parameter = param("1", "restitution", default=0.5)
+
+    def equations(self) -> Equations:
+        yield der(self.h) == self.v
+        yield der(self.v) == -9.81
+
+    def events(self) -> Events:
+        yield when(self.h < 0, {self.v: -self.e * self.v})  # rebound
+
+
+UNKNOWN = "is at {top}"
+
+
+class EndsByUnknown(Basis):
+    def events(self) -> Events:
+        yield when(self.x > 0.5, {self.n: 1, **terminate(UNKNOWN)})  # ending
 
 
 class Undetermined(Basis):
@@ -185,6 +210,11 @@ CASES: dict[type[Component], tuple[type[ModelicaLikeError], str]] = {
         "Undetermined: nothing determines the discrete variable on.\n"
         "Yield self.on == …, or set it in a `when` or a reset.",
     ),
+    EndsByUnknown: (
+        LanguageError,
+        "EndsByUnknown: the text of terminate(…) names top, which is not declared.\n"
+        f"  in {HERE}:{{ending}} `yield when(self.x > 0.5, {{self.n: 1, **terminate(UNKNOWN)}})`",
+    ),
     Twice: (
         LanguageError,
         "Twice: n is determined twice.\n"
@@ -310,3 +340,26 @@ def test_messages_of_discrete_equations(
     kind: type[Component], check_message: Callable[[type[ModelicaLikeError], Callable[[], object], str], None]
 ) -> None:
     check_message(CASES[kind][0], lambda: simulate(build(kind()), 1.0), CASES[kind][1])
+
+
+@pytest.mark.parametrize(("solver", "e", "told"), [("idas", 0.5, "1.35457086"), ("native", 0.1, "0.551862228")])
+def test_a_ball_that_comes_to_rest_does_not_fall_through_the_floor(
+    solver: Any,
+    e: float,
+    told: str,
+    check_message: Callable[[type[ModelicaLikeError], Callable[[], object], str], None],
+) -> None:
+    """It rebounds until (1 + e) / (1 - e) times its first fall, sqrt(2 m / 9.81 m/s2) = 0.4515236 s, is over."""
+    text = (
+        f"At {told} s the condition of relation[1] stays true: what is set there is at rest, and would pass "
+        "without another event.\n"
+        f"  in {HERE}:{{rebound}} `yield when(self.h < 0, {{self.v: -self.e * self.v}})`\n"
+        "Let it rest: a mode that holds the motion, with a restitution (docs/language.md, what a mode holds), or a "
+        "smallest speed below which `when` sets zero and a mode keeps it."
+    )
+    check_message(Chattering, lambda: simulate(build(Rebound(e=e)), 3.0, solver=solver), text)
+
+
+def test_no_fmu_lets_a_ball_fall_through_the_floor(tmp_path: Path) -> None:
+    with pytest.raises(FmuFailed, match=r"the condition of relation\[1\] stays true: what is set there is at rest"):
+        run_fmu(export_fmu(Rebound(e=0.1), tmp_path / "ball.fmu", kind=("cs",), check=False).path, stop=3.0)

@@ -15,6 +15,9 @@ def model(declarations: str = "", equations: str = "", before: str = "") -> str:
     return f"{before}\nmodel A\n{declarations}\nequation\n{equations}\nend A;\n"
 
 
+CONNECTED = "connector U = input Boolean; connector Y = output Boolean; block C U u; end C;"
+ENDLESS = "while true loop y := 1; end while"
+GROWING = "function f input Real u; output Real y; algorithm y := u; for i in 1:60 loop y := y*y + y; end for; end f;"
 MESSAGES: dict[str, tuple[str, str]] = {
     "no end": ("model A\n  Real x;\n", "model A of line 1 has no 'end A;'.\n  in a.mo:3"),
     "wrong end": ("model A\n  Real x;\nend B;\n", "model A of line 1 ends with 'end B'.\n  in a.mo:3 `end B;`"),
@@ -152,6 +155,77 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "The function bessel: that is not supported here.\n"
         "  in a.mo:5 `x = bessel(2);`\nOwn functions with an algorithm are read.",
     ),
+    "ticks over a connection": (
+        model("B b; C c;", "connect(b.y, c.u);", "block B Y y; equation y = sample(0, 1); end B; " + CONNECTED),
+        "b.y is true for instants only, which a connection does not carry here.\n"
+        "  in a.mo:5 `connect(b.y, c.u);`\n"
+        "Write the 'when' in the class of the sample, or name the variable: when block.y then.",
+    ),
+    "a Boolean of a part": (
+        model("C c;", "c.u = time > 1;", CONNECTED),
+        "An equation for c.u, a Boolean of a part: that is not supported here.\n"
+        "  in a.mo:5 `c.u = time > 1;`\nConnect a signal.",
+    ),
+    "a deep formula": (
+        model("Real x;", f"x =\n{'(' * 400}1{')' * 400};")[:-1],
+        f"This is nested more than 100 deep.\n  in a.mo:6 `{'(' * 159}…`",
+    ),
+    "classes in classes": (400 * "model M\n", "This is nested more than 100 deep.\n  in a.mo:101 `model M`"),
+    "a long product": (
+        model("Real x;", f"x =\n{'*'.join(['time'] * 302)};"),
+        f"A formula has more than 300 levels.\n  in a.mo:6 `{'*'.join(['time'] * 32)}…`",
+    ),
+    "an algorithm that grows": (
+        model("Real x = f(time);", before=GROWING),
+        f"A formula has more than 500000 numbers, names and operations.\n  in a.mo:1 `{GROWING}`",
+    ),
+    "no end of steps": (
+        model("Real x = f(time);", before=GROWING.replace("for i in 1:60 loop y := y*y + y; end for", ENDLESS)),
+        "The text has too many parts and equations: reading it takes more than 1000000 steps.\n"
+        f"  in a.mo:1 `{GROWING.replace('for i in 1:60 loop y := y*y + y; end for', ENDLESS)}`\n"
+        "Look for loops and arrays that are longer than meant, and for classes that contain each other.",
+    ),
+    "a step of zero": (
+        model("Real x[3];", "for i in 1:0:2 loop x[i] = 1; end for;"),
+        "The range 1:0:2 has a step of 0.\n  in a.mo:5 `for i in 1:0:2 loop x[i] = 1; end for;`",
+    ),
+    "a large array": (
+        model("Real v[100000000];"),
+        "An array cannot have 1e+08 elements: it has 0 to 100000.\n  in a.mo:3 `Real v[100000000];`",
+    ),
+    "a large matrix": (
+        model("Real v[10000, 10000];"),
+        "v, an array of 100000000 elements (at most 100000): that is not supported here.\n"
+        "  in a.mo:3 `Real v[10000, 10000];`",
+    ),
+    "a size that is no whole number": (
+        model("Real v[2.5];"),
+        "An array cannot have 2.5 elements: it has 0 to 100000.\n  in a.mo:3 `Real v[2.5];`",
+    ),
+    "an index that is no whole number": (
+        model("Real v[2]; Real x;", "x = v[1.5];"),
+        "The index 1.5 is no whole number from 1 to 2.\n  in a.mo:5 `x = v[1.5];`",
+    ),
+    "a large number": (
+        model("Real x;", "x = 1e400;"),
+        "1e400 is too large for a number.\n  in a.mo:5 `x = 1e400;`",
+    ),
+    "a comment without an end": (model() + "/* x", "A comment has no end.\n  in a.mo:7 `/* x`"),
+    "a text without an end": (model('Real x "speed;'), 'A text has no end.\n  in a.mo:3 `Real x "speed;`'),
+    "a binding from outside": (
+        model("B b(f(tau = 3));", before="model B Modelica.Mechanics.Rotational.Interfaces.Flange_a f; end B;"),
+        "An equation for f.tau in the modification of its component: that is not supported here.\n"
+        "  in a.mo:3 `B b(f(tau = 3));`",
+    ),
+    "no array": (model("Real x;", "x = sum(1);"), "sum(…) needs an array.\n  in a.mo:5 `x = sum(1);`"),
+    "too few arguments": (
+        model("Real x;", "der() = 1;"),
+        "der(…) has 1 argument, not 0.\n  in a.mo:5 `der() = 1;`",
+    ),
+    "no simplified law": (
+        model("Real x;", "homotopy(actual = x) = 1;"),
+        "homotopy(…) has 2 arguments, actual and simplified, not 1.\n  in a.mo:5 `homotopy(actual = x) = 1;`",
+    ),
     "no value": (
         model("Real x;", "x = log(-1);"),
         "A formula of -1 has no value.\n  in a.mo:5 `x = log(-1);`",
@@ -189,3 +263,15 @@ def test_errors_of_the_drive_point_into_the_text(tmp_path: Path) -> None:
         "  in a.mo:6 `y = x; y = 2;`\n"
         "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."
     )
+
+
+def test_what_python_cannot_go_down_into(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check_message) -> None:
+    from modelica_like.modelica_text import read
+
+    def deep(*_: object) -> None:
+        raise RecursionError  # as Python does
+
+    monkeypatch.setattr(read, "build_component", deep)
+    (tmp_path / "a.mo").write_text(model())
+    told = "Classes, functions or formulas are nested too deeply.\n  in a.mo:2 `model A`"
+    check_message(ModelicaTextError, lambda: load(tmp_path / "a.mo"), told)

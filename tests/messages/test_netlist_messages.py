@@ -25,6 +25,18 @@ MESSAGES = {
         "Mass has no parameter or variable 'n'. It has m, angle, g, s, v, L.\n"
         '  in bad.toml:2 `m = { is = "Mass", n = 3 }`',
     ),
+    "former name of a parameter": (
+        '[parts]\nm = { is = "SeriesDCMachine", alpha = 0.0038 }\n',
+        "SeriesDCMachine has no parameter or variable 'alpha' any more.\n"
+        '  in bad.toml:2 `m = { is = "SeriesDCMachine", alpha = 0.0038 }`\n'
+        "Write alpha20 = alpha/(1 - alpha*(T_ref - 293.15 K)): alpha was the coefficient at T_ref.",
+    ),
+    "former name of a part": (
+        '[parts]\nm = { is = "PositionServo", servo.J = 1 }\n',
+        "PositionServo has no part 'servo' any more.\n"
+        '  in bad.toml:2 `m = { is = "PositionServo", servo.J = 1 }`\n'
+        "Write its values and parts without 'servo.': J instead of servo.J.",
+    ),
     "wrong unit": (
         '[parts]\nrotor = { is = "Inertia", J = "8.5 kg.cm" }\n',
         "Inertia.J expects kg.m2; '8.5 kg.cm' is kg.m.\n"
@@ -102,8 +114,9 @@ MESSAGES = {
     ),
     "a module that is not there": (
         '[parts]\na = { is = "no_such_module:A" }\n',
-        "The module 'no_such_module' cannot be imported: No module named 'no_such_module'.\n"
-        '  in bad.toml:2 `a = { is = "no_such_module:A" }`',
+        "There is no module 'no_such_module' beside the netlist, or in a folder above.\n"
+        '  in bad.toml:2 `a = { is = "no_such_module:A" }`\n'
+        "A module from elsewhere must be installed as a library.",
     ),
     "a netlist that is not there": (
         '[parts]\na = { is = "./bat.toml" }\n',
@@ -119,6 +132,12 @@ MESSAGES = {
     "not TOML": (
         "[parts]\na is b\n",
         "'bad.toml' is not TOML: expected '=' after a key in a key/value pair.\n  in bad.toml:2 `a is b`",
+    ),
+    "an FMU": (
+        b"PK\3\4\xff",
+        """\
+'bad.toml' is an archive, such as an FMU, and no netlist.
+An FMU is run by run_fmu(…) in Python, and by `compare` and `report` on the command line.""",
     ),
     "not a text": (b"\x89PNG\n\xff", "'bad.toml' is not a text file (UTF-8).\n  in bad.toml:1"),
     "brackets": (

@@ -13,7 +13,20 @@ from components import Freewheel, Inertia
 from modelica_like import Assembly, build, load, sensitivities, simulate, simulation_function
 from modelica_like.analyse.replay.chain import replay
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient, StepFailed, UnknownName, ValueOutOfRange
-from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, sin, var
+from modelica_like.language import (
+    Component,
+    Equations,
+    Events,
+    Mode,
+    Parameter,
+    Variable,
+    der,
+    param,
+    sin,
+    terminate,
+    var,
+    when,
+)
 
 DIRECT = Path(__file__).parents[2] / "examples" / "machine_table_direct.toml"
 
@@ -116,7 +129,25 @@ def table(*of: str, to: tuple[str, ...] = ("load_torque",), **options: Any) -> A
     return sensitivities(DIRECT, of, to, **options)
 
 
+class Arriving(Component):
+    x: Variable = var("1", "grows", default=0.0)
+    T: Parameter = param("s", "time", default=2.0)
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == 1
+
+    def events(self) -> Events:
+        yield when(self.x > 0.5, terminate("has arrived"))
+
+
 CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], Any], str]] = {
+    "a run that a component ends": (
+        NoGradient,
+        lambda: sensitivities(Arriving(), ["x"], ["T"], until="3 s"),
+        """\
+No gradient: Arriving ends the run at 1 s, and this time depends on parameters.
+End the run before, or compare other values by a sweep, which has the numbers at each end.""",
+    ),
     "an event that grazes": (
         NoGradient,
         lambda: sensitivities(Touch(y=0.0), ["y"], ["T"], until="3 s"),
@@ -136,6 +167,15 @@ No gradient at t = 0.5 s: 'first: below → above' and 'second: below → above'
 A small change of a parameter decides which comes first, so the derivatives on both sides differ.
 Leave out one, or choose parameter values that separate the two events.""",
     ),
+    "an event at the end": (
+        NoGradient,
+        lambda: sensitivities(Race(x=0.0, y=0.0, two=0.9), ["y"], ["one"], until="0.5 s"),
+        """\
+No gradient at t = 0.5 s: first becomes above exactly at the end of the run.
+  in test_sensitivity_messages.py:{one} `yield self.first.go("below", "above", when=self.x > self.one)`
+A small change of a parameter moves it to either side, so the derivatives on both sides differ.
+Leave out one, or move the parameters away from this limit.""",
+    ),
     "another mode sequence": (
         NoGradient,
         lambda: simulation_function(strong(), ["load_torque"], ["table.s"]).at([86.0]),
@@ -152,7 +192,7 @@ Timeless has no states, so there is no run to differentiate.
 Compare runs with other parameter values instead."""),
     "an output that does not exist": (UnknownName, lambda: table("table.x"), """\
 machine_table_direct has no variable 'table.x'; did you mean 'table.v'?
-Other outputs are max(…), min(…), integral(…), at(…, time), series(…), time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time."""),
+Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(…), at(…, time), first(… > …), duration(mode: name), series(…), time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time."""),
     "a mode that does not exist": (UnknownName, lambda: table("time(clutch.node -> stuck)"), """\
 machine_table_direct has no mode 'clutch.node'; did you mean 'clutch.mode'?"""),
     "a mode change that does not exist": (UnknownName, lambda: table("time(clutch.mode -> stack)"), """\

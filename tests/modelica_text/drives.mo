@@ -341,3 +341,23 @@ package Drives "Texts that use every construct that is read"
     der(y) = -delay(y, T, 2);
   end Late;
 end Drives;
+
+// The bouncing ball of Modelica's textbooks: it lies still once a rebound is too low.
+model TextbookBall
+  parameter Real e = 0.7;
+  parameter Real g = 9.81;
+  Real h(start = 1, fixed = true);
+  Real v(start = 0, fixed = true);
+  Boolean flying(start = true, fixed = true);
+  Boolean impact;
+  Real v_new(start = 0, fixed = true);
+equation
+  impact = h <= 0;
+  der(v) = if flying then -g else 0;
+  der(h) = v;
+  when {h <= 0 and v <= 0, impact} then
+    v_new = if edge(impact) then -e*pre(v) else 0;
+    flying = v_new > 0;
+    reinit(v, v_new);
+  end when;
+end TextbookBall;

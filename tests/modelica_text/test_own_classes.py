@@ -2,17 +2,34 @@
 
 import pickle
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from modelica_like import build, export_fmu, load, simulate
+from modelica_like import Assembly, build, export_fmu, load, run_fmu, simulate
 from modelica_like.errors import ModelicaTextError
+from modelica_like.language import Component, Equations, Events, Parameter, Variable, der, param, terminate, var, when
 from modelica_like.modelica_text.netlist_form import netlist_text
+from modelica_like.modelica_text.write import modelica_text
 from modelica_like.netlist import loads
 
 DRIVES = Path(__file__).with_name("drives.mo")
+
+
+class Rising(Component):
+    a: Parameter = param("m/s2", "acceleration", default=2.0)
+    x_top: Parameter = param("m", "height", default=1.0)
+    x: Variable = var("m", "position", state="always", default=0.0)
+    v: Variable = var("m/s", "speed", state="always", default=0.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.v
+        yield der(self.v) == self.a
+
+    def events(self) -> Events:
+        yield when(self.x > self.x_top, terminate("is at the top, {x_top} m"))
 
 
 def drive(name: str):
@@ -39,6 +56,30 @@ def test_a_when_reinitializes_and_counts() -> None:
     rest = 1.2 - result["last"][-1]
     speed = 9.80665 * fall * 0.7**2
     assert result["h"][-1] == pytest.approx(speed * rest - 9.80665 / 2 * rest**2, rel=1e-7)
+
+
+def lies_still(e: float) -> float:
+    """Time at which a ball that falls from 1 m has rebounded without end: the first fall times (1 + e) / (1 - e)."""
+    return float(np.sqrt(2 / 9.81) * (1 + e) / (1 - e))
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize("e", [0.2, 0.3, 0.5, 0.7, 0.8, 0.9])
+def test_the_ball_of_the_textbooks_comes_to_rest(solver, e) -> None:
+    result = run("TextbookBall", 10.0, parameters={"e": e}, solver=solver)
+    assert result.events[-1].time == pytest.approx(lies_still(e), rel=3e-7)
+    assert result["flying"][-1] == 0
+    assert abs(result["h"][-1]) < 1e-9  # it lies for some seconds: a speed of rounding would carry it no further
+    assert abs(result["v"][-1]) < 1e-10
+    assert result["h"].min() > -1e-9
+
+
+def test_the_ball_of_the_textbooks_comes_to_rest_in_an_fmu(tmp_path) -> None:
+    export_fmu(drive("TextbookBall"), tmp_path / "ball.fmu")
+    result = run_fmu(tmp_path / "ball.fmu", stop=10.0, outputs=["h", "v"])
+    assert result.at(lies_still(0.7) * 0.3)["h"] == pytest.approx(0.49, rel=1e-3)  # the top after the first rebound
+    assert abs(result.final["h"]) < 1e-9
+    assert result.final["v"] == 0
 
 
 def test_two_whens_of_one_variable_switch_a_thermostat() -> None:
@@ -199,6 +240,49 @@ def test_a_broken_assertion_ends_the_run(tmp_path: Path) -> None:
     (tmp_path / "drives.mo").write_text(text)
     with pytest.raises(Exception, match="too many bounces"):
         simulate(load(f"{tmp_path / 'drives.mo'}:Ball"), 2.0)
+
+
+LIFT = """
+model Lift
+  parameter Real a = 3;
+  Real x(start = 0, fixed = true);
+  Real v(start = 0, fixed = true);
+  Integer n(start = 0, fixed = true);
+equation
+  der(x) = v;
+  der(v) = a;
+  when {x > 1, x < -1} then
+    n = pre(n) + 1;
+    terminate("the lift is at the top");
+  elsewhen time > 5 then
+    terminate("too late");
+  end when;
+end Lift;
+"""
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize(
+    ("a", "end", "count", "reason"),
+    [(3.0, np.sqrt(2 / 3), 1, "says: the lift is at the top"), (0.01, 5.0, 0, "says: too late")],
+)
+def test_terminate_ends_the_run(
+    tmp_path: Path, solver: Literal["idas", "native"], a: float, end: float, count: int, reason: str
+) -> None:
+    (tmp_path / "Lift.mo").write_text(LIFT)
+    result = simulate(load(tmp_path / "Lift.mo"), 10.0, parameters={"a": a}, solver=solver, rtol=1e-10)
+    assert result.time[-1] == pytest.approx(end, rel=1e-8)
+    assert result.final["n"] == count
+    assert result.ended is not None
+    assert result.ended.reason == reason
+
+
+def test_terminate_is_written(tmp_path: Path) -> None:
+    text = modelica_text(Assembly("drive", parts={"lift": Rising(a=3.0)}))
+    (tmp_path / "drive.mo").write_text(text)
+    assert 'terminate("is at the top, x_top m");' in text
+    result = simulate(load(tmp_path / "drive.mo"), 10.0, rtol=1e-10)
+    assert result.time[-1] == pytest.approx(np.sqrt(2 / 3), rel=1e-8)
 
 
 def test_an_fmu_of_a_text_agrees_with_idas(tmp_path: Path) -> None:

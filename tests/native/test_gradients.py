@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components import Clutch, Inertia
+from components import Clutch, Constant, FirstOrder, Inertia, Integrator, Limiter
 from modelica_like import Assembly, build, sensitivities, simulate
 from modelica_like.errors import NoGradient, ValueOutOfRange
+from modelica_like.language import Component, Equations, Input, Output, maximum, signal_in, signal_out
 
 ROOT = Path(__file__).parents[2]
 STARTUP = ROOT / "examples" / "machine_tool_startup.toml"
@@ -105,3 +106,33 @@ def test_where_there_are_none():
         build(CLUTCHES).native(outputs=["J1.w"], by=["J1.J"], fixed_step=1e-3)
     with pytest.raises(ValueOutOfRange, match=r"Derivatives with respect to clutch1\.tau are not available"):
         build(CLUTCHES).native(by=["clutch1.tau"])
+
+
+class Positive(Component):
+    """A signal, or zero: a kink without a mode."""
+
+    u: Input = signal_in("1", "signal")
+    y: Output = signal_out("1", "what is positive of it")
+
+    def equations(self) -> Equations:
+        yield self.y == maximum(self.u, 0)
+
+
+@pytest.mark.parametrize("limit", ["Limiter", "max"])
+def test_a_state_that_rests_at_a_limit_has_two_derivatives(limit):
+    """A lag rests at zero, where what follows is limited; its own derivative by the command is 1 - exp(-10)."""
+    law = {"Limiter": Limiter(y_max=1.0, y_min=0.0), "max": Positive()}[limit]
+    parts = {"command": Constant(k=0.0), "lag": FirstOrder(T=0.1, y=0.0), "limit": law, "sum": Integrator(k=1.0, y=0.0)}
+    connect = {"a": ["command.y", "lag.u"], "b": ["lag.y", "limit.u"], "c": ["limit.y", "sum.u"]}
+    drive = build(Assembly("resting", parts=parts, connect=connect))
+    handle = drive.native(outputs=["sum.y", "lag.y"], by=["command.k"])
+    handle.reset(until=1.0)
+    handle.step(1.0)
+    with pytest.raises(NoGradient, match=r"no derivatives with respect to command\.k .*: it is at a kink there"):
+        handle.gradient()
+    moved = build(Assembly("moved", parts=parts | {"command": Constant(k=0.5)}, connect=connect))
+    handle = moved.native(outputs=["sum.y", "lag.y"], by=["command.k"], rtol=1e-9)
+    handle.reset(until=1.0)
+    handle.step(1.0)
+    lag = 1 - np.exp(-10.0)
+    np.testing.assert_allclose(handle.gradient().ravel(), [1 - 0.1 * lag, lag], rtol=1e-7)

@@ -3,17 +3,24 @@
 import contextlib
 import http.client
 import json
+import math
+import socket
 import statistics
 import threading
+import time
+import webbrowser
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import numpy as np
 import pytest
 
 from modelica_like import load, run_fmu, sensitivities, simulate
-from modelica_like.explorer import Explorer
+from modelica_like.errors import NoGradient
+from modelica_like.explorer import Explorer, server
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRIVES = {"machine_table_direct": "table_mass", "machine_tool_startup": "J2.J"}
@@ -27,7 +34,7 @@ MOVE = """(async (name, place) => {
   return performance.now() - begin;
 })"""
 WAIT = """(async (find) => {
-  for (let k = 0; k < 500 && !find(); k++) await new Promise((go) => setTimeout(go, 20));
+  for (let k = 0; k < 3000 && !find(); k++) await new Promise((go) => setTimeout(go, 20));
   return find();
 })"""
 BARS = """((name) => {
@@ -68,10 +75,10 @@ def ask(
         return answer.status, answer.read()
 
 
-def request(explorer: Explorer, names: list[str], until: float = 1.0, turn: int = 1, **values: float) -> dict[str, Any]:
+def request(explorer: Explorer, names: list[str], until: float = 1.0, **values: float) -> dict[str, Any]:
     known = explorer.runs.references
     return {
-        "turn": turn, "until": until, "references": [known[name] for name in names],
+        "until": until, "references": [known[name] for name in names],
         "values": [[known[name.replace("__", ".")], value] for name, value in values.items()],
     }  # fmt: skip
 
@@ -106,8 +113,16 @@ def test_only_who_knows_the_address_is_answered(explorer: Explorer) -> None:
 
 
 def test_a_wrong_request_gets_a_sentence(explorer: Explorer) -> None:
-    assert ask(explorer, "/run", "no json")[0] == 400
-    assert ask(explorer, "/run", {"turn": 1})[0] == 400
+    right = request(explorer, ["J1.w"], J1__J=2.0)
+    wrong: list[Any] = ["no json", "[" * 500_000, "3", "[]", {"until": 1}, "\x00"]
+    wrong += [{**right, "references": [one]} for one in (-1, 2**32, 2**70, 0.5, "1", None)]
+    wrong += [{**right, "values": [[one, 1.0]]} for one in (-1, 2**32, explorer.runs.references["J1.w"], "1")]
+    wrong += [{**right, "values": one} for one in (3, [1, 2], [[1]], [[right["values"][0][0], "2"]])]
+    wrong += [json.dumps(right).replace("2.0", one) for one in ("Infinity", "NaN", "1" * 400)]
+    wrong += [{**right, "until": one} for one in (math.inf, math.nan, "1 s", None, [])]
+    for one in wrong:
+        code, said = ask(explorer, "/run", one)
+        assert (code, said[:21]) == (400, b"The request is wrong:"), one
     assert ask(explorer, "/save", {"what": "passwd", **request(explorer, [])})[0] == 400
     assert ask(explorer, "/elsewhere", {})[0] == 404
 
@@ -117,9 +132,53 @@ def test_a_bad_value_is_told_as_the_command_line_tells_it(explorer: Explorer) ->
     assert read(body)[0]["message"] == "Inertia.J = -1.0 is out of range: it must be at least 0 kg.m2."
 
 
-def test_an_old_request_is_dropped(explorer: Explorer) -> None:
-    assert ask(explorer, "/run", request(explorer, ["J1.w"], turn=7))[0] == 200
-    assert ask(explorer, "/run", request(explorer, ["J1.w"], turn=3))[0] == 204
+def test_a_run_that_nobody_waits_for_ends(explorer: Explorer, capfd: pytest.CaptureFixture[str]) -> None:
+    """Its page has been closed, or wants a newer run; the next one begins at once."""
+    body = json.dumps(request(explorer, ["J1.w"], until=1e9)).encode()
+    head = f"POST /run HTTP/1.1\r\nHost: {explorer.host}\r\nX-Token: {explorer.token}\r\n"
+    for _ in range(3):
+        with socket.create_connection(("127.0.0.1", explorer.server_port)) as left:
+            left.sendall(head.encode() + b"Content-Length: %d\r\n\r\n" % len(body) + body)
+            time.sleep(0.2)
+    begin = time.monotonic()
+    assert ask(explorer, "/run", request(explorer, ["J1.w"]))[0] == 200
+    assert time.monotonic() - begin < 3.0
+    assert capfd.readouterr() == ("", "")
+
+
+def test_connections_without_a_request_hold_few_threads(explorer: Explorer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "_PATIENCE", 1.0)
+    with contextlib.ExitStack() as stack:
+        for k in range(100):
+            half = stack.enter_context(socket.create_connection(("127.0.0.1", explorer.server_port)))
+            half.sendall(b"POST /run HTTP/1.1\r\nHost: a\r\n"[: k % 30])
+        assert threading.active_count() < 30
+        assert ask(explorer, "/run", request(explorer, ["J1.w"]))[0] == 200
+        # A byte from time to time does not keep a place.
+        slow = stack.enter_context(socket.create_connection(("127.0.0.1", explorer.server_port)))
+        begin = time.monotonic()
+        with contextlib.suppress(OSError):
+            while time.monotonic() - begin < 10.0:
+                slow.sendall(b"G")
+                time.sleep(0.1)
+        assert time.monotonic() - begin < 5.0
+
+
+def test_the_secret_is_in_no_command_line(explorer: Explorer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The browser opens a file that only this user can read, and that leads to the page."""
+    opened: list[str] = []
+
+    def browse(address: str) -> None:
+        way = Path(url2pathname(urlsplit(address).path))
+        opened.extend([address, way.read_text()])
+        assert way.parent.stat().st_mode & 0o077 == 0
+
+    monkeypatch.setattr(webbrowser, "open", browse)
+    monkeypatch.setattr(explorer, "serve_forever", lambda: None)
+    explorer.show()
+    assert explorer.token not in opened[0]
+    assert f"url={explorer.address}" in opened[1]
+    assert not Path(url2pathname(urlsplit(opened[0]).path)).exists()
 
 
 def test_sensitivities_follow_the_values(explorer: Explorer) -> None:
@@ -164,6 +223,17 @@ def test_a_slider_moves_the_curves(browser: Any, tmp_path: Path, name: str, slid
             browser.run("document.getElementById('keep').click()")
         browser.run(f"{MOVE}({json.dumps(slider)}, 0.55)")
         assert browser.run("picture.earlier.length") == 6, "five kept runs and the first one"
+
+
+@pytest.mark.browser
+def test_reload_and_a_second_page_work(browser: Any, explorer: Explorer) -> None:
+    for _ in range(3):
+        browser.open(explorer.address)
+        before = browser.run("picture.result.outputs.reduce((a, b) => a + b)")
+        browser.run(f"{MOVE}('J2.J', 0.6)")
+        assert browser.run("picture.result.outputs.reduce((a, b) => a + b)") != before
+        assert ask(explorer, "/run", request(explorer, ["J1.w"]))[0] == 200, "another page"
+    assert [one for one in browser.complaints if not one.startswith(explorer.address[:20])] == []
 
 
 @pytest.mark.browser
@@ -231,11 +301,17 @@ def test_larger_drives_are_explored_without_complaint(browser: Any, tmp_path: Pa
 
 
 @pytest.mark.browser
-def test_what_has_no_gradient_is_told_in_the_page(browser: Any, tmp_path: Path) -> None:
+def test_what_has_no_gradient_is_told_in_the_page(
+    browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        raise NoGradient("No gradient at t = 1 s: it grazes.", advice="Move the parameters.")
+
+    monkeypatch.setattr("modelica_like.explorer.runs.sensitivities", refuse)
     with served("components/h_bridge", tmp_path) as explorer:
         browser.open(explorer.address)
         browser.run("shown.add(PAGE.variables[0]); ask(); document.querySelector('#bars summary').click()")
         found = browser.run(f"{WAIT}(() => document.querySelector('#bars table').textContent)")
-        assert found.startswith("No gradient at t = 0.28 s: load.load changes from empty to reversed")
+        assert found.startswith("No gradient at t = 1 s: it grazes.")
         assert ".py:" not in found
         assert [one for one in browser.complaints if not one.startswith(explorer.address[:20])] == []

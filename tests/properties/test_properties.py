@@ -52,7 +52,7 @@ def test_energy_closes_at_all_times(tree: Tree) -> None:
     # Errors of the integrator's steps may add up. Nothing else may be told.
     assert not [one for one in balance.notices if "drifts" not in one]
     assert balance.imbalance == 0.0, [(one.component, one.imbalance) for one in balance]
-    assert balance.closure < 1e-9
+    assert balance.power_closure < 1e-9
     assert balance.drift < 1e-6
     held = sum(0.5 * J * solution[f"J{k}.w"] ** 2 for k, J in enumerate(tree.J))
     held = held + sum(_stored(solution, tree, number) for number in range(len(tree.joints)))

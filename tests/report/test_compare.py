@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from modelica_like import linearize, sensitivities, simulate, steady
-from modelica_like.errors import ModelicaLikeError, NetlistError
+from modelica_like.errors import ModelicaLikeError, NetlistError, UnitError
 from modelica_like.report.changes import reasons
 from modelica_like.report.compare import Comparison, compare
 from modelica_like.report.files import write_solution
@@ -151,7 +151,7 @@ MESSAGES = {
         ("0,0", "1,1"),
         ("time,x", "0,0"),
         (),
-        "a.csv: the first column of a table of trajectories is `time`.",
+        "a.csv is not a table: it needs a line of names, and lines of numbers.",
     ),
     "times that fall": (("time,x", "1,0", "0,1"), ("time,x", "0,0"), (), "a.csv: the times must increase."),
     "a word": (("time,x", "0,0", "1,fast"), ("time,x", "0,0"), (), "a.csv:3: 'fast' is not a number."),
@@ -199,3 +199,38 @@ def test_what_needs_equations_says_so_of_recorded_data(tmp_path: Path) -> None:
 
 def test_nobody_knows_why_a_mode_of_an_fmu_changes() -> None:
     assert reasons(recorded("clutch", [0.0, 1.0, 1.0], [0.0, 1.0, 1.0], [0, 0, 1])) == [""]
+
+
+FALLING = """[parts]
+mass = { is = "Mass", m = 1, s = 0, v = 0.5 }
+push = { is = "ConstantForce", f_constant = 6 }
+[connect]
+end = ["push.flange", "mass.flange_a"]
+"""
+
+
+def test_values_are_set_in_netlists_and_other_starts_are_told(tmp_path: Path) -> None:
+    """v = v0 + F·t/m, with 2 kg in the table and v0 = 0 there."""
+    (tmp_path / "push.toml").write_text(FALLING)
+    a = tmp_path / "push.toml"
+    b = write(tmp_path / "b.csv", "time,mass.v", "0,0", "0.5,1.5", "1,3")
+    assert compare(a, b, until=1.0)["mass.v"].largest == pytest.approx(3.5, rel=1e-6)
+    comparison = compare(a, b, until=1.0, values={"mass.m": "2000 g"})
+    assert comparison["mass.v"].largest == pytest.approx(0.5, rel=1e-6)
+    (start,) = comparison.starts
+    assert (start.signal, start.first, start.second) == ("mass.v", 0.5, 0.0)
+    assert "They start differently: mass.v at 0.5 and 0 m/s." in shown(comparison)
+    same = compare(a, b, until=1.0, values={"mass.m": 2, "mass.v": 0})
+    assert same.starts == ()
+    assert same["mass.v"].largest < 1e-6
+
+
+def test_values_for_a_system_and_texts_for_an_fmu_are_refused(tmp_path: Path) -> None:
+    a = write(tmp_path / "a.csv", "time,x", "0,0", "1,2")
+    (tmp_path / "drive.fmu").write_bytes(b"")
+    with pytest.raises(UnitError, match="cannot be given x = '3 m'"):
+        compare(tmp_path / "drive.fmu", a, values={"x": "3 m"})
+    system = tmp_path / "system.toml"
+    system.write_text('[fmus]\na = "a.fmu"\n')
+    with pytest.raises(NetlistError, match="No values can be set in the system"):
+        compare(system, a, values={"x": 3})

@@ -229,7 +229,8 @@ def rate(what: Number) -> Number:
 
 
 KNOWN: dict[str, Any] = {
-    "der": rate, "where": lambda holds, then, other: then if holds else other, "negate": lambda holds: not holds,
+    "der": rate, "where": lambda holds, then, other, events=None: then if holds else other,
+    "negate": lambda holds: not holds,
     "all_of": lambda *conditions: all(conditions), "any_of": lambda *conditions: any(conditions),
     "prescribed": lambda what: called("".join(tokens_of(latex_names.name(f"prescribed({what.path})")))),
     "maximum": max, "minimum": min, "absolute": abs, "sign": np.sign, "float": float, "exp": np.exp, "log": np.log,

@@ -1,5 +1,6 @@
 """Notes about what looks like a slip: told for drives that have it, and for no others."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -140,6 +141,17 @@ def test_a_gear_that_makes_a_load_too_fast_is_noticed(ratio: float, notes: int) 
     found = run_notes(drive, simulate(drive, 1.0, start="rest"))
     told = "wheel.rim exceeds its declared bound 100 rad/s: it is 200 rad/s at 0 s."
     assert found == [told] * notes
+
+
+def test_a_bound_exceeded_between_the_results_is_noticed() -> None:
+    """-6 rad cos(20/s t) has 120 rad/s at a quarter of its period; the wheel is at rest at all three results."""
+    parts = {"wall": Fixed(), "spring": Spring(c=2e3), "wheel": Grinder(J=5.0, phi=-6.0, w=0.0)}
+    drive = Assembly("drive", parts=parts, series={"drive": [*parts]})
+    run = simulate(drive, math.pi / 10, points=2)
+    (note,) = run_notes(drive, run)
+    assert note.startswith("wheel.rim exceeds its declared bound 100 rad/s: it is 120 rad/s at 0.0785")
+    run.dense = None
+    assert run_notes(drive, run) == []
 
 
 def test_commands_tell_them_and_go_on() -> None:

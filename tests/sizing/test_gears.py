@@ -14,11 +14,14 @@ from components.sizing import (
     LoadStage,
     gear_life,
     gear_strength,
+    gear_teeth,
     life_factor,
     tooth_form,
 )
+from components.sizing.gear_geometry import internal_form, involute_start
 from components.sizing.gear_life import damage_per_cycle
 from components.sizing.gear_strength import single_contact
+from components.sizing.gear_teeth import centre_distance
 
 ALPHA = pi / 9
 STEEL = GearMaterial(1500e6, 500e6)
@@ -111,14 +114,97 @@ def test_profile_shift_moves_the_centres() -> None:
 
 
 def test_internal_gears() -> None:
-    """The ring curves the other way: (u + 1)/u = 5/6, and its teeth count as those of a rack."""
-    made = gear_strength(GearPair(10, -60, 2e-3, 0.02, 0.5, -0.5), 15.873, STEEL)
-    tips, bases = (26.0, 118.0), (20 * cos(ALPHA), 120 * cos(ALPHA))
-    path = (sqrt(tips[0] ** 2 - bases[0] ** 2) - sqrt(tips[1] ** 2 - bases[1] ** 2)) / 2 + 50 * sin(ALPHA)
+    """The ring curves the other way: (u + 1)/u = 5/6, and its teeth count as those of a rack.
+
+    Z_B is that of the inner point of single contact of the pinion: the curvatures there over those at the pitch point.
+    """
+    pair = GearPair(18, -60, 2e-3, 0.02, 0.5, -0.5)
+    made = gear_strength(pair, 15.873, STEEL)
+    tips, bases = (42.0, 118.0), (36 * cos(ALPHA), 120 * cos(ALPHA))
+    path = (sqrt(tips[0] ** 2 - bases[0] ** 2) - sqrt(tips[1] ** 2 - bases[1] ** 2)) / 2 + 42 * sin(ALPHA)
     assert made.contact_ratio == pytest.approx(path / (2 * pi * cos(ALPHA)), rel=1e-12)
-    hertz = 2.4946 * 189.81 * sqrt((4 - made.contact_ratio) / 3) * sqrt(1587.3 / (20 * 20) * 5 / 6)
-    assert made.contact_stress / 1e6 == pytest.approx(hertz, rel=1e-4)
-    assert made.wheel_form == pytest.approx(2.053 * 2.65)
+    # Radii of curvature 2 of the pinion and of the ring, whose base circles are a·sin(a_w) apart along the line.
+    inner = sqrt(tips[0] ** 2 - bases[0] ** 2) / 2 - 2 * pi * cos(ALPHA)
+    at_pitch, at_inner = (1 / radius - 1 / (radius + 42 * sin(ALPHA)) for radius in (18 * sin(ALPHA), inner))
+    assert made.single_contact == pytest.approx(max(1.0, sqrt(at_inner / at_pitch)), rel=1e-12)
+    hertz = 2.4946 * 189.81 * sqrt((4 - made.contact_ratio) / 3) * sqrt(2 * 15873 / 36 / (36 * 20) * 42 / 60)
+    assert made.contact_stress / 1e6 == pytest.approx(hertz * made.single_contact, rel=1e-4)
+    assert made.wheel_form == pytest.approx(
+        2.053 * 2.65, rel=3e-4
+    )  # GB/T 3480, of a depth of 2.25 and a radius of 0.15
+    assert internal_form(replace(pair, addendum=0.8))[0] < internal_form(pair)[0]
+
+
+def test_the_inner_point_of_an_internal_pair() -> None:
+    """Document 001, long planet and ring: 803 N/mm² at the inner point of single contact, 756 at the pitch point."""
+    pair = GearPair(10, -60, 2e-3, 0.02, 0.5, -0.5)
+    assert gear_strength(pair, 9.62, STEEL).single_contact == pytest.approx(803 / 755.7, abs=1e-3)
+
+
+def cut(teeth: int, shift: float, pair: GearPair) -> float:
+    """Return tan of the pressure angle where an involute begins, by moving the rack past its points in small steps."""
+    radius, tip = teeth / 2, pair.dedendum - shift
+    rho = pair.root_radius
+    rolls = np.linspace(-3, 3, 20001)
+    centre = pi / 4 - pair.dedendum * tan(ALPHA) - (1 - sin(ALPHA)) * rho / cos(ALPHA)
+
+    def survives(tangent: float) -> bool:
+        over = radius * cos(ALPHA) * sqrt(1 + tangent**2)
+        half = (pi / 2 - 2 * shift * tan(ALPHA)) / teeth - (tan(ALPHA) - ALPHA) + tangent - np.arctan(tangent)
+        across, depth = over * np.sin(half + rolls), radius - over * np.cos(half + rolls)
+        across = across - radius * rolls  # to the middle of the rack's tooth; depth below the rolling line
+        inside = np.abs(across) < pi / 4 - (depth + shift) * tan(ALPHA) - 1e-9
+        round_begins = tip - rho * (1 - sin(ALPHA))
+        in_round = np.hypot(np.maximum(np.abs(across) - centre, 0), depth - (tip - rho)) < rho - 1e-9
+        return not bool(np.any(np.where(depth < round_begins, inside, in_round & (depth < tip))))
+
+    low, high = 0.0, 1.0
+    if survives(low):
+        return 0.0
+    for _ in range(30):
+        middle = (low + high) / 2
+        low, high = (low, middle) if survives(middle) else (middle, high)
+    return high
+
+
+@pytest.mark.parametrize(("teeth", "shift"), [(7, 0.0), (10, 0.0), (13, 0.0), (8, 0.2)])
+def test_an_undercut_takes_the_involute_away(teeth: int, shift: float) -> None:
+    pair = GearPair(teeth, 40, 1e-3, 0.01, shift)
+    assert involute_start(pair, teeth, shift) == pytest.approx(cut(teeth, shift, pair), abs=2e-4)
+
+
+def test_an_undercut_shortens_the_contact() -> None:
+    """7 and 40 teeth: 1.49 by the tips, 1.04 above the pinion's base circle, less above what the rack cuts away."""
+    pair = GearPair(7, 40, 1e-3, 0.01)
+    to_base = 7 * pair.tip_over_base(7, 0.0) / (2 * pi)
+    assert to_base == pytest.approx(1.04, abs=5e-3)
+    assert pair.contact_ratio == pytest.approx(to_base - 7 * cut(7, 0.0, pair) / (2 * pi), abs=5e-4)
+    teeth = gear_teeth(pair)
+    assert [one.name for one in teeth.lines() if one.exceeded] == ["contact_ratio", "pinion_shift", "pinion_contact"]
+    assert gear_teeth(GearPair(18, 40, 1e-3, 0.01)).lines()[2].verdict == "ok"
+
+
+def test_teeth_of_document_001() -> None:
+    """Short and long planet: clearance 0.124 modules, tips of the long planet 0.199 modules."""
+    pair = GearPair(10, 13, 2e-3, 0.02, 0.5, 0.3)
+    teeth = gear_teeth(pair)
+    working = acos(11.5 * cos(ALPHA) / (centre_distance(pair) / 2e-3))
+    assert tan(working) - working == pytest.approx(tan(ALPHA) - ALPHA + 1.6 * tan(ALPHA) / 23, rel=1e-9)
+    assert teeth.pinion_clearance / 2e-3 == pytest.approx(centre_distance(pair) / 2e-3 - 6.5 - 5.55, rel=1e-9)
+    assert teeth.pinion_clearance / 2e-3 == pytest.approx(0.124, abs=5e-4)
+    at_tip = acos(10 * cos(ALPHA) / 13)
+    thick = 13 * ((pi / 2 + tan(ALPHA)) / 10 + tan(ALPHA) - ALPHA - tan(at_tip) + at_tip)
+    assert teeth.pinion_tip / 2e-3 == pytest.approx(thick, rel=1e-9)
+    assert teeth.pinion_tip / 2e-3 == pytest.approx(0.20, abs=5e-3)
+
+
+def test_internal_pairs_with_few_teeth_difference() -> None:
+    """KHK, Gear Technical Reference: nine teeth of difference at least for standard teeth; 13.1683 mm."""
+    for pinion in (30, 40, 60):
+        passes = [bool(gear_teeth(GearPair(pinion, -pinion - more, 1e-3, 0.01)).tips_pass) for more in (7, 8, 9, 10)]
+        assert passes == [False, False, True, True]
+    shifted = GearPair(16, -24, 3e-3, 0.03, 0.0, -0.5)
+    assert centre_distance(shifted) == pytest.approx(13.1683e-3, abs=5e-8)
 
 
 def test_the_direction_of_the_torque_does_not_matter() -> None:

@@ -63,6 +63,7 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "gear_strength": (given(pair=PAIR, torque=150.0, material=GearMaterial(1500e6, 461e6), application=1.25,
                             dynamic=1.1, face_load=1.2, transverse_load=1.1, flank_life=0.9, root_life=0.9,
                             flank_influence=0.95, root_influence=0.95, pinion_reversal=0.7), {}),
+    "gear_teeth": (given(pair=PAIR, required_ratio=1.2, required_tip=0.3, required_clearance=0.15), {}),
     "gear_life": (given(strength=STRENGTH, wheel_cycles=0.4, spectrum=[LoadStage(4.0, 1e4), LoadStage(2.0, 1e6)]), {}),
     "bearing_life": (given(radial_load=150.0, speed=139.6, dynamic_rating=2600.0, static_rating=1060.0,
                           speed_limit=3351.0, exponent=3.0, axial_load=10.0, radial_factor=0.56, axial_factor=1.6), {}),

@@ -2,7 +2,8 @@
 
 import math
 from itertools import pairwise
-from typing import NoReturn
+from types import SimpleNamespace
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -258,7 +259,12 @@ def test_what_switches_most_is_told_with_three_of_its_places():
     often = [Event(0.1 * k, "relay.mode", *pair, place) for k, (pair, place) in enumerate(
         zip([("on", "off"), ("off", "on")] * 2, places, strict=True)
     )]  # fmt: skip
-    told = chattering([*often, Event(0.5, "clutch.mode", "free", "stuck", Source("other.py", 1))], "it does", "stop")
+    model: Any = SimpleNamespace(
+        discrete_position={"relay.mode": 0}, flat_discretes=[SimpleNamespace(hysteresis="")], name="drive"
+    )
+    told = chattering(
+        model, [*often, Event(0.5, "clutch.mode", "free", "stuck", Source("other.py", 1))], "it does", "stop"
+    )
     assert told.what == "relay.mode switched 4 times in t = 0…0.3 s (on ⇄ off)."
     assert told.where == tuple(places[:3])
 

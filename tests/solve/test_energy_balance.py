@@ -64,7 +64,7 @@ def test_the_energies_of_a_part_of_a_run() -> None:
         left = np.exp(-1.6 * np.array(cuts))
         np.testing.assert_allclose([one["oil"].lost for one in parts], -0.25 * 9 * np.diff(left), rtol=1e-7)
         np.testing.assert_allclose([one["J"].stored for one in parts], 0.25 * 9 * np.diff(left), rtol=1e-7)
-        assert max(one.closure for one in parts) < 1e-9
+        assert max(one.power_closure for one in parts) < 1e-9
     with pytest.raises(ValueOutOfRange, match=r"2\.5"):
         run.energy(1.0, 2.5)
 
@@ -101,7 +101,7 @@ def test_the_drift_is_that_of_the_run_whatever_its_results(name: str) -> None:
         # Runs with other results differ within their tolerance themselves.
         assert balance.lost == pytest.approx(fine.lost, abs=20 * run.options.rtol * fine.throughput)
         assert balance.source == pytest.approx(fine.source, abs=20 * run.options.rtol * fine.throughput)
-        assert balance.closure <= 1e-12
+        assert balance.power_closure <= 1e-12
 
 
 def test_a_drive_that_idas_gives_up_at_a_higher_precision_has_a_balance(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_a_model_without_states(points: int) -> None:
     """With 13 results the power seems to change thirteen times as slowly as it does."""
     balance = simulate(Cycle(), 1.0, points=points).energy()
     assert balance.lost == pytest.approx(3 * (0.5 - np.sin(80.0) / 160), rel=1e-7)
-    assert balance.closure < 1e-12
+    assert balance.power_closure < 1e-12
 
 
 @pytest.mark.parametrize(("bound", "most"), [("_PIECE", 40), ("_LARGEST", 1)])

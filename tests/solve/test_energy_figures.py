@@ -29,12 +29,12 @@ def test_efficiency_is_what_loads_take_over_what_sources_and_stores_give() -> No
 
 
 def test_the_largest_error_counts() -> None:
-    assert BALANCE.closure == pytest.approx(12e-3 / 120)  # at the connections
-    assert EnergyBalance((SPRING, replace(BRAKE, inflow=20.0)), 120.0).closure == pytest.approx(6e-3 / 120)
+    assert BALANCE.power_closure == pytest.approx(12e-3 / 120)  # at the connections
+    assert EnergyBalance((SPRING, replace(BRAKE, inflow=20.0)), 120.0).power_closure == pytest.approx(6e-3 / 120)
     assert BALANCE.drift == pytest.approx(2e-3 / 120)
     assert EnergyBalance((SPRING,), 0.0).drift == 2e-3
-    assert EnergyBalance((replace(SPRING, inflow=0.0),), 0.0).closure == 3e-3
-    assert EnergyBalance((), 0.0).closure == EnergyBalance((), 0.0).drift == EnergyBalance((), 0.0).imbalance == 0
+    assert EnergyBalance((replace(SPRING, inflow=0.0),), 0.0).power_closure == 3e-3
+    assert EnergyBalance((), 0.0).power_closure == EnergyBalance((), 0.0).drift == EnergyBalance((), 0.0).imbalance == 0
     one, other = replace(MOTOR, imbalance=0.1), replace(LOAD, imbalance=0.2)
     assert EnergyBalance((one, other), 120.0).imbalance == EnergyBalance((other, one), 120.0).imbalance == 0.2
 

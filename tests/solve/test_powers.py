@@ -87,7 +87,7 @@ def test_runs_between_results_are_more_precise(
     """Ten times as precise, but not below 1e-12; absolute tolerances go with it."""
     given: list[Any] = []
     monkeypatch.setattr(powers, "Integrator", lambda *args, **how: given.append((args, how)))
-    model: Any = object()
+    model: Any = SimpleNamespace(components=())
     made = Powers(model, Options(rtol=rtol, atol=1e-9), count)
     (((same, options), how),) = given
     assert same is model

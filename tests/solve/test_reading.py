@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from components import Clutch, Inertia
-from modelica_like import Assembly, simulate
+from modelica_like import Assembly, build, simulate
 from modelica_like.initialize import call
 from modelica_like.language import Component
 from modelica_like.solve import reading, solution
@@ -78,3 +78,13 @@ def test_whatever_is_read_and_in_whatever_blocks_it_is_what_each_result_gives(mo
         np.testing.assert_allclose([found[name] for name in names], every[:3], rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(fresh["right.w"], every[model.position["right.w"]], rtol=1e-12, atol=1e-12)
         assert ("variables" in fresh._cache) == (together == len(points) * len(every))
+
+
+def test_twins_of_a_model_read_by_the_same_symbols() -> None:
+    """What one of them has in the cache is read by the other."""
+    parts: dict[str, Component] = {"left": Inertia(J=1.0, phi=0.0, w=3.0), "right": Inertia(J=2.0)}
+    model = build(Assembly(parts=parts, series={"line": ["left", "right"]}))
+    first, second = model.twin(), model.with_parameters({"left.J": 2.0})
+    run = simulate(first, 1.0, points=2)
+    for one, name, expected in ((first, "right.phi", [0.0, 1.5, 3.0]), (second, "right.w", [3.0, 3.0, 3.0])):
+        assert variables(one, run.segments, [model.position[name]])[0] == pytest.approx(expected)

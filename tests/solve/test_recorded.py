@@ -81,7 +81,7 @@ def test_energies_are_integrals_of_columns() -> None:
     assert (balance.source, balance.lost, balance.stored) == (28.0, 16.0, 4.0)
     assert {row.component: row.inflow for row in balance} == {"motor": -28.0, "brake": 16.0, "wheel": 4.0}
     assert balance.throughput == 48.0
-    assert balance.closure == pytest.approx(8 / 48)
+    assert balance.power_closure == pytest.approx(8 / 48)
     assert {(row.at_events, row.residual, row.drift, row.impact) for row in balance} == {(0.0,) * 4}
     assert {(row.imbalance, row.imbalance_time, row.gain, row.gain_time) for row in balance} == {(0.0,) * 4}
     assert recorded("wheel.stored_energy").energy().throughput == 4.0

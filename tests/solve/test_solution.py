@@ -68,7 +68,7 @@ def test_every_variable_of_the_unreduced_model_is_there(run):
         "clutch.w_rel",
         "clutch.f_normalized",
     ]
-    assert set(run.names) == {*flanges, *own, "clutch.mode"}
+    assert set(run.names) == {*flanges, *own, "clutch.mode", "clutch.command"}
     for name in run.names:
         assert run[name].shape == run.time.shape
         assert name in run
@@ -276,7 +276,8 @@ def test_a_second_run_with_other_values_builds_nothing(monkeypatch):
     """An IDAS instance is kept for every number of results at once (powers of two), also for later values."""
     model = build(Drive())
     first = simulate(model, 2.0, points=8)
-    simulate(model, 2.0, points=8, parameters={"grip": 9.0})
+    for other in ({"grip": 9.0}, {"grip": 11.0, "left.J": 2.1}):  # all numbers of looks that are needed
+        simulate(model, 2.0, points=8, parameters=other)
     built = len(model._cache)
     for module in (
         "modelica_like.simulation.flatten",

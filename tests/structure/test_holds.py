@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modelica_like.structure.holds import Circuit, HeldMotion, find_circuits
-from modelica_like.structure.system import System
+from modelica_like.structure.system import Level, System
 
 
 def held(motion: int, *, reaction: int = 0, rigid: bool = True) -> HeldMotion:
@@ -24,7 +24,9 @@ def circuits(motions: np.ndarray, holds: list[HeldMotion], explicit: bool = Fals
     mode = ca.SX.sym("d", 3)
     model: Any = SimpleNamespace(p=ca.SX(0, 1), parameters=[], d=mode, discretes=[], time=ca.SX.sym("t"))
     values = ca.mtimes(ca.SX(ca.DM(motions)), unknowns if explicit else states)
-    made = System(model, [], [], [*ca.vertsplit(states)], ca.SX(0, 1), [], [], values)
+    levels = [Level(k, 0, f"x_{k}", 1, 1.0, 0.0) for k in range(size)]
+    chains = [[k] for k in range(size)]
+    made = System(model, levels, chains, [*ca.vertsplit(states)], ca.SX(0, 1), [], [], values)
     order = [(y, 2 * x) for x, y in zip(ca.vertsplit(states), ca.vertsplit(unknowns), strict=True)] if explicit else []
     return find_circuits(made, tuple(holds), order, list(range(size)))
 

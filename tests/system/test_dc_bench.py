@@ -139,7 +139,7 @@ def test_switch_on_is_the_motion_written_out(rise: str) -> None:
     assert run.energy()["clutch"].lost == pytest.approx(reference.slip_energy, rel=2e-6)
     assert reaches(run, 0.98) == pytest.approx(reference.reaches(0.98), rel=3e-5)
     assert run.final["flywheel.w"] == pytest.approx(reference.w_end, rel=1e-6)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 def test_switch_on_with_exponential_rise() -> None:

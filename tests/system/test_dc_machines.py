@@ -114,7 +114,7 @@ def test_electrical_power_is_mechanical_power(kind: str) -> None:
     np.testing.assert_allclose(
         run["machine.tau_electrical"] * run["machine.w"], run["machine.v_induced"] * run["machine.ia"], rtol=1e-12
     )
-    assert run.energy().closure < 1e-9
+    assert run.energy().power_closure < 1e-9
 
 
 STALL = {

@@ -42,7 +42,7 @@ def test_numbers(case: Any) -> None:
     for number in (number for number in case.numbers if number.published is not None):
         # The documents calculate with truncated intermediate results: up to 0.22 % off.
         assert number.computed(runs) == pytest.approx(number.published, rel=3e-3), number.name
-    assert runs.whole.energy().closure < 1e-8
+    assert runs.whole.energy().power_closure < 1e-8
 
 
 def test_pages_tell_everything_and_pictures_are_written(tmp_path: Path) -> None:

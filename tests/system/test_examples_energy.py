@@ -17,7 +17,7 @@ def test_energy_closes(path: Path) -> None:
     drive = load(path)
     run = simulate(drive, None if "until" in drive.simulate else 2.0)
     balance = run.energy()
-    assert balance.closure <= 1e-8
+    assert balance.power_closure <= 1e-8
     for row in balance:
         assert abs(row.residual) <= 1e-8 * balance.throughput, row
         losses = run[f"{row.component}.loss_power"]

@@ -248,7 +248,7 @@ def test_friction_work_of_the_shifts(run: Solution, report: ShiftReport) -> None
         assert sum(works) == pytest.approx(balance[f"box.{name}"].lost, rel=1e-4)
     assert report.work == pytest.approx(sum(balance[f"box.{name}"].lost for name in ELEMENTS.values()), rel=1e-5)
     assert [row.gear for row in report.shifts if row.element == "clutch_e"] == ["4", "5"]
-    assert balance.closure < 1e-9
+    assert balance.power_closure < 1e-9
     assert balance.drift < 1e-6
 
 
@@ -309,4 +309,4 @@ def test_losses_in_the_meshes(run: Solution) -> None:
     drive.set("box.mesh_efficiency", 0.99)
     lossy = simulate(drive)
     assert 0.97 * run.final["car.w"] < lossy.final["car.w"] < run.final["car.w"]
-    assert lossy.energy().closure < 1e-9
+    assert lossy.energy().power_closure < 1e-9

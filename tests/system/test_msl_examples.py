@@ -208,7 +208,7 @@ def test_the_number_of_results_does_not_decide_what_happens(example: str, points
 
 @pytest.mark.parametrize(("folder", "example"), ALL)
 def test_energy_closes(folder: str, example: str) -> None:
-    assert run(folder, example).energy().closure <= 1e-8
+    assert run(folder, example).energy().power_closure <= 1e-8
 
 
 @pytest.mark.parametrize("element", ["elastoBacklash", "elastoBacklash2"])

@@ -30,7 +30,7 @@ def distance(one: Solution, other: Solution) -> float:
 @pytest.mark.parametrize("rtol", [*TOLERANCES, FINEST])
 @pytest.mark.parametrize("name", DRIVES)
 def test_the_balance_closes(name, rtol):
-    assert run(name, rtol).energy().closure < 1e-12
+    assert run(name, rtol).energy().power_closure < 1e-12
 
 
 ADDED_UP = {("lossy_gear", 1e-9): 20, ("lossy_gear", FINEST): 20}

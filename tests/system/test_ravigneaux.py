@@ -121,7 +121,7 @@ def test_all_gears(gear: str, speed: float) -> None:
     assert ring * run.final["machine.w"] == pytest.approx(
         run.final["motor.flange.tau"] * run.final["motor.w"], rel=1e-7
     )
-    assert run.energy().closure < 1e-9
+    assert run.energy().power_closure < 1e-9
 
 
 def test_direct_gear_does_not_roll() -> None:
@@ -155,5 +155,5 @@ def test_direct_gear_has_no_losses() -> None:
 
 def test_losses_close_the_energy_balance() -> None:
     balance = in_gear("2", 0.98).energy()
-    assert balance.closure < 1e-9
+    assert balance.power_closure < 1e-9
     assert sum(balance[f"planets.{part}"].lost for part in ("small", "large", "long_planet")) > 0

@@ -35,7 +35,7 @@ def test_the_clutch_locks_after_slipping(run: Solution) -> None:
     speed = 1500 * 2 * np.pi / 60
     # The shaft swings a little, so the lock-up is near, not at, the time of the rigid drive.
     assert run.events[0].time == pytest.approx(inertia * speed / 25, rel=0.05)
-    assert run.energy().closure < 1e-8
+    assert run.energy().power_closure < 1e-8
 
 
 @pytest.mark.slow

@@ -74,7 +74,7 @@ def test_stop_by_hand() -> None:
 
 
 def test_energy_closes() -> None:
-    assert run().energy().closure < 1e-10
+    assert run().energy().power_closure < 1e-10
 
 
 def test_cut_below_the_rope(tmp_path: Path) -> None:

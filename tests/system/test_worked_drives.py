@@ -153,7 +153,7 @@ def test_gradient_is_the_slope_of_runs(name: str, of: str, to: str, value: float
 
 @pytest.mark.parametrize("name", ["launch", "servo_axis"])
 def test_energy_closes(name: str) -> None:
-    assert run(name).energy().closure < 1e-12
+    assert run(name).energy().power_closure < 1e-12
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modelica_like.errors import UnitError, ValueOutOfRange
+from modelica_like.language.formula import parse_formula
 from modelica_like.units import ANY, ONE, Unit, coherent, in_unit, parse_unit, read_quantity, same_dimension, to_si
 from modelica_like.units.atoms import ATOMS, BASE, PINT_NAMES, find_atom, pint_registry
 
@@ -106,6 +107,10 @@ def test_products_keep_the_declared_names() -> None:
     ("text", "message"),
     [
         ("Nm", "Unknown unit 'Nm'; did you mean 'N.m'?"),
+        ("U/min", "Unknown unit 'U' in 'U/min'; did you mean 'rpm'?"),
+        ("tr/min", "Unknown unit 'tr' in 'tr/min'; did you mean 'rpm'?"),
+        ("U/s", "Unknown unit 'U' in 'U/s'; did you mean 'rev/s'?"),
+        ("Upm", "Unknown unit 'Upm'; did you mean 'rpm'?"),
         ("kgm2", "Unknown unit 'kgm' in 'kgm2'; did you mean 'kg.m2'?"),
         ("N.radn", "Unknown unit 'radn' in 'N.radn'; did you mean 'N.rad'?"),
         ("J/kg.K", "'J/kg.K' is ambiguous: put everything after the '/' in parentheses, as in J/(kg.K)."),
@@ -214,6 +219,8 @@ def test_values_in_si(value: object, unit: str, si: float) -> None:
     [
         ("8.5 kg.cm", "kg.m2", "Inertia.J expects kg.m2; '8.5 kg.cm' is kg.m."),
         ("3 min", "m", "Inertia.J expects m; '3 min' is s."),
+        ("100 U/min", "rad/s", "Inertia.J = '100 U/min': Unknown unit 'U' in 'U/min'; did you mean 'rpm'?"),
+        ("\uff11\uff12 kg", "rad/s", "Inertia.J expects rad/s; '\uff11\uff12 kg' is kg."),
         ("3 Nm", "N.m", "Inertia.J = '3 Nm': Unknown unit 'Nm'; did you mean 'N.m'?"),
         (
             "6000 1/min",
@@ -264,3 +271,10 @@ def test_units_pickle_and_hash() -> None:
     unit = parse_unit("N.m/s")
     assert pickle.loads(pickle.dumps(unit)) == unit
     assert len({unit, parse_unit("N.m/s")}) == 1
+
+
+@pytest.mark.parametrize("text", ["\uff11\uff12 rad/s", "1\uff12 rad/s", "\u0661\u0662 rad/s"])
+def test_digits_of_other_scripts_are_digits(text: str) -> None:
+    """Full-width ones, as Japanese keyboards write them; they ended in a TypeError."""
+    assert to_si(text, parse_unit("rad/s"), "x") == 12.0
+    assert str(parse_formula(f"{text} + 1 rad/s")) == "12 rad/s + 1 rad/s"

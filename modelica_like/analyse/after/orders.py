@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from modelica_like.analyse.linear.model import LinearModel
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import ValueOutOfRange
+from modelica_like.runs.results import along
 from modelica_like.solve.style import COLOURS, picture, with_unit
 from modelica_like.solve.trajectories import Trajectories
 
@@ -137,27 +138,32 @@ def order_map(run: Trajectories, signal: str, angle: str, *, most: float = 10.0,
     """Return the orders of a signal during a run: its spectra over the angle, in windows of some revolutions (Hann).
 
     Args:
-        run: a run whose results follow the fastest order.
+        run: a run, or a measured table whose rows follow the fastest order.
         signal: path of a torque, speed or acceleration.
         angle: path of the angle that the orders count.
         most: highest order.
         revolutions: length of a window; orders closer than twice its inverse are not told apart.
 
     Raises:
-        ValueOutOfRange: the shaft turns back, or too little, or the results are too far apart.
+        ValueOutOfRange: the shaft turns back, or too little, or the rows are too far apart.
         UnknownName: there is no such variable.
+        MissingValue: the run has not kept what happens between its results.
     """
-    time, values, phi = run.time, run[signal], np.abs(run[angle] - run[angle][0]) / (2 * np.pi)
-    if np.any(np.diff(phi) < -1e-9 * (phi[-1] or 1.0)) or phi[-1] < revolutions:
+    curves, unit = along(run, run.path(signal), run.path(angle))
+    turned = curves.values[1] - curves.values[1, 0, 0]
+    phi = turned * np.sign(turned[-1, -1]) / (2 * np.pi)
+    end = float(phi[-1, -1])
+    if np.any(np.diff(phi, append=phi[:, -1:]) < -1e-9 * (end or 1.0)) or end < revolutions:
         raise ValueOutOfRange(f"{angle} does not turn {revolutions:g} times in one direction.")
     per_turn = 4 * int(np.ceil(most))
-    apart = float(np.diff(phi).max())
+    apart = float((phi[:, -1] - phi[:, 0]).max()) if run.measured else 0.0
     if apart > 0.5 / most:
-        what = f"The results are up to {apart:.3g} revolutions apart, and order {most:g} needs {0.5 / most:.3g}."
-        raise ValueOutOfRange(what, advice="Simulate with more points, or ask for lower orders.")
+        what = f"The rows are up to {apart:.3g} revolutions apart, and order {most:g} needs {0.5 / most:.3g}."
+        raise ValueOutOfRange(what, advice="Measure more often, or ask for lower orders.")
     size = int(revolutions * per_turn)
-    grid = np.arange(0, phi[-1], 1 / per_turn)
-    even, moments = np.interp(grid, phi, values), np.interp(grid, phi, time)
+    grid = np.arange(0, end, 1 / per_turn)
+    pieces, places = replace(curves, values=phi[None]).places(0, grid)
+    even, moments = curves.at(0, pieces, places), curves.times(pieces, places)
     begins = np.arange(0, len(grid) - size + 1, max(size // 4, 1))
     window = np.hanning(size + 1)[:-1]
     spectra = np.array([np.abs(np.fft.rfft(window * even[k : k + size])) * 2 / window.sum() for k in begins]).T
@@ -165,6 +171,5 @@ def order_map(run: Trajectories, signal: str, angle: str, *, most: float = 10.0,
     orders: Any = np.fft.rfftfreq(size, 1 / per_turn)
     first, last = moments[begins], moments[begins + size - 1]
     speeds = 2 * np.pi * (size - 1) / per_turn / (last - first)
-    unit = {one.path: str(one.unit) for one in run.model.flat_variables}.get(run.path(signal), "1")
     kept = orders <= most
     return OrderMap(run.path(signal), unit, orders[kept], (first + last) / 2, speeds, spectra[kept])

@@ -9,6 +9,8 @@ import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import ValueOutOfRange, extra_module
+from modelica_like.runs.polynomials import WEIGHTS
+from modelica_like.runs.results import along
 from modelica_like.solve.style import COLOURS, picture, with_unit
 from modelica_like.solve.trajectories import Trajectories
 
@@ -100,20 +102,22 @@ class LoadSpectrum:
 def load_spectrum(run: Trajectories, load: str) -> LoadSpectrum:
     """Count the cycles of a load by rainflow counting (ASTM E1049-85), with what is left over as half cycles.
 
-    Turning points are those of the results: a run with more `points` finds peaks more sharply.
+    Turning points are those between the results, too; a measured table has no others.
 
     Args:
-        run: a run.
-        load: path of a torque, force or stress.
+        run: a run of this tool, or a measured table.
+        load: path of a torque, force or stress, or a formula.
 
     Raises:
         MissingExtra: the package rainflow is not installed.
         UnknownName: there is no such variable.
+        MissingValue: the run has not kept what happens between its results.
     """
     rainflow = extra_module("rainflow", "analyse")
-    found = sorted(rainflow.extract_cycles(run[load].tolist()), key=lambda cycle: -cycle[0])
+    curve, unit = along(run, run.path(load))
+    found = sorted(rainflow.extract_cycles(curve.turning(0).tolist()), key=lambda cycle: -cycle[0])
     table = np.array([cycle[:3] for cycle in found], float).reshape(-1, 3)
-    return LoadSpectrum(run.path(load), _unit(run, load), table[:, 0] / 2, table[:, 1], table[:, 2])
+    return LoadSpectrum(run.path(load), unit, table[:, 0] / 2, table[:, 1], table[:, 2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,31 +174,27 @@ def duty(run: Trajectories, torque: str, speed: str, gear: str = "", classes: in
     Raises:
         ValueOutOfRange: there is no class.
         UnknownName: there is no such variable.
+        MissingValue: the run has not kept what happens between its results.
     """
     if classes < 1:
         raise ValueOutOfRange(f"A duty needs at least one class of torque, not {classes}.")
-    widths = np.diff(run.time)
-    size, turning, power = np.abs(run[torque]), np.abs(run[speed]), run[torque] * run[speed]
-    middle = [(values[1:] + values[:-1]) / 2 for values in (size, turning, power)]
-    top = float(middle[0].max(initial=0.0)) or 1.0
-    which = np.minimum((middle[0] / top * classes).astype(int), classes - 1)
-    # Between two results the gear is that of the first one: at an event both sides are in the results.
-    engaged = run[gear][:-1] if gear else np.zeros(len(widths))
-    values, row = np.unique(engaged, return_inverse=True)
+    curves, _ = along(run, *map(run.path, (torque, speed, *[gear][: len(gear)])))
+    weights = (WEIGHTS * (curves.ends - curves.begins)[:, None]).ravel()
+    values = curves.values.reshape(len(curves.values), -1)
+    size, turning, power = np.abs(values[0]), np.abs(values[1]), values[0] * values[1]
+    top = float(size.max(initial=0.0)) or 1.0
+    which = np.minimum((size / top * classes).astype(int), classes - 1)
+    engaged = values[2] if gear else np.zeros(len(weights))
+    gears, row = np.unique(engaged, return_inverse=True)
 
-    def sorted_by(weights: Vector) -> Vector:
-        made = np.zeros((len(values), classes))
-        np.add.at(made, (row, which), weights * widths)
+    def sorted_by(amounts: Vector) -> Vector:
+        made = np.zeros((len(gears), classes))
+        np.add.at(made, (row, which), amounts * weights)
         return made
 
     torques = top * np.arange(1, classes + 1) / classes
-    return Duty(run.path(torque), _gears(run, gear, values), torques, sorted_by(np.ones(len(widths))),
-                sorted_by(middle[1] / (2 * np.pi)), sorted_by(middle[2]))  # fmt: skip
-
-
-def _unit(run: Trajectories, path: str) -> str:
-    named = {one.path: str(one.unit) for one in (*run.model.flat_variables, *run.model.flat_discretes)}
-    return named.get(run.path(path), "1")
+    return Duty(run.path(torque), _gears(run, gear, gears), torques, sorted_by(np.ones(len(weights))),
+                sorted_by(turning / (2 * np.pi)), sorted_by(power))  # fmt: skip
 
 
 def _gears(run: Trajectories, gear: str, values: Vector) -> tuple[str, ...]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from modelica_like.errors import ValueOutOfRange
+from modelica_like.runs.results import along
 from modelica_like.solve.trajectories import Trajectories
 
 _ROUNDING = 1e-9
@@ -46,7 +47,7 @@ def step_metrics(
     run: Trajectories, variable: str, *, start: float = 0.0, until: float = np.inf, end: float | None = None,
     band: float = 0.02,
 ) -> StepMetrics:  # fmt: skip
-    """Measure a step response; between results it is a straight line.
+    """Measure a step response; the results have no influence. A measured table is straight lines between its rows.
 
     Args:
         run: a run.
@@ -59,37 +60,27 @@ def step_metrics(
     Raises:
         ValueOutOfRange: it goes nowhere, does not get there, or does not settle.
         UnknownName: there is no such variable.
+        MissingValue: the run has not kept what happens between its results.
     """
-    kept = (run.time >= start) & (run.time <= until)
-    time, values = run.time[kept] - start, run[variable][kept]
-    if len(time) < 2:
+    curve = along(run, run.path(variable))[0].within(start, until)
+    if not len(curve.begins):
         raise ValueOutOfRange(f"The run has no results between {start:g} s and {until:g} s.")
-    begin = float(values[0])
-    way = (float(values[-1]) if end is None else end) - begin
+    values = curve.values[0]
+    begin = float(values[0, 0])
+    way = (float(values[-1, -1]) if end is None else end) - begin
     if not way:
         raise ValueOutOfRange(f"{variable} ends where it begins, at {begin:g}: this is no step response.")
     share = (values - begin) / way
-
-    def reached(level: float) -> float:
-        after = int(np.argmax(share >= level))
-        if share[after] < level:
-            raise ValueOutOfRange(f"{variable} does not get {100 * level:g} % of its way to {begin + way:g}.")
-        return float(_crossing(time, share, after, level)) if after else 0.0
-
-    outside = np.flatnonzero(np.abs(share - 1) > band)
-    last = int(outside[-1]) + 1 if len(outside) else 0
-    if last == len(time):
+    above = replace(curve, values=np.array([share - 0.1, share - 0.9, share - 1 - band, 1 - band - share]))
+    outside = np.nanmax([above.last(2), above.last(3), start])
+    if outside >= curve.ends[-1]:
         raise ValueOutOfRange(f"{variable} does not settle within {100 * band:g} % of its way.")
-    settled = _crossing(time, np.abs(share - 1), last, band) if last else 0.0
-    peak = int(np.argmax(share))
-    over = float(share[peak]) - 1
+    reached = [above.first(0), above.first(1)]
+    for level, moment in zip((0.1, 0.9), reached, strict=True):
+        if np.isnan(moment):
+            raise ValueOutOfRange(f"{variable} does not get {100 * level:g} % of its way to {begin + way:g}.")
+    over, peak = replace(curve, values=share[None] - 1).largest(0)
     return StepMetrics(
-        run.path(variable), begin, begin + way, reached(0.9) - reached(0.1), over if over > _ROUNDING else 0.0,
-        float(time[peak]), float(settled), band,
+        run.path(variable), begin, begin + way, reached[1] - reached[0], over if over > _ROUNDING else 0.0,
+        peak - start, float(outside) - start, band,
     )  # fmt: skip
-
-
-def _crossing(time: np.ndarray, values: np.ndarray, after: int, level: float) -> float:
-    """Return when a straight line between two results meets a level."""
-    before = after - 1
-    return time[before] + (level - values[before]) / (values[after] - values[before]) * (time[after] - time[before])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -128,9 +129,16 @@ def calibrate(
         MissingExtra: scipy is not installed.
     """
     model = build(drive, free=parameters)
-    measured = [data] if isinstance(data, Measurement) else list(data)
+    measured = [data] if isinstance(data, Measurement | str | Path) else list(data)
     if not measured or not parameters:
         raise ValueOutOfRange("A calibration needs data and at least one parameter.")
+    for one in measured:
+        if not isinstance(one, Measurement):
+            raise ValueOutOfRange(
+                f"{one!r} is no measurement.",
+                advice='Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the '
+                "uncertainties.",
+            )
     problem = _Problem(model, measured, parameters)
     begins = problem.starts(guess or {}, starts, seed)
     found: list[Any] = []

@@ -12,10 +12,10 @@ import numpy as np
 
 from modelica_like.analyse.operating.steady import OperatingPoint, steady, steady_slopes
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
-from modelica_like.analyse.sensitivity.outputs import read_output
-from modelica_like.analyse.sensitivity.readings import quick_run
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.runs.readings import read_output
+from modelica_like.simulation import quick_run
 from modelica_like.solve.measured import read_columns, title_and_unit
 from modelica_like.units import Unit, parse_unit, to_si
 
@@ -57,7 +57,7 @@ class Numbers(Measurement):
         wanted = np.array([to_si(v, o.unit, o.name) for v, o in zip(self.values.values(), outputs, strict=True)])
         pairs = zip(outputs, wanted, strict=True)
         sizes = np.array([_uncertainty(self.uncertainty, one.name, one.unit, value) for one, value in pairs])
-        run = quick_run(model, until=self.until, parameters=self.parameters)
+        run = quick_run(model, until=self.until, parameters=self.parameters, readings=[*self.values])
         found = sensitivities(run, list(self.values), names)
         now = np.array([one.value for one in found.outputs])
         return (now - wanted) / sizes, found.derivatives / sizes[:, None], list(self.values)

@@ -224,6 +224,11 @@ def replay(
         )
     if TERMINAL in model.discrete_position:
         raise NoGradient(f"No gradient: {model.name} changes at the end of a run, by terminal().")
+    if (ended := solution.ended) is not None:
+        raise NoGradient(
+            f"No gradient: {ended.component} ends the run at {ended.time:.9g} s, and this time depends on parameters.",
+            advice="End the run before, or compare other values by a sweep, which has the numbers at each end.",
+        )
     model.refuse_delays(NoGradient, f"No gradient of {model.name}")
     integrands = ca.SX(0, 1) if quadratures is None else quadratures
     chain = Replay(StepFunctions(model, integrands, name, tolerances or Tolerances()))

@@ -47,9 +47,12 @@ class Kinks:
         return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
     def passed(self, before: Vector, after: Vector) -> Any:
-        """Which kinks lie between two points (or rows of points), without kinks at the points themselves."""
+        """Which kinks lie between two points (or rows of points), but not at the first of them.
+
+        An event may follow so closely that its point is at the kink but for rounding: slopes there are those behind it.
+        """
         zero = self._zero if before.ndim == 1 else self._zero[:, None]
-        return (before * after < 0.0) & (np.abs(before) > zero) & (np.abs(after) > zero)
+        return (before * after < 0.0) & (np.abs(before) > zero)
 
     def seen(self) -> Vector:
         """Times of the first results of the run behind each kink, in s."""
@@ -70,14 +73,14 @@ def _switches(model: CompiledDae) -> ca.Function:
     found: dict[str, Any] = {}
     if any(equations.instruction_id(k) in (*_DIFFERENCES, *_ZEROS) for k in range(equations.n_instructions())):
         moving = ca.vertcat(*(model.arguments[name] for name in "txz"))
-        for one in _arguments(equations, given):
+        for one in arguments_of_kinks(equations, given):
             if ca.depends_on(one, moving):
                 found.setdefault(str(one), one)
     return ca.Function("kinks", given, [ca.densify(ca.SX(ca.vertcat(*found.values())))])
 
 
-def _arguments(function: ca.Function, given: list[Any]) -> list[Any]:
-    """Evaluate a function by its instructions; collect the arguments of its operations with a kink."""
+def arguments_of_kinks(function: ca.Function, given: list[Any]) -> list[Any]:
+    """Return the arguments of the operations with a kink in a function: it is evaluated by its instructions."""
     work: dict[int, Any] = {}
     found: list[Any] = []
     for k in range(function.n_instructions()):

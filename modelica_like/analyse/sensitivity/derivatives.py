@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, get_args
 
@@ -11,8 +11,9 @@ import numpy as np
 from modelica_like.analyse.replay.chain import Replay, replay
 from modelica_like.analyse.replay.edges import Edge, edges
 from modelica_like.analyse.replay.steps import Tolerances
+from modelica_like.analyse.sensitivity.at_instants import at_instants
+from modelica_like.analyse.sensitivity.at_kinks import Candidate, Sides, kinks, natural_size
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
-from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_output
 from modelica_like.analyse.sensitivity.replayed import read_off, value_at
 from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.analyse.sensitivity.result import Sensitivities as Sensitivities
@@ -20,11 +21,14 @@ from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, NoGradient, UnknownName, did_you_mean
 from modelica_like.initialize import StartKind
-from modelica_like.simulation import Model, simulate
+from modelica_like.runs.readings import Output, is_series, listed, quadratures, read_output
+from modelica_like.simulation import Model, quick_run
 from modelica_like.solve.options import Options
 from modelica_like.solve.solution import Solution
 
 Method = Literal["auto", "forward", "adjoint"]
+_NOTHING = 1e-9
+"""Share of the largest amount below which an extreme is zero up to rounding."""
 _NAMED = 3
 """Largest number of parameters in an error message."""
 
@@ -68,7 +72,8 @@ def sensitivities(
         start = start or drive.start
     else:
         freed = free_formulas(drive, to, parameters)
-        solution = simulate(freed.model, until, parameters=freed.values, start=start, options=options)
+        asked = {"parameters": freed.values, "start": start, "options": options}
+        solution = quick_run(freed.model, until, **asked, readings=[name for name in of if not is_series(name)])
     model = solution.model
     outputs = [read_output(model, name) for name in of]
     chosen = _chosen(model, to)
@@ -113,8 +118,9 @@ def _differentiate(
     nodes = [*chain.nodes] if series else []
     readings = read_off(solution, chain, plain)
     over_time = [value_at(chain, one.path, node) for one in series for node in nodes]
-    on_edge = edges(chain, readings)
-    total = [*readings, *over_time, *(edge.reading for edge in on_edge)]
+    on_edge = [*edges(chain, readings), *at_instants(chain, readings, plain)]
+    at_kink = kinks(chain, outputs)
+    total = [*readings, *over_time, *(edge.reading for edge in (*on_edge, *at_kink))]
     positions = [k for k, _ in chosen]
     # A column costs about the same in both directions.
     way = method if method != "auto" else "adjoint" if len(total) < len(chosen) else "forward"
@@ -126,22 +132,57 @@ def _differentiate(
     if series:
         # Somewhere along the run everything is felt.
         on_edge = [replace(edge, matters=lambda: True) for edge in on_edge]
-    kept, left_out = _by_existence(on_edge, derivatives[len(total) - len(on_edge) :], [one for _, one in chosen], named)
-    derivatives, chosen = derivatives[: len(total) - len(on_edge), kept], [chosen[k] for k in kept]
+    of_outputs, of_edges, of_kinks = np.split(derivatives, np.cumsum([len(readings) + len(over_time), len(on_edge)]))
+    kept, left_out = _by_existence(on_edge, of_edges, [one for _, one in chosen], named)
+    ends = [*range(len(plain)), *(len(plain) - 1 + len(nodes) * k for k in range(1, len(series) + 1))]
+    sides = Sides(solution, [*plain, *series], [total[k] for k in ends])
+    candidates = dict[Candidate, int]()
+    for k in [k for k in kept if np.any(of_kinks[:, k])]:
+        size = abs(chosen[k][1].value) or natural_size(chain, outputs, positions[k])
+        if np.isfinite(size) and _at_a_kink(at_kink, of_kinks[:, k] * size):
+            candidates[Candidate(chosen[k][1], size, of_outputs[ends, k])] = k
+    for one in sides.suspects([*candidates]):
+        error = sides.error(one)
+        if error is not None and (named or len(kept) == 1):
+            raise error
+        if error is not None:
+            kept = [k for k in kept if k != candidates[one]]
+            left_out[one.by.name] = f"{error.what} {error.why}"
+    derivatives, chosen = of_outputs[:, kept], [chosen[k] for k in kept]
     if freed.slopes:
         derivatives = derivatives @ freed.taken_along([quantity.name for _, quantity in chosen])
+    # The same name has the same number everywhere, though the replay is more precise.
+    values = solution.read(*(one.name for one in plain))
     count = len(plain)
     rows = derivatives[count:].reshape(len(series), len(nodes), len(chosen))
     return Sensitivities(
         chain.model.name,
-        tuple(Quantity(one.name, reading.value, one.unit) for one, reading in zip(plain, readings, strict=True)),
+        tuple(Quantity(one.name, float(value), one.unit) for one, value in zip(plain, values, strict=True)),
         tuple(quantity for _, quantity in chosen),
         derivatives[:count],
         way,
         np.array([node.t for node in nodes]),
         {one.name: table for one, table in zip(series, rows, strict=True)},
         left_out,
+        (*_of_rounding(solution, plain, values), *sides.remark([*candidates])),
     )
+
+
+def _of_rounding(solution: Solution, outputs: Sequence[Output], values: Sequence[float]) -> Iterator[str]:
+    """Tell which extremes are rounding beside those of the other sign, and so are their derivatives."""
+    for one, value in zip(outputs, values, strict=True):
+        if one.kind in ("max", "min") and solution.dense is not None:
+            (largest,) = solution.read(f"peak({one.path})")
+            if abs(value) <= _NOTHING * largest:
+                yield (
+                    f"{one.name} is zero up to rounding, and so are its derivatives: {one.path} has the other sign, up "
+                    f"to {largest * largest.sign:.6g} {largest.unit}. Ask for peak({one.path}), the largest amount."
+                )
+
+
+def _at_a_kink(at_kink: list[Edge], changes: Vector) -> bool:
+    """Whether changes of what is zero lead off a kink."""
+    return any(one.moved_by(np.abs(change)) for one, change in zip(at_kink, changes, strict=True))
 
 
 def _by_existence(

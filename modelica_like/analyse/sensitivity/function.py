@@ -11,12 +11,11 @@ import numpy as np
 
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
 from modelica_like.analyse.sensitivity.formulas import free_formulas
-from modelica_like.analyse.sensitivity.outputs import listed, read_output
-from modelica_like.analyse.sensitivity.readings import quick_run, read
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient
 from modelica_like.initialize import StartKind
-from modelica_like.simulation import Model, plan
+from modelica_like.runs.readings import does_not_happen, is_series, listed, read_output
+from modelica_like.simulation import Model, plan, quick_run
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.solution import Solution
@@ -24,8 +23,8 @@ from modelica_like.solve.solution import Solution
 Found = TypeVar("Found")
 
 _TOGETHER = 1e-9
-_PLAIN = ("end", "at", "time")
-"""Outputs that a run gives as precisely as its replay; peaks and integrals of a run come from its results."""
+_CHANGE = 1e-3
+"""Relative change of a parameter for second derivatives: the error of both, rounding and curvature, is about 1e-4."""
 _FINER = 1e-2
 """Tolerance of a run relative to that of its replay, so that both agree."""
 
@@ -87,11 +86,12 @@ class SimulationFunction(_Callback):
         self._last: tuple[Solution, Sensitivities] | None = None
         self._simulated: tuple[bytes, Solution] | None = None
         self._sequence: list[tuple[str, str, str]] | None = None
-        self._plain = all(one.kind in _PLAIN for one in (read_output(self._model, name) for name in outputs))
+        for name in outputs:
+            read_output(self._model, name)
         end, chosen = plan(self._model, run["until"], options=run["options"])
         rtol = min(chosen.rtol, precision * _FINER)
         self._tight = {"until": end, "rtol": rtol, "atol": min(chosen.atol, rtol / 100)}
-        solution = quick_run(self._model, **{**self._run, **self._tight})
+        solution = quick_run(self._model, **{**self._run, **self._tight}, readings=outputs)
         first = self._differentiate(solution)
         self.start_values = np.array([one.value for one in first.parameters])
         self._sequence = None if any_sequence else mode_sequence(solution.events)
@@ -116,17 +116,18 @@ class SimulationFunction(_Callback):
         return self._last[1]
 
     def values_at(self, p: Vector | Sequence[float]) -> list[float]:
-        """Return only the outputs: from the run, or from its replay if the run is too coarse.
+        """Return only the outputs.
 
         Raises:
             NoGradient: as in `at`.
             UnknownName: a mode change does not happen.
             ModelicaLikeError: the simulation fails.
         """
-        solution = self._simulate(np.asarray(p, float).ravel())
-        if not self._plain or (self._last is not None and self._last[0] is solution):
-            return [one.value for one in self.at(p).outputs]
-        return [read(solution, read_output(solution.model, name)) for name in self.outputs]
+        values = self._simulate(np.asarray(p, float).ravel()).read(*self.outputs)
+        for name, value in zip(self.outputs, values, strict=True):
+            if np.isnan(value):
+                raise does_not_happen(name)
+        return values
 
     def _simulate(self, values: Vector) -> Solution:
         """Simulate at parameter values; kept until the next ones."""
@@ -134,7 +135,8 @@ class SimulationFunction(_Callback):
         if self._simulated is None or self._simulated[0] != key:
             given = {**self._run["parameters"], **dict(zip(self.inputs, map(float, values), strict=True))}
             self.runs += 1
-            solution = quick_run(self._model, **{**self._run, **self._tight, "parameters": given})
+            run = {**self._run, **self._tight, "parameters": given}
+            solution = quick_run(self._model, **run, readings=self.outputs)
             sequence = mode_sequence(solution.events)
             if self._sequence not in (None, sequence):
                 raise _changed(self._sequence or [], sequence, solution)
@@ -174,13 +176,43 @@ class _Jacobian(_Callback):
         self._simulation = simulation
         self._size = len(simulation.outputs), len(simulation.inputs)
         arguments = {"p": ca.Sparsity.dense(self._size[1]), "out_y": ca.Sparsity(self._size[0], 1)}
-        self.declare(
-            "jacobian", arguments, {"jac_y_p": ca.Sparsity.dense(*self._size)}, enable_fd=True, fd_method="central"
-        )
+        self._second = _Second(simulation, self._size)
+        self.declare("jacobian", arguments, {"jac_y_p": ca.Sparsity.dense(*self._size)})
+
+    def has_jacobian(self) -> bool:
+        """Tell CasADi that there are second derivatives."""
+        return True
+
+    def get_jacobian(self, name: str, inames: Any, onames: Any, opts: Any) -> Any:
+        """Return the function of the second derivatives."""
+        return self._second
 
     def eval(self, arg: Any) -> list[Any]:
         made = self._simulation.attempt(self._simulation.at, arg[0])
         return [ca.DM(np.full(self._size, np.nan) if made is None else made.derivatives)]
+
+
+class _Second(_Callback):
+    """d²y/dp² of a simulation: CasADi's own differences have a step of 1e-8, in which a parameter of 1e4 drowns."""
+
+    def __init__(self, simulation: SimulationFunction, size: tuple[int, int]) -> None:
+        super().__init__()
+        self._simulation, self._size, dense = simulation, size, ca.Sparsity.dense
+        count = size[0] * size[1]
+        arguments = {"p": dense(size[1]), "out_y": ca.Sparsity(size[0], 1), "out_jac_y_p": ca.Sparsity(*size)}
+        results = {"jac_jac_y_p_p": dense(count, size[1]), "jac_jac_y_p_out_y": ca.Sparsity(count, size[0])}
+        self.declare("second", arguments, results)
+
+    def eval(self, arg: Any) -> list[Any]:
+        p = np.array(arg[0], float).ravel()
+        found = np.full((self._size[0] * self._size[1], self._size[1]), np.nan)
+        for k, step in enumerate(_CHANGE * np.where(p == 0, 1.0, np.abs(p))):
+            moved = (p + sign * step * (np.arange(len(p)) == k) for sign in (1, -1))
+            sides = [self._simulation.attempt(self._simulation.at, one) for one in moved]
+            if None not in sides:
+                above, below = (side.derivatives for side in sides if side is not None)
+                found[:, k] = ((above - below) / (2 * step)).ravel("F")
+        return [ca.DM(found), ca.DM(self._size[0] * self._size[1], self._size[0])]
 
 
 def simulation_function(
@@ -211,7 +243,7 @@ def simulation_function(
         ModelicaLikeError: the model or a name is wrong, or the simulation is not possible.
     """
     inputs, outputs = listed(inputs, "parameter as input"), listed(outputs, "output")
-    series = [name for name in outputs if name.replace(" ", "").startswith("series(")]
+    series = [name for name in outputs if is_series(name)]
     if series:
         raise LanguageError(
             f"{series[0]} is a trajectory; the outputs of a simulation function are numbers.",

@@ -11,12 +11,12 @@ import numpy as np
 from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.analyse.replay.step import Step, shortened
-from modelica_like.analyse.sensitivity.outputs import Output, expression_of
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange
 from modelica_like.initialize import Point
 from modelica_like.initialize.slopes import Slopes, slopes
+from modelica_like.runs.readings import INTEGRATED, Output, expression_of
 from modelica_like.solve.solution import Solution
 
 _NEAR = 0.05
@@ -32,20 +32,65 @@ def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> l
         NoGradient: it has no derivative.
     """
     _check_impacts(solution, outputs)
-    integrals = [one for one in outputs if one.kind == "integral"]
-    by_integral = np.eye(len(integrals))
+    span, integrals = replay.nodes[-1].t - replay.nodes[0].t, 0
     found: list[Reading] = []
     for one in outputs:
-        if one.kind == "integral":
-            number = integrals.index(one)
-            found.append(Reading(float(replay.quadratures[number]), quadratures=by_integral[number]))
+        if one.kind in INTEGRATED:
+            found.append(_integrated(replay, one, integrals, span))
+            integrals += 1
         elif one.kind == "time":
             found.append(_event_time(solution, replay, one))
-        elif one.kind in ("max", "min"):
-            found.append(_peak(replay, one))
+        elif one.kind == "first":
+            found.append(_first(replay, one))
+        elif one.kind in ("max", "min", "peak"):
+            signs = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}[one.kind]
+            largest = max((_scaled(_peak(replay, one.path, sign), sign) for sign in signs), key=lambda peak: peak.value)
+            found.append(_scaled(largest, -1.0 if one.kind == "min" else 1.0))
         else:
             found.append(value_at(replay, one.path, _node_of(replay, one)))
     return found
+
+
+def _scaled(one: Reading, by: float) -> Reading:
+    return Reading(by * one.value, tuple((node, by * part) for node, part in one.parts), by * one.quadratures)
+
+
+def _integrated(replay: Replay, output: Output, number: int, span: float) -> Reading:
+    """Read an integral, a mean or a root mean square."""
+    integral = Reading(float(replay.quadratures[number]), quadratures=np.eye(replay.functions.nq)[number])
+    if output.kind not in ("mean", "rms"):
+        return integral
+    mean = _scaled(integral, 1.0 / span)
+    if output.kind == "mean":
+        return mean
+    root = mean.value**0.5
+    return Reading(root, quadratures=mean.quadratures / (2.0 * root) if root else mean.quadratures)
+
+
+def _first(replay: Replay, output: Output) -> Reading:
+    """Read when a value is above zero for the first time: in a step, or at a jump."""
+    value: Callable[[Point], float] = lambda point: float(along(replay, output.path, [point])[0])  # noqa: E731
+    if value(replay.nodes[0]) > 0.0:
+        return Reading(replay.nodes[0].t)
+    for k, move in enumerate(replay.moves):
+        if isinstance(move, Jump):
+            if value(replay.nodes[k + 1]) > 0.0:
+                return _at_jump(move)
+            continue
+        points = [move.before, *move.inside(), move.after]
+        values = [(point.t - move.before.t, value(point)) for point in points]
+        for low, high in pairwise(values):
+            if high[1] > 0.0 >= low[1]:
+                step = shortened(move, value, low, high, _STILL)
+                node = replay.split(k, step) if step is not None else move.after
+                part = _slopes(replay, output.path, node)
+                return Reading(node.t, ((node, -part.by[0] / float(part.rate[0])),))
+    raise UnknownName(f"'{output.name}' does not happen in this run.")
+
+
+def _at_jump(jump: Jump) -> Reading:
+    trigger = jump.time()
+    return Reading(jump.before.t + trigger.shift, ((jump.before, trigger.by),))
 
 
 def value_at(replay: Replay, path: str, node: Point, jump: Jump | None = None) -> Reading:
@@ -91,9 +136,7 @@ def _event_time(solution: Solution, replay: Replay, output: Output) -> Reading:
             f"'{output.name}' does not happen after the start of the run.",
             why=f"{output.path} changes: {told}." if changes else f"{output.path} does not change in this run.",
         )
-    jump = found[number - 1]
-    trigger = jump.time()
-    return Reading(jump.before.t + trigger.shift, ((jump.before, trigger.by),))
+    return _at_jump(found[number - 1])
 
 
 def _node_of(replay: Replay, output: Output) -> Point:
@@ -105,14 +148,13 @@ def _node_of(replay: Replay, output: Output) -> Point:
     return replay.at(output.moment)
 
 
-def _peak(replay: Replay, output: Output) -> Reading:
-    """Read the largest or smallest value along a replay.
+def _peak(replay: Replay, path: str, sign: float) -> Reading:
+    """Read the largest (`sign` 1) or smallest (-1) value along a replay.
 
     Candidates are the nodes and the stages in between; near the best ones, zeros of the rate are located.
     """
-    sign = 1.0 if output.kind == "max" else -1.0
-    rate: Callable[[Point], float] = lambda point: sign * float(_slopes(replay, output.path, point).rate[0])  # noqa: E731
-    values: Callable[[list[Point]], Vector] = lambda points: sign * _along(replay, output.path, points)  # noqa: E731
+    rate: Callable[[Point], float] = lambda point: sign * float(_slopes(replay, path, point).rate[0])  # noqa: E731
+    values: Callable[[list[Point]], Vector] = lambda points: sign * along(replay, path, points)  # noqa: E731
     at_nodes = values(replay.nodes)
     inside = [values(move.inside()) if isinstance(move, Step) else np.zeros(0) for move in replay.moves]
     everything = np.concatenate([at_nodes, *inside])
@@ -125,14 +167,14 @@ def _peak(replay: Replay, output: Output) -> Reading:
                 if value > top + _FLAT * abs(top):
                     best, top, found = k, value, step
     if found is not None:
-        return value_at(replay, output.path, replay.split(best, found))
+        return value_at(replay, path, replay.split(best, found))
     # Beside a jump, the event may move.
     beside = (replay.moves[k] for k in (best, best - 1) if 0 <= k < len(replay.moves))
     jump = next((move for move in beside if isinstance(move, Jump)), None)
-    return value_at(replay, output.path, replay.nodes[best], jump)
+    return value_at(replay, path, replay.nodes[best], jump)
 
 
-def _along(replay: Replay, path: str, points: list[Point]) -> Vector:
+def along(replay: Replay, path: str, points: list[Point]) -> Vector:
     """Values of a variable at points."""
     model = replay.model
     fast = model.fast(("only", path), lambda: _function(model, path))

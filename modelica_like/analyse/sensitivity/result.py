@@ -50,6 +50,7 @@ class Sensitivities(Shown):
         time: times of the series in s, both sides of events included; empty without series.
         series: derivatives of each series over time, shape (times, parameters).
         left_out: parameters without a derivative that were not asked for by name, with the reasons.
+        remarks: sentences about outputs.
     """
 
     model: str
@@ -60,6 +61,7 @@ class Sensitivities(Shown):
     time: Vector = field(default_factory=lambda: np.zeros(0))
     series: Mapping[str, Vector] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     def __getitem__(self, key: tuple[str, str]) -> float:
         """Derivative of an output by a parameter.
@@ -79,10 +81,13 @@ class Sensitivities(Shown):
         return np.divide(self.derivatives * weights, values[:, None], out=nothing, where=values[:, None] != 0)
 
     def ranking(self, output: str) -> tuple[tuple[Quantity, float, float], ...]:
-        """Parameters with derivative and normalised derivative of an output, the most important first."""
+        """Parameters with derivative and normalised derivative of an output, the most important first.
+
+        Of those that matter as much up to rounding, such as two factors of a product, the first one declared is first.
+        """
         row = _position(self.outputs, output, "output")
         rows = zip(self.parameters, map(float, self.derivatives[row]), map(float, self.normalised[row]), strict=True)
-        return tuple(sorted(rows, key=lambda one: -abs(one[0].value * one[1])))
+        return tuple(sorted(rows, key=lambda one: -float(f"{abs(one[0].value * one[1]):.9e}")))
 
     def table(self, output: str) -> tuple[str, list[tuple[str, ...]]]:
         """Return title and rows of the ranking of an output as text, in the order of `COLUMNS`."""
@@ -95,8 +100,8 @@ class Sensitivities(Shown):
         return f"{output} = {quantity.value:.9g} {quantity.unit_text}".rstrip(), rows
 
     def notes(self) -> list[str]:
-        """Return a sentence about each parameter that was left out."""
-        return [f"{name} is left out. {reason}" for name, reason in self.left_out.items()]
+        """Return remarks, and a sentence about each parameter that was left out."""
+        return [*self.remarks, *(f"{name} is left out. {reason}" for name, reason in self.left_out.items())]
 
     def tornado(self, output: str, *, change: float = 0.1, most: int = 12) -> Figure:
         """Draw the first-order change of an output for a relative change of each parameter.

@@ -10,13 +10,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.sensitivity.outputs import Output, expression_of
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ModelicaLikeError, ValueOutOfRange
 from modelica_like.native.batch import Batch, Reading
+from modelica_like.runs.readings import Output, Part
 from modelica_like.simulation import plan
-
-_ENERGIES = ("loss_energy", "source_energy")
+from modelica_like.units import ONE
 
 
 class NativeRuns:
@@ -41,11 +40,13 @@ class NativeRuns:
         for one in outputs:
             if one.kind == "at" and not span[0] <= one.moment <= end:
                 raise ValueOutOfRange(f"{one.name} is not within the run, {span[0]:g} s to {end:g} s.")
-        self._model, self._names = model, names
-        known = _with_energies(model, [one.path for one in outputs if one.kind != "time"])
-        parts = [_readings(known, one) for one in outputs]
-        self._firsts = np.cumsum([0, *(len(part) for part in parts[:-1])])
-        self._batch = Batch(known, [one for part in parts for one in part], options, span, settings.get("start"))
+        self._model, self._names, self._outputs, self._begin = model, names, outputs, span[0]
+        # The last reading is the time at the end, where a component may end a run earlier.
+        parts = [*(one.parts(model) for one in outputs), [Part("end", "time")]]
+        known = _with_expressions(model, [part for some in parts for part in some])
+        readings = [[one for part in some for one in _readings(model, known, part)] for some in parts]
+        self._lasts = np.cumsum([len(some) for some in readings])
+        self._batch = Batch(known, [one for some in readings for one in some], options, span, settings.get("start"))
         self._places = [model.fixed_position[name] for name in names]
 
     def run(self, points: Any, stop: ctypes.c_int | None = None) -> tuple[Vector, dict[int, str], list[int]]:
@@ -64,8 +65,10 @@ class NativeRuns:
         refused = self._refused(points, p)
         kept = np.array([k for k in range(len(points)) if k not in refused], int)
         numbers, failed = self._batch.run(p[kept], u[kept], stop)
-        values = np.full((len(points), len(self._firsts)), np.nan)
-        values[kept] = np.add.reduceat(numbers, self._firsts, axis=1)
+        values = np.full((len(points), len(self._outputs)), np.nan)
+        spans = numbers[:, -1] - self._begin
+        for k, (one, some) in enumerate(zip(self._outputs, np.split(numbers, self._lasts, axis=1), strict=False)):
+            values[kept, k] = one.combined(some, spans)
         values[kept[failed]] = np.nan
         return values, refused, kept[failed].tolist()
 
@@ -93,36 +96,33 @@ def _within(values: Vector, low: float | None, high: float | None) -> Any:
     return (values >= (-np.inf if low is None else low)) & (values <= (np.inf if high is None else high))
 
 
-def _with_energies(model: CompiledDae, paths: Sequence[str]) -> CompiledDae:
-    """Return the model with energies and powers of components among its variables, if outputs need them."""
-    more = tuple(dict.fromkeys(path for path in paths if path not in model.position))
-    return model.once(("energies", more), lambda: _with(model, more)) if more else model
+def _key(part: Part) -> str:
+    return f"{part.text} ({part.form} {part.change[1]})"
 
 
-def _with(model: CompiledDae, more: tuple[str, ...]) -> CompiledDae:
-    made = [expression_of(model, path) for path in more]
-    column = ca.vertcat(model.variables(*model.arguments.values()), *(expression() for expression, _ in made))
+def _with_expressions(model: CompiledDae, parts: Sequence[Part]) -> CompiledDae:
+    """Return the model with the values of parts among its variables."""
+    more = {_key(part): part for part in parts if part.kind not in ("change", "impact")}
+    return model.once(("expressions", tuple(more)), lambda: _with(model, more)) if more else model
+
+
+def _with(model: CompiledDae, more: Mapping[str, Part]) -> CompiledDae:
+    column = ca.vertcat(model.variables(*model.arguments.values()), *(part.expression(model) for part in more.values()))
     names = model.variables.name_in()
     variables = ca.Function("variables", [*model.arguments.values()], [ca.densify(column)], names, ["variables"])
     like = model.flat_variables[0]
-    further = [replace(like, path=path, unit=unit, kind="local") for path, (_, unit) in zip(more, made, strict=True)]
+    further = [replace(like, path=path, unit=ONE, kind="local") for path in more]
     twin = model.twin(variables=variables, flat_variables=(*model.flat_variables, *further), _cache={})
     for name in ("position", "units"):
         twin.__dict__.pop(name, None)
     return twin
 
 
-def _readings(model: CompiledDae, output: Output) -> list[Reading]:
-    """Return the parts of an output, which is their sum."""
-    owner, _, last = output.path.rpartition(".")
-    if output.kind == "time":
-        place = model.discrete_position[output.path]
-        names = model.flat_discretes[place].names
-        before, after = (names.index(name) if name else -1 for name in output.change[:2])
-        return [Reading("change", place, (before, after, output.change[2]))]
-    place = model.position[output.path]
-    if output.kind == "integral" and last in _ENERGIES:
-        strikes = [k for k, one in enumerate(model.holds) if owner in ("", one.component)]
-        return [Reading("work", place), *(Reading("impact", k) for k in strikes if last == "loss_energy")]
-    kind: Any = "area" if output.kind == "integral" else output.kind
-    return [Reading(kind, place, moment=output.moment)]
+def _readings(model: CompiledDae, known: CompiledDae, part: Part) -> list[Reading]:
+    """Return what a part is in the run-time: their sum."""
+    if part.kind == "change":
+        return [Reading("change", model.discrete_position[part.text], part.change)]
+    if part.kind == "impact":
+        places = [k for k, one in enumerate(model.holds) if part.text in ("", one.component)]
+        return [Reading("impact", k) for k in places]
+    return [Reading(part.kind, known.position[_key(part)], moment=part.moment)]

@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.sensitivity.outputs import read_output
-from modelica_like.analyse.sensitivity.readings import read_all
 from modelica_like.analyse.sweeps.native_runs import NativeRuns
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ModelicaLikeError, WorkersLost, extra_module
+from modelica_like.runs.readings import read_output
 from modelica_like.simulation import plan, simulate
 
 _RESTARTS = 3
@@ -141,8 +140,8 @@ class Reference:
         """Do one run, and record its results."""
         given = dict(zip(self._job.names, map(float, point), strict=True))
         try:
-            run = simulate(self._model, parameters=given, **{**self._job.settings, "solver": "idas"})
-            done.values[k] = read_all(run, self._outputs)
+            settings = {**self._job.settings, "solver": "idas", "readings": self._job.outputs}
+            done.values[k] = simulate(self._model, parameters=given, **settings).read(*self._job.outputs)
         except ModelicaLikeError as error:
             done.failures[done.first + k] = str(error)
 
@@ -221,7 +220,7 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Don
     others = set(multiprocessing.active_children())
     for _ in range(_RESTARTS):
         # Spawned, not forked: libraries of this process may have threads.
-        with ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), signal.signal, _DEAF) as pool:
+        with ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin_worker) as pool:
             with _deaf():
                 futures: list[Future[Done]] = [pool.submit(run_chunk, job, *chunk) for chunk in left.items()]
             try:
@@ -245,6 +244,19 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Don
         'If they died at startup: put the work of a script under if __name__ == "__main__":, '
         "or set processes=1.",
     )  # fmt: skip
+
+
+def _begin_worker() -> None:
+    """Prepare a process: Ctrl-C is for its parent, and it ends with that, killed perhaps."""
+    signal.signal(*_DEAF)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 @contextmanager

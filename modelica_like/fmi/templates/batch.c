@@ -1,6 +1,5 @@
 /* Many runs of one model that leave nothing but numbers behind: sweeps. Every run has its own parameters and inputs,
- * begins where these start it, and is read by `Reading`s. Results are at equal distances and on both sides of every
- * event; what happens between them is read off the dense output of the steps. */
+ * begins where these start it, and is read by `Reading`s off the dense output of its steps. */
 #include "core.h"
 
 /* native.c */
@@ -11,13 +10,11 @@ Result instance_begin(Instance *c);
 typedef enum {
     READ_END,
     READ_AT,
-    READ_MAX, /* of the results, like READ_MIN and READ_AREA (trapezoids) */
-    READ_MIN,
-    READ_AREA,
-    READ_WORK,   /* integral over the steps */
+    READ_MAX,
+    READ_INTEGRAL,
+    READ_FIRST,  /* when it is above zero for the first time; nan: never */
     READ_CHANGE, /* time of a mode change; nan: it does not happen */
-    READ_IMPACT, /* energy that impacts on a motion that is held take */
-    N_READINGS
+    READ_IMPACT  /* energy that impacts on a motion that is held take */
 } ReadingKind;
 
 typedef struct {
@@ -29,7 +26,7 @@ typedef struct {
 
 typedef struct {
     double start, end, rtol, atol;
-    int64_t results, most_events, n_runs, n_readings; /* results: number of intervals */
+    int64_t most_events, n_runs, n_readings;
     const Reading *readings;
     const double *parameters, *inputs; /* by run */
     double *values;                    /* by run */
@@ -40,10 +37,10 @@ typedef struct {
 typedef struct {
     Instance *c;
     const NativeBatch *asked;
-    double *values, *kept; /* of the present run; the last value, or the count, or the energy of former instants */
-    double last;           /* time of the last result */
-    int64_t next, events;  /* number of the next result */
-    int failed, sampled, in_steps;
+    double *values, *kept; /* of the present run; the count, or the energy of former instants */
+    double *sizes, *nodes; /* largest amounts so far; values at the nodes of a stretch, by node */
+    int64_t events;
+    int failed;
 } Batch;
 
 /* All variables that are asked for, now or at a time within the step that has just been taken. */
@@ -58,43 +55,168 @@ static const double *variables_at(Batch *b, double t, int now) {
     return c->variables;
 }
 
-static void take_result(Batch *b, double t, const double *variables) {
-    for (int64_t k = 0; k < b->asked->n_readings; k++) {
-        const Reading *one = &b->asked->readings[k];
-        if (one->kind != READ_MAX && one->kind != READ_MIN && one->kind != READ_AREA) continue;
-        double value = variables[one->place], *found = &b->values[k];
-        if (one->kind == READ_AREA) *found += 0.5 * (t - b->last) * (value + b->kept[k]);
-        else if (isnan(*found) || (one->kind == READ_MAX ? value > *found : value < *found)) *found = value;
-        b->kept[k] = value;
-    }
-    b->last = t;
+/* Lobatto's rule of order eight, and the quartic through its nodes: the dense output is of degree four. */
+#define SAME_END 1e-6 /* of a run: events are located within its tolerances, so a moment so near is its end */
+#define READ_NODES 5
+static const double NODE_PLACES[READ_NODES] = {0, 0.17267316464601143, 0.5, 0.8273268353539886, 1},
+                    SHARES[READ_NODES] = {9. / 180, 49. / 180, 64. / 180, 49. / 180, 9. / 180};
+#define BENT 3e-5       /* of the largest amount: difference to Simpson's rule; the error is its square, at most 1e-9 */
+#define TWISTED 0.03    /* of the largest amount: part of third degree, which both rules do not see */
+#define LEAST_PART 1e-4 /* part of a step; kinks are less precise only within */
+#define QUARTIC_LOOKS 16 /* at the quartic, for its extremes */
+#define BESIDE 1e-3
+#define GOLDEN 0.6180339887498949
+#define GOLDEN_TRIALS 40 /* golden section: the time is as precise as the value allows */
+
+static int reads_along(const Reading *one) {
+    return one->kind == READ_MAX || one->kind == READ_INTEGRAL || one->kind == READ_FIRST;
 }
 
-/* Gauss's rule of order six: the dense output has order four. */
-static void add_work(Batch *b, double begin, double end) {
-    static const double places[] = {-0.7745966692414834, 0, 0.7745966692414834}, weights[] = {5, 8, 5};
-    for (int g = 0; g < 3; g++) {
-        const double *variables = variables_at(b, 0.5 * (begin + end) + 0.5 * (end - begin) * places[g], 0);
-        for (int64_t k = 0; k < b->asked->n_readings; k++)
-            if (b->asked->readings[k].kind == READ_WORK)
-                b->values[k] += weights[g] / 18 * (end - begin) * variables[b->asked->readings[k].place];
+static void take_reading(Batch *b, int64_t k, double t, double value) {
+    int kind = b->asked->readings[k].kind;
+    double *found = &b->values[k];
+    b->sizes[k] = fmax(b->sizes[k], fabs(value));
+    if (kind == READ_MAX && !(value <= *found)) *found = value;
+    if (kind == READ_FIRST && isnan(*found) && value > 0) *found = t;
+}
+
+/* Both sides of an event count. */
+static void take_instant(Batch *b) {
+    const double *variables = variables_at(b, b->c->state.t, 1);
+    for (int64_t k = 0; k < b->asked->n_readings; k++)
+        if (reads_along(&b->asked->readings[k]))
+            take_reading(b, k, b->c->state.t, variables[b->asked->readings[k].place]);
+}
+
+static void look_along(Batch *b, double t, int node) {
+    const double *variables = variables_at(b, t, 0);
+    for (int64_t k = 0; k < b->asked->n_readings; k++)
+        if (reads_along(&b->asked->readings[k]))
+            b->nodes[k * READ_NODES + node] = variables[b->asked->readings[k].place];
+}
+
+/* Is something no polynomial of degree four there? Below the absolute tolerance all is noise. */
+static int is_rough(const Batch *b) {
+    for (int64_t k = 0; k < b->asked->n_readings; k++) {
+        const double *v = b->nodes + k * READ_NODES;
+        double sum = 0, size = b->sizes[k], simpson = (v[0] + 4 * v[2] + v[4]) / 6;
+        if (!reads_along(&b->asked->readings[k])) continue;
+        for (int i = 0; i < READ_NODES; i++) {
+            sum += SHARES[i] * v[i];
+            size = fmax(size, fabs(v[i]));
+        }
+        if (fabs(sum - simpson) > fmax(BENT * size, b->asked->atol)) return 1;
+        if (fabs(v[3] - v[1] - (NODE_PLACES[3] - NODE_PLACES[1]) * (v[4] - v[0])) >
+            fmax(TWISTED * size, b->asked->atol))
+            return 1;
+    }
+    return 0;
+}
+
+static double quartic(const double *values, double s) {
+    double sum = 0;
+    for (int i = 0; i < READ_NODES; i++) {
+        double weight = values[i];
+        for (int j = 0; j < READ_NODES; j++)
+            if (j != i) weight *= (s - NODE_PLACES[j]) / (NODE_PLACES[i] - NODE_PLACES[j]);
+        sum += weight;
+    }
+    return sum;
+}
+
+static double value_at(Batch *b, int64_t k, double t) { return variables_at(b, t, 0)[b->asked->readings[k].place]; }
+
+static void climb(Batch *b, int64_t k, double low, double high) {
+    double first = high - GOLDEN * (high - low), second = low + GOLDEN * (high - low);
+    double f = value_at(b, k, first), g = value_at(b, k, second);
+    for (int n = 0; n < GOLDEN_TRIALS; n++) {
+        if (f > g) {
+            high = second;
+            second = first;
+            g = f;
+            f = value_at(b, k, first = high - GOLDEN * (high - low));
+        } else {
+            low = first;
+            first = second;
+            f = g;
+            g = value_at(b, k, second = low + GOLDEN * (high - low));
+        }
+        take_reading(b, k, first, fmax(f, g));
+    }
+}
+
+/* The first time above zero, between one that is not and one that is. */
+static void meet_zero(Batch *b, int64_t k, double low, double high) {
+    if (!(value_at(b, k, high) > 0)) return;
+    for (double middle = 0.5 * (low + high); low < middle && middle < high; middle = 0.5 * (low + high)) {
+        if (value_at(b, k, middle) > 0) high = middle;
+        else low = middle;
+    }
+    b->values[k] = high;
+}
+
+/* Is a place of the quartic a top: higher than its neighbours, or, at an end, than what is just within? */
+static int is_top(const double *v, int i, double before, double now, double after) {
+    if (i == 0) return quartic(v, BESIDE) > now && after <= quartic(v, BESIDE);
+    if (i == QUARTIC_LOOKS) return quartic(v, 1 - BESIDE) > now && before <= quartic(v, 1 - BESIDE);
+    return now >= before && now >= after;
+}
+
+/* Takes what is extreme between the nodes of a stretch. */
+static void search_stretch(Batch *b, int64_t k, double begin, double h) {
+    const double *v = b->nodes + k * READ_NODES, width = h / QUARTIC_LOOKS;
+    double before = -INFINITY, now = v[0];
+    int first = b->asked->readings[k].kind == READ_FIRST, last = QUARTIC_LOOKS;
+    for (int i = 0; i <= last; i++) {
+        double after = i < last ? quartic(v, (i + 1.) / last) : -INFINITY;
+        if (first && i > 0 && isnan(b->values[k]) && now > 0)
+            meet_zero(b, k, begin + width * (i - 1), i < last ? begin + width * i : begin + h);
+        if (!first && now >= b->values[k] - BENT * b->sizes[k] && is_top(v, i, before, now, after))
+            climb(b, k, begin + width * fmax(i - 1, 0), i < last - 1 ? begin + width * (i + 1) : begin + h);
+        before = now;
+        now = after;
+    }
+}
+
+static void take_stretch(Batch *b, double begin, double h) {
+    for (int64_t k = 0; k < b->asked->n_readings; k++) {
+        const Reading *one = &b->asked->readings[k];
+        double *v = b->nodes + k * READ_NODES;
+        if (!reads_along(one)) continue;
+        if (one->kind != READ_INTEGRAL) search_stretch(b, k, begin, h);
+        for (int i = 0; i < READ_NODES; i++) {
+            if (one->kind == READ_INTEGRAL) b->values[k] += SHARES[i] * h * v[i];
+            take_reading(b, k, begin + h * NODE_PLACES[i], v[i]);
+        }
+        v[0] = v[READ_NODES - 1];
+    }
+}
+
+static void read_along(Batch *b, double t, double end) {
+    double least = LEAST_PART * (end - t), h = end - t;
+    look_along(b, t, 0);
+    while (t < end && !b->failed) {
+        if (t + 1.0001 * h >= end) h = end - t;
+        for (int i = 1; i < READ_NODES; i++) look_along(b, t + h * NODE_PLACES[i], i);
+        if (h > least && is_rough(b)) {
+            h /= 2;
+            continue;
+        }
+        take_stretch(b, t, h);
+        t = h < end - t ? t + h : end;
+        h *= 2;
     }
 }
 
 static void read_piece(Batch *b) {
     const NativeBatch *a = b->asked;
     double begin = b->c->piece->begin, end = b->c->piece->end;
-    for (; b->sampled && b->next < a->results; b->next++) {
-        double t = a->start + (a->end - a->start) * ((double)b->next / (double)a->results);
-        if (t >= end) break;
-        if (t > begin) take_result(b, t, variables_at(b, t, 0));
-    }
     for (int64_t k = 0; k < a->n_readings; k++) { /* a moment at the beginning is behind an event there */
         const Reading *one = &a->readings[k];
         if (one->kind == READ_AT && one->moment >= begin && one->moment < end)
             b->values[k] = variables_at(b, one->moment, 0)[one->place];
     }
-    if (b->in_steps & 1 << READ_WORK) add_work(b, begin, end);
+    if (b->sizes != NULL) read_along(b, begin, end);
 }
 
 static double after_step(Instance *c) {
@@ -129,13 +251,12 @@ static void add_impact(Instance *c, int held, double energy, int first) {
 static void begin_readings(Batch *b, int64_t run) {
     const NativeBatch *a = b->asked;
     b->values = a->values + run * a->n_readings;
-    b->last = a->start;
-    b->next = 1;
     b->events = b->failed = 0;
     for (int64_t k = 0; k < a->n_readings; k++) {
         int kind = a->readings[k].kind;
-        b->values[k] = kind == READ_AREA || kind == READ_WORK || kind == READ_IMPACT ? 0 : NAN;
+        b->values[k] = kind == READ_INTEGRAL || kind == READ_IMPACT ? 0 : NAN;
         b->kept[k] = 0;
+        if (b->sizes != NULL) b->sizes[k] = 0;
     }
 }
 
@@ -157,41 +278,43 @@ static int start_run(Batch *b, int64_t run) {
 static int run_to_end(Batch *b) {
     Instance *c = b->c;
     State *s = &c->state;
-    while ((s->t < b->asked->end || s->at_event) && !b->failed && !*b->asked->stop) {
+    while (((s->t < b->asked->end && !s->ended) || s->at_event) && !b->failed && !*b->asked->stop) {
         int passed = s->at_event;
         if (passed && (!handle_event(c) || b->events > b->asked->most_events)) return 0;
         Arrival arrival = passed ? AT_EVENT : integrate_to(c, b->asked->end, 1);
         if (arrival == FAILED) return 0;
         if (arrival == AT_EVENT && !passed) read_piece(b);
-        if (arrival == REACHED && s->t < b->asked->end) continue;
-        if (b->sampled) take_result(b, s->t, variables_at(b, b->c->state.t, 1));
+        if (passed && b->sizes != NULL) take_instant(b);
     }
     return !b->failed;
 }
 
 static void read_end(Batch *b) {
-    const double *variables = variables_at(b, b->c->state.t, 1);
+    double end = b->c->state.t, latest = end + SAME_END * (end - b->asked->start);
+    const double *variables = variables_at(b, end, 1);
     for (int64_t k = 0; k < b->asked->n_readings; k++) {
         const Reading *one = &b->asked->readings[k];
-        if (one->kind == READ_END || (one->kind == READ_AT && one->moment >= b->asked->end))
+        if (one->kind == READ_END || (one->kind == READ_AT && one->moment >= end && one->moment <= latest))
             b->values[k] = variables[one->place];
     }
 }
 
 static int begin_batch(Batch *b, const Model *m) {
     const NativeBatch *a = b->asked;
-    b->kept = calloc((size_t)a->n_readings + 1, sizeof(double));
+    int along = 0;
+    for (int64_t k = 0; k < a->n_readings; k++) along |= reads_along(&a->readings[k]);
+    b->kept = calloc((size_t)a->n_readings * (2 + READ_NODES) + 1, sizeof(double));
     b->c = instance_for(m, b);
     if (b->kept == NULL || b->c == NULL) return 0;
+    if (along) b->sizes = b->kept + a->n_readings;
+    b->nodes = b->kept + 2 * a->n_readings;
     b->c->noted = count_change;
     b->c->struck = add_impact;
     b->c->step_finished = after_step;
     for (int64_t k = 0; k < a->n_readings; k++) {
         int kind = a->readings[k].kind;
-        b->in_steps |= 1 << kind;
         if (kind != READ_CHANGE && kind != READ_IMPACT) ask_for(b->c, a->readings[k].place);
     }
-    b->sampled = (b->in_steps & (1 << READ_MAX | 1 << READ_MIN | 1 << READ_AREA)) != 0;
     return 1;
 }
 

@@ -27,6 +27,7 @@ __asm__(OLD(exp) OLD(log) OLD(pow) OLD(hypot) OLD(fmod));
 
 #define TIME_RESOLUTION 1e-10 /* as in guards_soon */
 #define JUST_TRUE 1e-300      /* as in conditions.py */
+#define AT_EDGE 1e-12         /* an edge or guard so close to zero rests there: rounding of values of about one */
 #define NOISE 1e-30           /* a decaying signal ends by swinging around zero with such values; that is no event */
 #define CROWD 24              /* further instants in a short time follow each other ever faster */
 
@@ -55,9 +56,11 @@ typedef struct { /* what changes; arrays of the model's sizes stand behind it, s
     double tolerance, absolute, start_time, stop_time; /* absolute: in nominal values */
     double delayed_until;                              /* when series of delayed values end */
     int stop_time_defined, n_past, past_lost;          /* rows of the past; there were too many */
-    double step;                                       /* next step size, 0: choose one */
+    int ended;                                         /* a component has ended the run */
+    double step, longest;                              /* next step size, 0: choose one; largest one, 0: any */
     double instants[CROWD];                            /* of the last events, in a circle */
-    int n_instants, resting;                           /* resting: impacts end in contact */
+    double resting;                                    /* length of the last crowd: impacts end in contact; or 0 */
+    int n_instants;
     double n_steps, n_rejected, n_evaluations, n_events;
 } State;
 
@@ -80,7 +83,7 @@ typedef struct { /* a tape for the present modes, see tape.c */
     int first_known, uses;
     uint64_t belongs_to;
 } Special;
-enum { N_SPECIALS = 6 }; /* of the first tapes of a model, from its rates to its guards */
+enum { N_SPECIALS = 7 }; /* of the first tapes of a model, from its rates to its edges */
 
 /* Arrays with their sizes, for which lay_out has short names. */
 #define FIELD(name, size) *name
@@ -97,19 +100,21 @@ typedef struct {
 /* Those of single functions are named after them; a function that calls another one does not share with it. Tapes have
  * `slots` (values) and `dots` (derivatives in either direction, or three Taylor coefficients), the integrator 8 stages
  * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
- * steady state began; `impact_x` are states before the first impact at an instant. */
-#define WORK_NUMBERS(A)                                                                                              \
-    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),         \
-        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),  \
-        A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),         \
-        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),         \
-        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS), \
-        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),            \
-        A(start_unknowns, system), A(start_values, starts), A(start_residual, larger(m->n_start_values, resets)),    \
-        A(delayed, 2 * delays), A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(d_before, n_d),              \
-        A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets), A(respond_d, n_d),    \
-        A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(weights, holds), A(base_weights, holds), \
-        A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), A(sizes, members)
+ * steady state began; `impact_x` and `impact_d` are states before the first impact at an instant. */
+#define WORK_NUMBERS(A)                                                                                                \
+    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),           \
+        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),    \
+        A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),           \
+        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),           \
+        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS),   \
+        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),              \
+        A(start_unknowns, system), A(start_values, starts), A(start_residual, larger(m->n_start_values, resets)),      \
+        A(delayed, 2 * delays), A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(d_before, n_d),                \
+        A(d_begun, n_d), A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),        \
+        A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(impact_d, n_d),         \
+        A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), \
+        A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n),      \
+        A(edge_guards, 2 * guards)
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant */
 #define WORK_INDICES(A)                                                                                          \
@@ -118,7 +123,7 @@ typedef struct {
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
-        A(tuned, m->n_p), A(entered, holds)
+        A(tuned, m->n_p), A(entered, holds), A(positive, guards)
 
 typedef struct Gradient Gradient; /* see gradient.c */
 
@@ -169,6 +174,8 @@ typedef struct Instance {
     int budget;          /* rounds of events and further pieces that are left of a bounded step */
     int variables_valid; /* which values belong to the present point, see values.c */
     int look_valid;      /* the last look at the guards was at the present point */
+    int edges_valid;     /* the first third of `edges` belongs to the present point */
+    double edges_kept;   /* the last third to the beginning of a step of this length, which ended there; or 0 */
     Gradient *gradient;  /* or NULL */
 } Instance;
 
@@ -222,6 +229,7 @@ void replace_dependent(Instance *c);
 int pushed(Instance *c);
 #define GIVEN_BACK 1e-3 /* of the largest current: none where modes return, as it ends within the time resolution */
 Result meet(Instance *c, double keep, int *any);
+Result refuse_contradiction(Instance *c);
 Result renew(Instance *c);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before);
@@ -241,6 +249,7 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 void drop_balanced(Instance *c, double *soon);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
 Result update_discrete(Instance *c, int *restart, double *next);
+Result check_turned_back(Instance *c, const double *before);
 double number_or_false(double guard);
 void move_states(Instance *c, const int *nodes, const double *values, int count);
 void note_change(Instance *c, int name, int transition, int mode, int target);
@@ -248,6 +257,8 @@ unsigned char *nothing_wanting(Instance *c);
 /* integrate.c */
 double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece);
 double *last_of(const Model *m, Piece *piece);
+double error_norm(const Instance *c, const double *first, const double *last, const double *error);
+double step_diagonal(double h);
 int factor_step(Instance *c, double diagonal);
 size_t piece_size(const Model *m);
 void piece_at(const Model *m, const Piece *piece, double t, double *point);
@@ -264,6 +275,13 @@ int is_due(Instance *c);
 #define MOST_LOOKS 9 /* at guards, that there is room for */
 double cubic_guess(double g0, double r0, double g1, double r1);
 int search_events(Instance *c);
+/* edges.c */
+double seen_length(Instance *c, double least, double *most);
+void keep_edges(Instance *c);
+int is_over_edge(Instance *c);
+int stands_on_edge(Instance *c, unsigned char *zero);
+int leads_off_edge(Instance *c, double least);
+double edge_ahead(Instance *c, double t, double *behind);
 /* fixed.c */
 Arrival step_fixed(Instance *c, double target);
 /* values.c */

@@ -6,7 +6,9 @@
 #define ALONE 6    /* further rounds per motion that may be held, in which only one fires */
 #define BALANCED 1e-3
 #define SAME_TIME 1e-12
-#define CROWDED 1e-6 /* of the run: in less time, CROWD further instants follow each other ever faster */
+#define LATER 1e3     /* as in penetration.py: time resolutions, for the difference of a rate */
+#define CONVERGES 0.9 /* as in instants.py: length of a crowd over the one before */
+#define CROWDED 1e-6  /* of the run: in less time, CROWD further instants follow each other ever faster */
 
 /* A guard that is not a number is false; what is nothing but rounding is zero. */
 double number_or_false(double guard) {
@@ -40,6 +42,14 @@ double next_moment(Instance *c) {
     return next;
 }
 
+/* Evaluates a tape at states moved by their rates. */
+static void look_ahead(Instance *c, const Tape *tape, double step, double *values) {
+    double *point = c->vector + c->model->n_z;
+    evaluate_now(c, &c->model->tapes.rates, c->rhs);
+    for (int k = 0; k < c->model->n_unknowns; k++) point[k] = c->x[k] + (k < c->model->n_x ? step * c->rhs[k] : 0);
+    evaluate(c, tape, c->state.t + step, point, values);
+}
+
 /* Adds time events that are due and, unless they were found already, state events that are positive or about to be. */
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
     const Model *m = c->model;
@@ -51,7 +61,10 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
             if (m->transitions[k].timed && values[m->transitions[k].index] <= just_after(&c->state)) wanting[k] = 1;
     }
     if (m->n_guards > 0 && guards_too) {
-        evaluate_now(c, &m->tapes.guards_soon, values);
+        /* What has rebounded many times in less than the time resolution is judged where it turns round. */
+        double later = TIME_RESOLUTION * fmax(1, fabs(c->state.t));
+        if (c->state.resting > 0 && c->state.resting < later) look_ahead(c, &m->tapes.guards_soon, later, values);
+        else evaluate_now(c, &m->tapes.guards_soon, values);
         for (int k = 0; k < m->n_guards; k++)
             if (number_or_false(values[k]) > 0) wanting[m->guard_transition[k]] = 1;
     }
@@ -70,6 +83,19 @@ void drop_balanced(Instance *c, double *soon) {
     evaluate_now(c, &c->model->tapes.guards, now);
     for (int k = 0; k < c->model->n_guards; k++)
         if (number_or_false(now[k]) < 0 && soon[k] > 0 && soon[k] <= BALANCED * fabs(now[k])) soon[k] = now[k];
+}
+
+/* At the same edge a mode that was left in this round is not wanted back where that soon is no longer so: what settles
+ * within few time resolutions moves so much within one that both modes want the other. `soon` as above. */
+static void drop_returning(Instance *c, const double *modes, double *soon) {
+    const Model *m = c->model;
+    double *now = c->guards_before;
+    evaluate_now(c, &m->tapes.guards, now);
+    for (int k = 0; k < m->n_guards; k++) {
+        const Transition *one = &m->transitions[m->guard_transition[k]];
+        int returns = guard_active(c, k) && modes[one->mode] == one->target && now[k] > 0;
+        if (returns && soon[k] > 0 && now[k] < LATER * (now[k] - soon[k])) soon[k] = -now[k];
+    }
 }
 
 /* Move the states as little as possible, so that variables that follow from them take new values, or vanish. */
@@ -124,7 +150,9 @@ static Result fire(Instance *c, unsigned char *wanting) {
         if (!wanting[k]) continue;
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
-        if (one->fails) return fail(c, "t = %.9g s: %s", c->state.t, notice);
+        if (one->ends == 1) return fail(c, "t = %.9g s: %s", c->state.t, notice);
+        if (one->ends) gradient_lose(c, "a component ends the run there", NULL);
+        c->state.ended |= one->ends;
         if (*notice) report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, notice);
         d[one->mode] = one->target;
     }
@@ -151,8 +179,8 @@ static Result update_once(Instance *c, int *changes) {
     return share_and_solve(c) && check_singular(c);
 }
 
-/* Notes an instant. Where the last ones came ever faster, impacts end in contact if the model asks for it; an error
-   otherwise, and if that does not help. */
+/* Notes an instant. Where the last ones came ever faster, impacts end in contact if the model asks for it, and what is
+   not held goes on as long as it converges; an error otherwise. */
 static Result crowded(Instance *c) {
     State *s = &c->state;
     double span = s->stop_time_defined ? s->stop_time - s->start_time : 1;
@@ -161,8 +189,8 @@ static Result crowded(Instance *c) {
     if (s->t - last >= CROWDED * span) s->resting = 0;
     s->instants[s->n_instants % CROWD] = s->t;
     if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
-    if (c->model->settings->rests && !s->resting) {
-        s->resting = 1;
+    if (c->model->settings->rests && (s->resting == 0 || s->t - first < CONVERGES * s->resting)) {
+        s->resting = fmax(s->t - first, DBL_MIN);
         s->n_instants = 0;
         return RESULT_OK;
     }
@@ -185,10 +213,17 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
     return RESULT_OK;
 }
 
+/* Adds guards that an update has made positive, however soon they will fall again: a rebound may be that short. */
+static void want_jumped(Instance *c, const double *before, unsigned char *wanting) {
+    evaluate_now(c, &c->model->tapes.guards, c->guards_before);
+    for (int g = 0; g < c->model->n_guards; g++)
+        if (before[g] < 0 && c->guards_before[g] > 0 && guard_active(c, g)) wanting[c->model->guard_transition[g]] = 1;
+}
+
 /* Fire what wants to fire until nothing does. `wanting` holds the state events that were located, if `located`. */
 Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     const Model *m = c->model;
-    double *before = c->d_before;
+    double *before = c->d_before, *jumped = c->edge_guards;
     int changes = m->n_updates > 0, rounds = ROUNDS + ALONE * (m->n_holds + m->n_ideals), met;
     c->stopped = 0;
     memset(c->entered, 0, (size_t)m->n_holds);
@@ -203,7 +238,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             if (met) find_wanting(c, wanting, 1);
         }
         for (int k = 0; k < m->n_transitions; k++) any |= wanting[k] = wanting[k] && (!any || round < TOGETHER);
-        if (!gradient_round(c, round, wanting, any | changes)) return RESULT_OK;
+        if (!gradient_round(c, round, wanting, any | changes)) return refuse_contradiction(c);
         any = any_of(wanting, m->n_transitions); /* it may have told others to fire */
         if (c->bounded && --c->budget < 1) {
             c->state.at_event = 1; /* the rest comes at the beginning of the next step */
@@ -219,17 +254,48 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             for (int k = 0; k < m->n_ideals; k++) same &= c->d[m->ideals[k].mode] == c->d_earlier[m->ideals[k].mode];
             if (!meet(c, same ? GIVEN_BACK : 0, &met)) return RESULT_ERROR;
         }
+        if (m->n_updates > 0 && m->n_guards > 0) evaluate_now(c, &m->tapes.guards, jumped);
         if (!update_once(c, &changes)) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) {
             drop_balanced(c, c->guards);
+            drop_returning(c, before, c->guards);
             keep_wanting(c, c->guards, wanting);
         }
+        if (changes && m->n_guards > 0) want_jumped(c, jumped, wanting);
     }
     if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", c->state.t);
+    int last = 0;
+    while (last < m->n_transitions - 1 && !wanting[last]) last++;
     return fail(c,
-        "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        rounds, c->state.t);
+        "Modes still switch after %d rounds at t = %.12g s: %s. Give the switching a hysteresis, or smooth what drives "
+        "it.",
+        rounds, c->state.t, text_of(m, m->transitions[last].name));
+}
+
+/* An error if a relation became true and stays true, because what it sets is at rest and is turned back too late: as in
+   penetration.py. `before`: guards and rates before the instant; its modes are in d_begun. */
+Result check_turned_back(Instance *c, const double *before) {
+    const Model *m = c->model;
+    double step = LATER * TIME_RESOLUTION * fmax(1, fabs(c->state.t)), *now = c->guards_before;
+    double *rates = now + m->n_guards, *later = c->edge_guards + m->n_guards;
+    evaluate_now(c, &m->tapes.guards, now);
+    look_ahead(c, &m->tapes.guards, step, c->edge_guards);
+    for (int g = 0; g < m->n_guards; g++)
+        if (guard_active(c, g) && now[g] + 0.5 * step * (rates[g] + later[g]) > 0) return RESULT_OK; /* it comes */
+    for (int g = 0; g < m->n_guards; g++) {
+        const Transition *one = &m->transitions[m->guard_transition[g]];
+        double rate = rates[g], turn = later[g] - rate;
+        int slow = fmax(fabs(before[m->n_guards + g]), fabs(rate)) < turn && fabs(before[g]) < turn * step;
+        if (!slow || c->d_begun[one->mode] == one->target || c->d[one->mode] != one->target) continue;
+        if (strstr(text_of(m, one->name), "relation[") == NULL) continue; /* a declared mode may keep its condition */
+        if (rate > -turn / LATER || now[g] > rate * rate * step / (2 * turn))
+            return fail(c,
+                "At %.9g s the condition of %s stays true: what is set there is at rest, and would pass without "
+                "another event. Let it rest: a mode that holds the motion, with a restitution.",
+                c->state.t, text_of(m, one->name));
+    }
+    return RESULT_OK;
 }
 
 /* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if

@@ -104,7 +104,7 @@ static Result one_step(Instance *c, double end) {
     int fired = 0;
     c->budget = BUDGET;
     if (!take_changes(c) || (s->at_event && !fire_here(c, &fired))) return RESULT_ERROR;
-    while (s->t < end) {
+    while (s->t < end && !s->ended) {
         double moment = c->budget >= 2 ? next_moment(c) : INFINITY;
         if (!go_on(c, fmin(end, moment), &fired)) return RESULT_ERROR;
         if (fired || s->at_event || !is_due(c)) continue;
@@ -120,7 +120,7 @@ Arrival step_fixed(Instance *c, double target) {
     double begin = c->state.t, h = c->model->settings->fixed_step, until = target;
     int n = (int)(0.5 + (target - begin) / h), done = 1;
     c->bounded = 1;
-    for (int k = 1; k <= n && done && c->state.t < until; k++) {
+    for (int k = 1; k <= n && done && c->state.t < until && !c->state.ended; k++) {
         done = one_step(c, k < n ? begin + k * h : target);
         if (done && c->step_finished != NULL) until = fmin(until, c->step_finished(c));
     }

@@ -113,7 +113,7 @@ Status FMI(CompletedIntegratorStep)(void *instance, FMI(Boolean) noSetFMUStatePr
     if (!settle(c)) return FMI(Error);
     keep_past(c, c->state.t, c->x, -1);
     *enterEventMode = find_wanting(c, nothing_wanting(c), 1) != 0;
-    *terminateSimulation = 0;
+    *terminateSimulation = c->state.ended != 0;
     return FMI(OK);
 }
 

@@ -74,7 +74,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInf
     NEED(1, eventInfo);
     if (!update_discrete(c, &restart, &next)) return failed(c);
     eventInfo->newDiscreteStatesNeeded = fmi2False;
-    eventInfo->terminateSimulation = fmi2False;
+    eventInfo->terminateSimulation = c->state.ended != 0;
     eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
     eventInfo->valuesOfContinuousStatesChanged = restart;
     eventInfo->nextEventTimeDefined = isfinite(next);
@@ -92,13 +92,14 @@ fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint
     double target;
     ENTER(DoStep, PHASE_STEP);
     if (!check_step(c, currentCommunicationPoint, communicationStepSize, &target)) return fmi2Error;
-    return integrate_to(c, target, 0) == FAILED ? failed(c) : fmi2OK;
+    if (integrate_to(c, target, 0) == FAILED) return failed(c);
+    return c->state.ended ? fmi2Discard : fmi2OK;
 }
 
 DO(CancelStep, ANY_PHASE,
     fail(c, "fmi2CancelStep: there is no step to cancel, as fmi2DoStep returns when its step is done."))
 
-/* fmi2DoStep is never pending or discarded, so little is told about it. */
+/* fmi2DoStep is never pending, and discarded only where a component has ended the run. */
 #define GET_STATUS(name, type, told, answer)                                                                       \
     fmi2Status fmi2##name(fmi2Component instance, const fmi2StatusKind kind, type *value) {                        \
         ENTER(name, PHASE_STEP | PHASE_TERMINATED | PHASE_FAILED);                                                 \
@@ -112,5 +113,5 @@ DO(CancelStep, ANY_PHASE,
 GET_STATUS(GetStatus, fmi2Status, NEVER, fmi2OK)
 GET_STATUS(GetRealStatus, fmi2Real, fmi2LastSuccessfulTime, c->state.t)
 GET_STATUS(GetIntegerStatus, fmi2Integer, NEVER, 0)
-GET_STATUS(GetBooleanStatus, fmi2Boolean, fmi2Terminated, fmi2False)
+GET_STATUS(GetBooleanStatus, fmi2Boolean, fmi2Terminated, c->state.ended != 0)
 GET_STATUS(GetStringStatus, fmi2String, NEVER, "")

@@ -167,7 +167,8 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     NEED(1, discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
         valuesOfContinuousStatesChanged, nextEventTimeDefined, nextEventTime);
     if (!update_discrete(c, &restart, &next)) return failed(c);
-    *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = fmi3False;
+    *discreteStatesNeedUpdate = *nominalsOfContinuousStatesChanged = fmi3False;
+    *terminateSimulation = c->state.ended != 0;
     *valuesOfContinuousStatesChanged = restart != 0;
     *nextEventTimeDefined = isfinite(next);
     *nextEventTime = isfinite(next) ? next : 0;
@@ -194,6 +195,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     Arrival arrival = integrate_to(c, target, c->event_mode_used && c->early_return_allowed);
     *lastSuccessfulTime = c->state.t;
     *eventHandlingNeeded = arrival == AT_EVENT;
-    *earlyReturn = c->state.t < target;
+    *terminateSimulation = c->state.ended != 0;
+    *earlyReturn = c->state.t < target && c->early_return_allowed; /* where it is not, the end of the run is told */
     return arrival == FAILED ? failed(c) : fmi3OK;
 }

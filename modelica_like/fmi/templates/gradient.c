@@ -10,9 +10,13 @@
 
 #define NEARBY 3e-6      /* of the sizes of states and parameters: how far instants are moved */
 #define FELT_CHANGE 1e-9 /* of states and rates, relative to their sizes */
+#define FELT_KINK 1e-3   /* of a slope: curvature changes it by about NEARBY */
+#define CLOSER 0.01      /* the part of that where a kink differs as much */
+#define RESTS 1e-3       /* of a run: a step from which on what is zero at both its ends rests */
 #define MOST_ROUNDS 32
 #define MOST_TANGENTS 100000
-#define STEPS 4 /* per step of the run */
+#define STEPS 4        /* per step of the run */
+#define MOST_EDGES 100 /* in a step: more are noise */
 enum { N_STAGES = 6 };
 
 static const double NODES[N_STAGES] = {0, 0.5, 0.332, 0.62, 0.85, 1};
@@ -89,11 +93,12 @@ static void take_stage(Instance *c, Tangent *one, int i, double h) {
     if (i == N_STAGES - 1) memcpy(x, solved, n_x * sizeof(double));
 }
 
-void gradient_move(Instance *c, double end) {
+/* A part of the piece without edges, from the present point on. */
+static void move_smoothly(Instance *c, double end) {
     Gradient *g = c->gradient;
     const Model *m = c->model;
     double begin = c->state.t, h = (end - begin) / STEPS, *rates = c->rhs;
-    if (g == NULL || g->why != NULL || h <= 0) return;
+    if (h <= 0) return;
     if (!factor_implicit(c)) gradient_lose(c, "its equations are singular there", NULL);
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);
@@ -111,6 +116,112 @@ void gradient_move(Instance *c, double end) {
             if (stage == 1 && i > 1) memcpy(stages, stages + (N_STAGES - 1) * m->n_x, m->n_x * sizeof(double));
             take_stage(c, &g->tangents[j], stage, h);
         }
+    }
+}
+
+static double span_of(const Instance *c) {
+    return c->state.stop_time_defined ? c->state.stop_time - c->state.start_time : 1;
+}
+
+/* A part of a tangent along which everything changes but little. */
+static double small_part(const Instance *c, const Tangent *one) {
+    const double *x = part_of(c, one, c->x), *d = part_of(c, one, c->d);
+    double value = c->numbers[one->place], largest = value == 0 ? 1 : fabs(1 / value);
+    for (int k = 0; k < c->model->n_x; k++)
+        largest = fmax(largest, fabs(x[k]) / (fabs(c->x[k]) + c->model->nominals[k]));
+    for (int k = 0; k < c->model->n_d; k++) largest = fmax(largest, fabs(d[k]) / (1 + fabs(c->d[k])));
+    return NEARBY / fmax(largest, fabs(one->shift) / fmax(1, fabs(c->state.t)));
+}
+
+/* Slopes along a tangent at the present point. */
+static void slopes_along(Instance *c, const Tangent *one, double *slopes) {
+    c->variables_valid = c->state.z_valid = 0;
+    memset(slopes, 0, (size_t)c->model->n_x * sizeof(double));
+    if (!factor_implicit(c)) return;
+    load_tangent(c, one, 1);
+    tangent_now(c, &c->model->tapes.rates, slopes);
+}
+
+/* By how much slopes differ that can be felt in the time of a run, beside what has moved so far. */
+static double felt(const Instance *c, const Tangent *one, const double *some, const double *others) {
+    const double *x = part_of(c, one, c->x), *nominals = c->model->nominals;
+    double largest = 0, most = 0;
+    for (int k = 0; k < c->model->n_x; k++) largest = fmax(largest, fabs(x[k]) / nominals[k]);
+    for (int k = 0; k < c->model->n_x; k++) {
+        double change = fabs(some[k] - others[k]), least = FELT_CHANGE * largest * nominals[k] / span_of(c);
+        int any = change > least && change > FELT_KINK * fmax(fabs(some[k]), fabs(others[k]));
+        if (any) most = fmax(most, change / nominals[k]);
+    }
+    return most;
+}
+
+/* By how much slopes along a tangent differ a little to its two sides. */
+static double felt_beside(Instance *c, const Tangent *one, double part) {
+    const Model *m = c->model;
+    double *sides = one->stages, *z = sides + 2 * m->n_x;
+    memcpy(one->next, c->numbers, c->n_smooth * sizeof(double));
+    memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
+    for (int side = 0; side < 2; side++) {
+        double way = side == 0 ? -part : part;
+        for (size_t k = 0; k < c->n_smooth; k++) c->numbers[k] = one->next[k] + way * one->now[k];
+        slopes_along(c, one, sides + side * m->n_x);
+        memcpy(c->numbers, one->next, c->n_smooth * sizeof(double));
+        memcpy(c->z, z, (size_t)m->n_z * sizeof(double));
+    }
+    return felt(c, one, sides, sides + m->n_x);
+}
+
+/* Whether slopes along a tangent that leads off an edge are other ones on its two sides: what is only curved differs
+ * less when closer. */
+static int has_kink(Instance *c, const Tangent *one) {
+    double part = small_part(c, one), here;
+    load_tangent(c, one, 1);
+    if (!leads_off_edge(c, AT_EDGE * NEARBY / part)) return 0;
+    here = felt_beside(c, one, part);
+    return here > 0 && felt_beside(c, one, CLOSER * part) > 0.5 * here;
+}
+
+/* Whether a tangent leads to a mode with other slopes: its guard is zero. */
+static int has_other_mode(Instance *c, const Tangent *one, int guard) {
+    const Model *m = c->model;
+    const Transition *to = &m->transitions[m->guard_transition[guard]];
+    double *sides = one->stages, *z = sides + 2 * m->n_x, mode = c->d[to->mode];
+    slopes_along(c, one, sides);
+    tangent_now(c, &m->tapes.guards, c->edge_guards);
+    if (fabs(c->edge_guards[guard]) * small_part(c, one) <= AT_EDGE * NEARBY) return 0;
+    memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
+    c->d[to->mode] = to->target;
+    slopes_along(c, one, sides + m->n_x);
+    c->d[to->mode] = mode;
+    memcpy(c->z, z, (size_t)m->n_z * sizeof(double));
+    return felt(c, one, sides, sides + m->n_x) > 0;
+}
+
+/* What rests at a limit, an end of play or a row of a table has two derivatives by what leads off it. Behind an event
+ * something may be zero for a short step because it begins there. */
+static void check_kinks(Instance *c) {
+    Gradient *g = c->gradient;
+    if (c->piece->end - c->piece->begin < RESTS * span_of(c)) return;
+    if (!stands_on_edge(c, c->positive) || !factor_implicit(c)) return;
+    for (int j = 0; j < g->n; j++) {
+        int kink = has_kink(c, &g->tangents[j]);
+        for (int k = 0; k < c->model->n_guards; k++)
+            if (c->positive[k]) kink |= has_other_mode(c, &g->tangents[j], k);
+        if (kink) gradient_lose(c, "it is at a kink there", g->tangents[j].by);
+    }
+    c->variables_valid = c->state.z_valid = 0;
+}
+
+/* States are smooth enough at edges within a step, slopes of tangents are not. */
+void gradient_move(Instance *c, double end) {
+    if (c->gradient != NULL && c->gradient->why == NULL && c->state.t < end) check_kinks(c);
+    for (int k = 0; c->gradient != NULL && c->gradient->why == NULL && c->state.t < end; k++) {
+        double behind = INFINITY, before = k < MOST_EDGES ? edge_ahead(c, c->state.t, &behind) : INFINITY;
+        move_smoothly(c, fmin(before, end));
+        if (!(behind < end)) return;
+        piece_at(c->model, c->piece, behind, c->x);
+        c->state.t = behind;
+        c->variables_valid = c->state.z_valid = 0;
     }
 }
 
@@ -165,16 +276,6 @@ int gradient_round(Instance *c, int round, unsigned char *wanting, int any) {
     if (any && round >= MOST_ROUNDS) gradient_lose(c, "that event has too many rounds", NULL);
     else if (any) memcpy(g->rounds + n * (size_t)round, wanting, n);
     return any;
-}
-
-/* A part of a tangent along which everything changes but little. */
-static double small_part(const Instance *c, const Tangent *one) {
-    const double *x = part_of(c, one, c->x), *d = part_of(c, one, c->d);
-    double value = c->numbers[one->place], largest = value == 0 ? 1 : fabs(1 / value);
-    for (int k = 0; k < c->model->n_x; k++)
-        largest = fmax(largest, fabs(x[k]) / (fabs(c->x[k]) + c->model->nominals[k]));
-    for (int k = 0; k < c->model->n_d; k++) largest = fmax(largest, fabs(d[k]) / (1 + fabs(c->d[k])));
-    return NEARBY / fmax(largest, fabs(one->shift) / fmax(1, fabs(c->state.t)));
 }
 
 /* Passes the instant on both sides of the run; returns 0 if other modes follow. */

@@ -191,15 +191,20 @@ Result stop_motions(Instance *c, const double *before) {
     if (!any_of(strike->entering, m->n_holds)) return RESULT_OK;
     begin_strike(c, strike, terms);
     if (strike->hard) {
+        if (first) memcpy(c->impact_x, c->x, (size_t)m->n_x * sizeof(double));
+        if (first) memcpy(c->impact_d, c->d, (size_t)m->n_d * sizeof(double));
         for (int k = 0; k < m->n_holds; k++) {
             const Held *one = &m->holds[k];
+            int mode = (int)c->d[one->mode];
             strike->entering[k] = entered[k] |= strike->entering[k];
-            if (!entered[k] || c->d[one->mode] == one->number) continue;
-            /* Finite forces have released it since the first impact at this instant: they act after it. */
-            note_change(c, one->name, -1, one->mode, one->number);
-            c->d[one->mode] = one->number;
+            /* Finite forces have released it since the first impact at this instant: they act after it. Or it has come
+             * to rest by an impact that is now solved anew. */
+            if (entered[k]) mode = one->number;
+            else if (mode == one->number) mode = (int)c->impact_d[one->mode];
+            if (mode == c->d[one->mode]) continue;
+            note_change(c, one->name, -1, one->mode, mode);
+            c->d[one->mode] = mode;
         }
-        if (first) memcpy(c->impact_x, c->x, (size_t)m->n_x * sizeof(double));
         c->stopped = 1;
         memcpy(c->x, c->impact_x, (size_t)m->n_x * sizeof(double));
         if (!share_and_solve(c)) return RESULT_ERROR;
@@ -365,6 +370,20 @@ Result meet(Instance *c, double keep, int *any) {
     move_states(c, c->places, NULL, *any);
     c->variables_valid = 0;
     return solve_now(c, 0);
+}
+
+/* Refuses modes in which an element and the rest of the circuit ask for different voltages or currents. */
+Result refuse_contradiction(Instance *c) {
+    for (int k = 0; k < c->model->n_ideals; k++) {
+        if (row_of(c, k)[HEAD - 1] == 0) continue;
+        const double *values = variables_now(c);
+        if (excess(c, k, values, LOST) > 0)
+            return fail(c,
+                "At t = %.9g s %s contradicts the rest of the circuit: it is ideal and makes zero what the rest makes "
+                "%.4g. Put a resistance in series or in parallel with it.",
+                c->state.t, text_of(c->model, c->model->ideals[k].name), values[zero_of(c, k)]);
+    }
+    return RESULT_OK;
 }
 
 /* Inputs or parameters have changed, and the conditions with them. */

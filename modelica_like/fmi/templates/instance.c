@@ -58,7 +58,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
     uint64_t starts = m->n_starts, slots = m->n_slots, delays = m->n_delays, used = 0, left = 0;
     uint64_t members = m->most_members + 1, ideal = m->n_ideals > 0 ? n_z : 0, dense = n_z * n_z;
     uint64_t jacobian = larger(m->n_jacobian, m->start.n_nonzeros), system = larger(n, m->start.size);
-    uint64_t steady = m->settings->steady ? m->n_steady : 0;
+    uint64_t steady = m->settings->steady ? m->n_steady : 0, edges = m->tapes.edges.n_outputs;
     uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), larger(m->n_updates, holds + m->n_ideals));
     uint64_t small = larger(larger(guards, m->n_moments), larger(larger(m->n_start_modes, n_d), m->n_derived));
     uint64_t outputs = larger(larger(n, m->n_nodes), larger(larger(m->n_derived, m->n_moments), 2 * guards));
@@ -101,7 +101,7 @@ void instance_reset(Instance *c) {
     s->phase = PHASE_INSTANTIATED;
     s->tolerance = m->settings->default_tolerance;
     s->absolute = s->tolerance * m->settings->absolute_to_relative;
-    c->variables_valid = c->look_valid = 0;
+    c->variables_valid = c->look_valid = c->edges_valid = 0;
     gradient_end(c);
     memcpy(c->p, m->parameters, m->n_p * sizeof(double));
     memcpy(c->u, m->inputs, m->n_u * sizeof(double));
@@ -195,7 +195,7 @@ Result state_copy_out(Instance *c, void **copy) {
 Result state_copy_in(Instance *c, const void *copy) {
     memcpy(&c->state, copy, sizeof(State));
     memcpy(c->numbers, (const char *)copy + sizeof(State), c->n_numbers * sizeof(double));
-    c->variables_valid = c->look_valid = 0;
+    c->variables_valid = c->look_valid = c->edges_valid = 0;
     gradient_lose(c, "the state was set", NULL);
     return RESULT_OK;
 }

@@ -4,9 +4,11 @@
 #include "core.h"
 
 #define MAX_REJECTIONS 60
-#define SAME_POINT 1e-9 /* rounding of the importer's communication points */
-#define SAME_PART 1e-6  /* of a fixed step */
-#define LEAST_STEPS 50  /* per run, where time itself is in the equations: a pulse could hide between longer ones */
+#define LEAST_OVER_EDGE 10 /* of the least step: no error is asked of shorter ones at an edge */
+#define MAX_LANDINGS 8     /* on edges: what switches without end is integrated as it is written */
+#define SAME_POINT 1e-9    /* rounding of the importer's communication points */
+#define SAME_PART 1e-6     /* of a fixed step */
+#define LEAST_STEPS 50     /* per run, where time itself is in the equations: a pulse could hide between longer ones */
 
 /* One step of RODAS5P: a stiffly accurate, L-stable Rosenbrock method of order 5(4) for index-1 systems with dense
  * output of order 4 (G. Steinebach, BIT Numerical Mathematics 63:27, 2023). Notation as in Hairer & Wanner II, ch.
@@ -74,7 +76,7 @@ int factor_step(Instance *c, double diagonal) {
     return qr_factor(&m->step, c->matrix, c);
 }
 
-static double error_norm(const Instance *c, const double *first, const double *last, const double *error) {
+double error_norm(const Instance *c, const double *first, const double *last, const double *error) {
     double sum = 0, rtol = c->state.tolerance, atol = c->state.absolute;
     if (c->model->n_x == 0) return 0;
     for (int k = 0; k < c->model->n_x; k++) {
@@ -95,7 +97,7 @@ double rosenbrock_step(Instance *c, double t, const double *first, double h, int
     piece->end = t + h;
     memcpy(piece->points, first, size);
     if (!keep_jacobian) linearize(c, t, first, slope);
-    if (!factor_step(c, 1 / (h * GAMMA))) return -1;
+    if (!factor_step(c, step_diagonal(h))) return -1;
     c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
         double *stage = c->stages + (size_t)i * n;
@@ -126,6 +128,9 @@ double rosenbrock_step(Instance *c, double t, const double *first, double h, int
     }
     return error_norm(c, first, last, c->stages + (STAGES - 1) * n);
 }
+
+/* Of the matrix of a step of length h. */
+double step_diagonal(double h) { return 1 / (h * GAMMA); }
 
 double *last_of(const Model *m, Piece *piece) { return piece->points + m->n_unknowns; }
 
@@ -161,15 +166,16 @@ static void clear_pending(Instance *c) {
 }
 
 static void leave_piece(Instance *c) {
-    c->state.piece_valid = c->state.looked = c->look_valid = 0;
+    c->state.piece_valid = c->state.looked = c->look_valid = c->edges_valid = 0;
     clear_pending(c);
 }
 
 static double largest_step(const Instance *c) {
-    double span = c->state.stop_time - c->state.start_time;
-    if (c->model->n_x > 0 && !c->model->settings->rates_depend_on_time) return INFINITY;
-    if (!c->state.stop_time_defined || !(span > 0)) return c->model->n_x == 0 ? 1e-3 : INFINITY;
-    return span / LEAST_STEPS;
+    double span = c->state.stop_time - c->state.start_time,
+           longest = c->state.longest > 0 ? c->state.longest : INFINITY;
+    if (c->model->n_x > 0 && !c->model->settings->rates_depend_on_time) return longest;
+    if (!c->state.stop_time_defined || !(span > 0)) return c->model->n_x == 0 ? fmin(longest, 1e-3) : longest;
+    return fmin(longest, span / LEAST_STEPS);
 }
 
 /* Below this, two times are the same. */
@@ -179,8 +185,8 @@ static double least_step(const State *s) { return 1e-15 * fmax(1, fabs(s->t)); }
 static Result take_step(Instance *c, double limit) {
     State *s = &c->state;
     double *first = c->first, wished = s->step > 0 ? s->step : first_step(c);
-    double least = least_step(s);
-    int rejected = 0;
+    double least = least_step(s), most = INFINITY;
+    int rejected = 0, landings = 0;
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
     wished = fmin(wished, largest_step(c));
     for (int n = 0; n < MAX_REJECTIONS; n++) {
@@ -191,10 +197,17 @@ static Result take_step(Instance *c, double limit) {
         if (h < least || !isfinite(h)) break;
         error = rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece);
         if (!(error >= 0 && isfinite(error))) error = 1e30;
+        else if (error > 1 && h < LEAST_OVER_EDGE * least && is_over_edge(c)) error = 1;
         if (cut) c->piece->end = limit;
         factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
-        if (error > 1 || !solve_implicit(c, c->piece->end, last_of(c->model, c->piece), 1) ||
-            (c->model->n_guards > 0 && !search_events(c))) {
+        int solved = error <= 1 && solve_implicit(c, c->piece->end, last_of(c->model, c->piece), 1);
+        double seen = solved && c->model->tapes.edges.n_outputs > 0 ? seen_length(c, least, &most) : INFINITY;
+        if (seen < h && landings++ < MAX_LANDINGS) {
+            rejected++;
+            wished = seen;
+            continue;
+        }
+        if (!solved || (c->model->n_guards > 0 && !search_events(c))) {
             rejected++;
             s->n_rejected++;
             wished = h * (error > 1 ? fmax(0.1, factor) : 0.25);
@@ -202,7 +215,8 @@ static Result take_step(Instance *c, double limit) {
         }
         s->n_steps++;
         factor = fmin(factor, rejected ? 1 : 6);
-        s->step = cut ? fmax(wished, h * factor) : h * factor;
+        s->step = fmin(cut ? fmax(wished, h * factor) : h * factor, most);
+        keep_edges(c);
         s->piece_valid = 1;
         if (c->log_enabled & LOG_INTEGRATOR)
             report(c, LOG_INTEGRATOR, RESULT_OK, "t = %.12g s: step %.3e s, error %.2e of the tolerance, %d rejected",
@@ -238,6 +252,7 @@ Result take_changes(Instance *c) {
 static Result pass_event(Instance *c) {
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
+    int whens = c->model->n_updates > 0 && c->model->n_guards > 0;
     int located = s->event_pending, ticks = !located && (c->model->n_moments > 0 || delays_due(c));
     size_t size = (size_t)c->model->n_x * sizeof(double);
     double *x = c->first, *rates = c->first_rates, step = s->step, events = s->n_events;
@@ -248,8 +263,11 @@ static Result pass_event(Instance *c) {
     s->z_valid = 0;
     if (!settle(c) || !reach_instant(c)) return RESULT_ERROR;
     if (ticks) evaluate_now(c, &c->model->tapes.rates, rates);
+    if (whens) evaluate_now(c, &c->model->tapes.guards, c->looks);
     memcpy(x, c->x, size);
+    memcpy(c->d_begun, c->d, (size_t)c->model->n_d * sizeof(double));
     if (!iterate_events(c, wanting, located)) return RESULT_ERROR;
+    if (whens && memcmp(x, c->x, size) != 0 && !check_turned_back(c, c->looks)) return RESULT_ERROR;
     s->z_valid = 1;
     if (!leave_instant(c, s->n_events != events)) return RESULT_ERROR;
     if (!ticks || memcmp(x, c->x, size) != 0) return RESULT_OK;
@@ -305,7 +323,7 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
         held |= s->inputs_changed;
         if (!take_changes(c)) return FAILED;
         if (s->at_event && (stop_at_events || !handle_event(c))) return stop_at_events ? AT_EVENT : FAILED;
-        if (!(s->t < target)) return REACHED;
+        if (!(s->t < target) || s->ended) return REACHED;
         if (!s->piece_valid && target - s->t < least_step(s)) {
             /* An event was located a rounding error before the target. */
             s->t = target;

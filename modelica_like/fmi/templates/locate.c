@@ -161,11 +161,12 @@ static int mark_wanting(Instance *c, const Look *look, double tolerance) {
 
 typedef enum { NOTHING, ENDED, TOO_LONG } Found;
 
-/* Go on by the time resolution; what crossed and is still positive there wants to fire, else the search begins anew. */
+/* Go on by the time resolution; what crossed and is still positive then wants to fire, else the search begins anew. */
 static Found look_behind(Instance *c, double end, Look *look) {
-    if (!step_to(c, fmin(c->piece->end + TIME_RESOLUTION * fmax(1, fabs(c->piece->end)), end), look)) return TOO_LONG;
+    double due = c->piece->end + TIME_RESOLUTION * fmax(1, fabs(c->piece->end));
+    if (!step_to(c, fmin(due, end), look)) return TOO_LONG;
     for (int g = 0; g < c->model->n_guards; g++)
-        if (c->kinds[g] == CROSSING && look->values[g] > 0)
+        if (c->kinds[g] == CROSSING && fmin(look->values[g], look->values[g] + (due - look->t) * look->rates[g]) > 0)
             c->state.event_pending = c->wanting[c->model->guard_transition[g]] = 1;
     return ENDED;
 }

@@ -3,7 +3,7 @@
  * resources, which importers name in many ways. */
 #include "model.h"
 
-#define FORMAT 6
+#define FORMAT 7
 #define UNKNOWN (-1)
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
 
@@ -41,7 +41,7 @@ static const struct {
     TABLE(start_rows, n_start_unknowns), TABLE(start_dependent, n_start_dependent), TABLE(start_zero, n_start_zero),
     TABLE(start_columns, n_start_unknowns), TABLE(steady, n_steady), TABLE(jacobian_to_step, n_jacobian),
     TABLE(step_diagonal, n_x), QR(step), QR(start), TAPE(rates), TAPE(jacobian), TAPE(alg), TAPE(alg_jacobian),
-    TAPE(variables), TAPE(guards), TAPE(guards_soon), TAPE(moments), TAPE(resets), TAPE(updates),
+    TAPE(variables), TAPE(guards), TAPE(edges), TAPE(guards_soon), TAPE(moments), TAPE(resets), TAPE(updates),
     TAPE(start_conditions), TAPE(start_values), TAPE(discrete_starts), TAPE(hold_terms), TAPE(determinants),
     TAPE(start_system), TAPE(start_jacobian), TAPE(derived), TAPE(delays)};
 enum { N_TABLES = sizeof tables / sizeof tables[0] };
@@ -186,7 +186,9 @@ typedef struct { /* integers of records, not below `low` and below `end` */
 
 /* Every index is one of the table that it points into. */
 static int check_indices(const Model *m, char *message) {
-    const Range ranges[] = {COLUMN(settings, terminal, n_settings, -1, m->n_modes), ARRAY(state_names, n_x, n_text),
+    const Range ranges[] = {COLUMN(settings, terminal, n_settings, -1, m->n_modes),
+        COLUMN(settings, n_edges, n_settings, 0, m->tapes.edges.n_outputs + 1),
+        COLUMN(settings, n_slope_edges, n_settings, 0, m->settings->n_edges + 1), ARRAY(state_names, n_x, n_text),
         ARRAY(implicit_names, n_z, n_text), ARRAY(singular_names, n_determinants, n_text),
         COLUMN(variables, kind, n_variables, 0, N_KINDS), COLUMN(variables, type, n_variables, 0, N_TYPES),
         TEXT(variables, name), COLUMN(variables, count, n_variables, 1, m->n_p + 2), INDEX(rising, below, n_p),

@@ -71,7 +71,7 @@ typedef struct { /* of a transition, or an update: at events, and where at_start
 } Reset;
 typedef struct {
     int mode, target;
-    short timed, fails;
+    short timed, ends; /* 1: the run ends with an error, 2: regularly */
     int index, name, notice;
     uint64_t sources;
 } Transition;
@@ -105,10 +105,11 @@ typedef struct {
 } StartRow;
 typedef struct {
     int n_d, n_y, steady, rates_depend_on_time;
-    int implicit_linear; /* the implicit equations are linear in z */
-    int terminal;        /* entry of d that becomes 1 at the end of a run, or -1 */
-    int ideal;           /* entry of d where the rows of ideal elements begin */
-    int rests;           /* where impacts follow each other ever faster, they end in contact */
+    int implicit_linear;        /* the implicit equations are linear in z */
+    int terminal;               /* entry of d that becomes 1 at the end of a run, or -1 */
+    int ideal;                  /* entry of d where the rows of ideal elements begin */
+    int n_edges, n_slope_edges; /* the first results of their tape: of slopes, then of guards; phases follow */
+    int rests;                  /* where impacts follow each other ever faster, they end in contact */
     double absolute_to_relative, default_tolerance;
     double fixed_step; /* 0: as accuracy asks for */
 } Settings;
@@ -141,7 +142,7 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     const int *jacobian_to_step, *step_diagonal;
     QrPattern step, start;
     struct {
-        Tape rates, jacobian, alg, alg_jacobian, variables, guards, guards_soon, moments, resets, updates,
+        Tape rates, jacobian, alg, alg_jacobian, variables, guards, edges, guards_soon, moments, resets, updates,
             start_conditions, start_values, discrete_starts, hold_terms, determinants, start_system, start_jacobian,
             derived, delays;
     } tapes;

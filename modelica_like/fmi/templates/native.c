@@ -15,10 +15,11 @@ typedef struct {
     double *modes, *firsts;           /* by segment: d (modes, discrete values, what holds need); its first point */
     double *events;             /* time, transition (-1: an impact's), mode, from, to, round, segment that follows */
     double *impacts;            /* time, motion that is held, energy in J */
+    double *steps_taken;        /* segment, begin, end, and `piece_at`'s points: states and implicit unknowns */
     const uint32_t *references; /* of the outputs */
     int64_t n_outputs, steps;
-    int64_t room_points, room_segments, room_events, room_impacts;
-    int64_t n_points, n_segments, n_events, n_impacts;
+    int64_t room_points, room_segments, room_events, room_impacts, room_taken;
+    int64_t n_points, n_segments, n_events, n_impacts, n_taken;
     int64_t next, first; /* number of the next result, first point of the open segment */
     double begin, last;  /* times of the run's begin and of the last point */
 } NativeRun;
@@ -92,6 +93,9 @@ EXPORTED int native_reset(Native *n, double start, double stop, double rtol, dou
     return code(instance_prepare(n->c, start, stop, rtol, atol));
 }
 
+/* The largest step from now on, in s. */
+EXPORTED void native_limit(Native *n, double longest) { n->c->state.longest = longest; }
+
 /* Before the begin: parameters, inputs and start values; later: inputs, and parameters that are tunable. */
 EXPORTED int native_set(Native *n, int64_t count, const uint32_t *references, const double *values) {
     for (int64_t k = 0; k < count; k++)
@@ -139,6 +143,23 @@ EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const 
     c->state.solved = 1;
     c->state.z_valid = c->variables_valid = 0;
     return code(instance_begin(c));
+}
+
+/* The states after the events that come first; with other ones, if these are `given`. Those may move what modes hold:
+ * it is stopped as if they began to hold it now. */
+EXPORTED int native_states(Native *n, const double *given, double *x) {
+    Instance *c = n->c;
+    if (event_first(c) && !handle_event(c)) return NATIVE_FAILED;
+    if (given != NULL) {
+        if (!set_states(c, given)) return NATIVE_FAILED;
+        gradient_lose(c, "the states were set", NULL);
+        for (int k = 0; k < c->model->n_d; k++) c->d_before[k] = -1;
+        memset(c->entered, 0, (size_t)c->model->n_holds);
+        c->stopped = c->state.piece_valid = c->state.event_pending = 0;
+        if (!share_and_solve(c) || !stop_motions(c, c->d_before) || !instance_begin(c)) return NATIVE_FAILED;
+    }
+    memcpy(x, c->x, (size_t)c->model->n_x * sizeof(double));
+    return NATIVE_OK;
 }
 
 /* A control loop's step: sets, goes to a time through all events, gets. */
@@ -223,8 +244,24 @@ static int instant(Native *n, NativeRun *r, double width) {
     return write_point(n, r);
 }
 
+/* Notes the step that has just been taken. */
+static void note_step(Native *n, NativeRun *r) {
+    size_t size = 5 * (size_t)n->c->model->n_unknowns;
+    const Piece *piece = n->c->piece;
+    if (r->steps_taken == NULL) return;
+    double *row = r->steps_taken + (size_t)r->n_taken++ * (3 + size);
+    row[0] = (double)(r->n_segments - 1);
+    row[1] = piece->begin;
+    row[2] = piece->end;
+    memcpy(row + 3, piece->points, size * sizeof(double));
+}
+
+static int steps_full(const NativeRun *r) { return r->steps_taken != NULL && r->n_taken == r->room_taken; }
+
 static double pause_after(Instance *c) {
-    return c->state.n_steps >= ((Native *)c->environment)->pause ? c->state.t : INFINITY;
+    Native *n = c->environment;
+    note_step(n, n->run);
+    return c->state.n_steps >= n->pause || steps_full(n->run) ? c->state.t : INFINITY;
 }
 
 static int last_instant(Native *n, NativeRun *r, double width) {
@@ -239,7 +276,7 @@ static int last_instant(Native *n, NativeRun *r, double width) {
 static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
     State *s = &n->c->state;
     double width = (end - r->begin) / (double)results;
-    while (s->t < end || event_first(n->c) || r->n_segments == 0) {
+    while ((s->t < end && !s->ended) || event_first(n->c) || r->n_segments == 0) {
         double t = r->begin + (end - r->begin) * ((double)r->next / (double)results);
         if (event_first(n->c) || r->n_segments == 0) {
             int result = instant(n, r, width);
@@ -247,11 +284,12 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
             continue;
         }
         if (s->n_steps >= n->pause) return NATIVE_PAUSED;
-        if (r->n_points == r->room_points) return NATIVE_MORE;
+        if (r->n_points == r->room_points || steps_full(r)) return NATIVE_MORE;
         if (r->next++ < results && t <= s->t + fmin(0.5 * NEAR_EVENT * width, SAME * fmax(1, fabs(s->t)))) continue;
         t = r->next <= results ? t : end;
         Arrival arrival = integrate_to(n->c, t, 1);
         if (arrival == FAILED) return NATIVE_FAILED;
+        if (arrival == AT_EVENT) note_step(n, r);
         if (arrival == AT_EVENT || s->t < t) r->next--;
         if (arrival == AT_EVENT) continue;
         if (s->t < t) return NATIVE_PAUSED;
@@ -271,7 +309,7 @@ EXPORTED int native_run(Native *n, double end, int64_t results, NativeRun *run) 
     n->pause = run->steps > 0 ? n->c->state.n_steps + (double)run->steps : INFINITY;
     n->c->noted = note_event;
     n->c->struck = note_impact;
-    n->c->step_finished = run->steps > 0 ? pause_after : NULL;
+    n->c->step_finished = pause_after;
     int result = run_on(n, end, results, run);
     n->run = NULL;
     n->c->step_finished = NULL;

@@ -15,7 +15,7 @@ from modelica_like.draw import schematic
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.fmi.export import tool
 from modelica_like.language import Component
-from modelica_like.native.page import HELPERS
+from modelica_like.native.page import HELPERS, joined_scripts, script_hash
 from modelica_like.report.changes import Change, changes
 from modelica_like.report.page.assessed import design_checks, ranking, small_motions
 from modelica_like.report.page.curves import curves
@@ -77,12 +77,12 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
         ("Energy", _attempt(lambda: _energy(drive, run)) if run.model.components else ""),
         *(_of_equations(drive, run, ends) if drive and isinstance(run, Solution) else ()),
     ]  # fmt: skip
+    script = joined_scripts(HELPERS, folder / "page.js")
     data = json.dumps(drawn, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     parts = {
         "name": escape(run.model.name), "description": escape(getattr(drive, "description", "")), "data": data,
         "sections": "\n".join(f"<section><h2>{title}</h2>{body}</section>" for title, body in sections if body),
-        "helpers": HELPERS.read_text(encoding="utf-8").rstrip(),
-        "script": (folder / "page.js").read_text(encoding="utf-8").rstrip(),
+        "script": script, "hash": script_hash(script),
     }  # fmt: skip
     page = (folder / "page.html").read_text(encoding="utf-8")
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], page)

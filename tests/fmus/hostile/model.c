@@ -2,10 +2,11 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "model.h"
 
-enum { NOTHING, CRASH, HANG, LEAVE, RUN_BACK, CRASH_AT_START, NOT_A_NUMBER };
+enum { NOTHING, CRASH, HANG, LEAVE, RUN_BACK, CRASH_AT_START, NOT_A_NUMBER, CRASH_AT_END, EAT };
 
 static void crash(void) {
     volatile int *volatile nowhere = NULL;
@@ -33,6 +34,9 @@ void model_advance(Model *m, double end) {
         case LEAVE: exit(0);
         case RUN_BACK: m->time = 0; break; /* the next step does not begin where this one has ended: an error */
         case NOT_A_NUMBER: m->v[x] = NAN; break;
+        case CRASH_AT_END: atexit(crash); break; /* when the process has let go of it */
+        case EAT:
+            for (size_t size = 1 << 24;;) memset(malloc(size), 1, size);
         default: break;
     }
 }

@@ -1,0 +1,147 @@
+"""Events exactly at the start, at the end, or when something is read: on one side they are not part of what is read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from modelica_like.analyse.replay.chain import Reading, Replay
+from modelica_like.analyse.replay.edges import Edge
+from modelica_like.analyse.replay.jumps import Jump
+from modelica_like.analyse.sensitivity.replayed import along
+from modelica_like.compile.buffers import Vector
+from modelica_like.compile.compiled import CompiledTransition
+from modelica_like.errors import NoGradient
+from modelica_like.initialize import Point, share, solve_implicit
+from modelica_like.initialize.slopes import slopes
+from modelica_like.runs.readings import Output
+
+_NEAR = 1e-9
+"""Time between an event and an instant, relative to the run, up to which it may be rounding of parameters."""
+_ROUNDING = 1e-9
+
+
+def at_instants(chain: Replay, readings: Sequence[Reading], outputs: Sequence[Output]) -> list[Edge]:
+    """Find the events whose time is that of the start, of the end, or of a reading.
+
+    Args:
+        chain: the run.
+        readings: what is asked for.
+        outputs: their names.
+    """
+    return [*_at_start(chain, readings), *_read_there(chain, readings, outputs)]
+
+
+@dataclass(frozen=True)
+class _Change:
+    """What an event changes at an instant.
+
+    Attributes:
+        states: by how much the states jump, shape (nx,).
+        rates: by how much their derivatives do, shape (nx,).
+        integrands: by how much the integrands do, shape (nq,).
+        sizes: of states, of rates and of integrands, beside which there is rounding.
+    """
+
+    states: Vector
+    rates: Vector
+    integrands: Vector
+    sizes: tuple[Vector, Vector, Vector]
+
+    @classmethod
+    def between(cls, chain: Replay, before: Point, after: Point) -> _Change:
+        """Compare the points before and after."""
+        rates = [slopes(chain.model, one, "ode").value for one in (before, after)]
+        integrands = [chain.functions.integrands(one).copy() for one in (before, after)]
+        x = np.abs(before.x) + chain.model.nominals
+        sizes = x, np.sum(np.abs(rates), axis=0), np.sum(np.abs(integrands), axis=0)
+        return cls(after.x - before.x, rates[1] - rates[0], integrands[1] - integrands[0], sizes)
+
+    def felt(self, row: Vector, quadratures: Vector) -> bool:
+        """Whether what has these derivatives by the states and the quadratures changes with it."""
+        by = row[: len(self.states)]
+        rows = by, by, quadratures if quadratures.size else np.zeros(len(self.integrands))
+        changes = zip(rows, (self.states, self.rates, self.integrands), self.sizes, strict=True)
+        return any(bool(abs(by @ change) > _ROUNDING * (np.abs(by) @ size)) for by, change, size in changes)
+
+
+def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
+    """Timed events that would come a moment after the start; the start has passed over them."""
+    model, start = chain.model, chain.nodes[0]
+    for one in (t for t in model.transitions if t.timed and start.d[t.mode] == t.target):
+        part = slopes(model, start, "moments", [one.index])
+        if not _same(chain, float(part.value[0]), start.t):
+            continue
+        mode = model.flat_discretes[one.mode]
+
+        def matters(one: CompiledTransition = one) -> bool:
+            multipliers = {0: np.zeros(0)}
+            chain.adjoint(readings, multipliers)
+            for source in one.sources:
+                before = start.copy()
+                before.d[one.mode] = source
+                share(model, before)
+                solve_implicit(model, before)
+                change = _Change.between(chain, before, start)
+                if any(change.felt(multipliers[0][:, k], one.quadratures) for k, one in enumerate(readings)):
+                    return True
+            return False
+
+        reading = Reading(float(part.value[0]) - start.t, ((start, part.by[0]),))
+        yield Edge(
+            reading,
+            0.0,
+            _error(start.t, mode.path, mode.names[one.target], "at the start of the run", one.source),
+            matters,
+        )
+
+
+def _read_there(chain: Replay, readings: Sequence[Reading], outputs: Sequence[Output]) -> Iterator[Edge]:
+    end = chain.nodes[-1].t
+    for reading, output in zip(readings, outputs, strict=True):
+        instants = [node.t for node, _ in reading.parts] if output.kind in ("end", "at") else []
+        instants += [end] * bool(reading.quadratures.size)
+        for instant in instants:
+            for jump in (jump for _, jump in chain.jumps if jump.trigger and _same(chain, jump.before.t, instant)):
+                yield _edge(chain, jump, instant, reading, output)
+
+
+def _edge(chain: Replay, jump: Jump, instant: float, reading: Reading, output: Output) -> Edge:
+    trigger, event = jump.time(), jump.events[0]
+
+    def matters() -> bool:
+        points = [_moved(chain, point, trigger.shift) for point in (jump.before, jump.after)]
+        row = reading.parts[0][1] if reading.parts else np.zeros(len(points[0].x))
+        if _Change.between(chain, points[0], points[1]).felt(row, reading.quadratures):
+            return True
+        before, after = along(chain, output.path, points) if reading.parts else (0.0, 0.0)
+        return bool(abs(after - before) > _ROUNDING * (abs(before) + abs(after)))
+
+    where = "at the end of the run" if instant == chain.nodes[-1].t else f"when {output.name} is read"
+    late = jump.before.t + trigger.shift - instant
+    error = _error(instant, event.mode, event.after, where, event.source)
+    return Edge(Reading(late, ((jump.before, trigger.by),)), _ROUNDING * _NEAR, error, matters)
+
+
+def _moved(chain: Replay, point: Point, by: float) -> Point:
+    """A point beside an event, at the event's own time."""
+    moved = point.copy()
+    moved.x = point.x + by * slopes(chain.model, point, "ode").value
+    solve_implicit(chain.model, moved)
+    return moved
+
+
+def _same(chain: Replay, time: float, instant: float) -> bool:
+    return abs(time - instant) <= _NEAR * max(chain.nodes[-1].t - chain.nodes[0].t, abs(instant))
+
+
+def _error(time: float, mode: str, name: str, instant: str, source: Any) -> NoGradient:
+    return NoGradient(
+        f"No gradient at t = {time:.9g} s: {mode} becomes {name} exactly {instant}.",
+        where=source,
+        why="A small change of a parameter moves it to either side, so the derivatives on both sides differ.",
+        advice="Move the parameters away from this limit.",
+    )

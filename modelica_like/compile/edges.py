@@ -1,0 +1,115 @@
+"""Edges: where the slope of the equations changes or jumps without an event, and phases, which repeat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+PHASE_STEP = math.pi / 6
+"""Largest advance of a phase in rad that an integrator may pass unseen: twelve looks show all humps of a wave."""
+
+_DIFFERENCES = frozenset({ca.OP_LT, ca.OP_LE, ca.OP_FMIN, ca.OP_FMAX})
+"""Their edge is left minus right operand; of `<` the other way round, so that its sign is positive where it is true."""
+_OPERANDS = frozenset({ca.OP_FABS, ca.OP_SIGN, ca.OP_COPYSIGN})
+_COUNTS = frozenset({ca.OP_FLOOR, ca.OP_CEIL})
+_RATIOS = frozenset({ca.OP_FMOD, ca.OP_REMAINDER})
+_EDGES = _DIFFERENCES | _OPERANDS | _COUNTS | _RATIOS
+_COUNTS_FROM = 36.0
+"""exp(-36) is rounding beside exp(0)."""
+_WAVES = frozenset({ca.OP_SIN, ca.OP_COS, ca.OP_TAN})
+
+
+@dataclass(frozen=True)
+class Edges:
+    """What an integrator must not step over.
+
+    Attributes:
+        function: of (t, x, z, p, u, d); edges, which are zero where a slope of the equations or guards may change or
+            jump, then phases, over `PHASE_STEP`.
+        count: number of edges.
+        slopes: how many of them, the first ones, are edges of the equations; the others are of guards.
+        phases: number of phases.
+    """
+
+    function: ca.Function
+    count: int
+    slopes: int
+    phases: int
+
+
+def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, guards: ca.Function) -> Edges:
+    """Collect edges of equations and guards, and phases of edges and guards, from the expression graph.
+
+    Args:
+        arguments: symbols t, x, z, p, u, d.
+        ode: derivatives of the states.
+        alg: residuals of the implicit equations.
+        guards: of the state events.
+    """
+    given = list(arguments.values())
+    of_slopes, of_guards = (
+        _different([_edge(*one) for one in _operations(arguments, expressions, _EDGES)])
+        for expressions in (ca.vertcat(ode(*given), alg(*given)), guards(*given))
+    )
+    of_slopes = _different([*of_slopes, *_pulses(arguments, ca.vertcat(ode(*given), alg(*given)))])
+    edges = of_slopes + of_guards
+    phases = _different([one for _, (one, *_) in _operations(arguments, ca.vertcat(*edges, guards(*given)), _WAVES)])
+    result = ca.densify(ca.vertcat(ca.SX(0, 1), *edges, *(one / PHASE_STEP for one in phases)))
+    function = ca.Function("edges", list(arguments.values()), [result], list(arguments), ["edges"])
+    return Edges(function, len(edges), len(of_slopes), len(phases))
+
+
+def _pulses(arguments: dict[str, Any], expressions: Any) -> Iterator[Any]:
+    """Edges of exponentials of time that rise and fall: the tops of their exponents, and where they begin to count."""
+    t, *others = arguments["t"], *(arguments[name] for name in "xzd")
+    for _, (exponent, *_) in _operations(arguments, expressions, frozenset({ca.OP_EXP})):
+        rate = ca.jacobian(exponent, t)
+        if ca.depends_on(rate, t) and not any(ca.depends_on(exponent, one) for one in others if one.numel()):
+            yield from (rate, exponent + _COUNTS_FROM)
+
+
+def _edge(code: int, operands: list[Any]) -> Any:
+    if code in _DIFFERENCES:
+        left, right = operands
+        return right - left if code == ca.OP_LT else left - right
+    if code in _OPERANDS:
+        return operands[-1]
+    return ca.sin(math.pi * (operands[0] / operands[1] if code in _RATIOS else operands[0]))
+
+
+def _different(expressions: list[Any]) -> list[Any]:
+    if not expressions:
+        return []
+    return list({one.element_hash(): one for one in ca.vertsplit(ca.cse(ca.vertcat(*expressions)))}.values())
+
+
+def _operations(arguments: dict[str, Any], expressions: Any, codes: frozenset[int]) -> Iterator[tuple[int, list[Any]]]:
+    """Yield operations whose operands move with time, states or implicit unknowns."""
+    function = ca.Function("all", list(arguments.values()), [ca.densify(expressions)])
+    count, code = function.n_instructions(), function.instruction_id
+    if not any(code(k) in codes for k in range(count)):
+        return
+    held, moves, symbols = dict[int, Any](), dict[int, bool](), [ca.vertsplit(one) for one in arguments.values()]
+    for k in range(count):
+        if (kind := code(k)) == ca.OP_OUTPUT:
+            continue
+        (place,), reads = function.instruction_output(k), function.instruction_input(k)
+        if kind == ca.OP_CONST:
+            held[place], moves[place] = ca.SX(function.instruction_constant(k)), False
+        elif kind == ca.OP_INPUT:
+            held[place], moves[place] = symbols[reads[0]][reads[1]], reads[0] < _FIXED
+        else:
+            operands = [held[one] for one in reads]
+            moving = any(moves[one] for one in reads)
+            if moving and kind in codes:
+                yield kind, operands
+            held[place] = ca.SX.unary(kind, *operands) if len(operands) == 1 else ca.SX.binary(kind, *operands)
+            moves[place] = moving
+
+
+_FIXED = 3
+"""Number of arguments that move: t, x, z."""

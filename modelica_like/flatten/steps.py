@@ -1,0 +1,183 @@
+"""Steps in equations: what jumps becomes an event; what is asked to make none keeps a slope that the graph shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.flatten.generic import Matrix, meets, pairs
+from modelica_like.language.discrete import CONTINUOUS, is_a, is_fixed, marker, moves, silence
+from modelica_like.language.expr import TIME, Symbol, operands, symbols_in
+from modelica_like.language.fields import Variable
+
+_Key = tuple[int, int]
+"""Identity of a node of a graph, and which of its steps."""
+_EVENTS = {ca.OP_LT, ca.OP_LE, ca.OP_FLOOR}
+_SILENT = {ca.OP_EQ, ca.OP_NE, ca.OP_CEIL, ca.OP_FMOD, ca.OP_REMAINDER, ca.OP_COPYSIGN}
+"""Steps without an event: equality holds at single instants, a ceiling stands for `floor(…, events=False)`."""
+
+_SOME = 3
+STEPS = _EVENTS | _SILENT | {ca.OP_SIGN, ca.OP_AND, ca.OP_OR, ca.OP_NOT}
+"""Operations whose slope is zero wherever it is defined, though their value is not constant."""
+
+
+def with_events(residual: Any) -> Any:
+    """Return a residual in which every step of a variable or of time at which it jumps is an event.
+
+    A step at whose border the branches meet stays, because the slope shows it. For one that makes no event by its name,
+    a zero is added whose slope has the same symbols: else what depends on a variable would look constant.
+    """
+    whole = ca.SX(residual)
+    if not _has_steps(whole):
+        return whole
+    merged = ca.cse(whole)  # a step written twice is one
+    jumps = _jumps(merged)
+    if not any(jumps.values()):
+        return _Written(lambda _key, _plain, new: new).honest(whole)
+
+    def decided(key: _Key, _: Any, new: Any) -> Any | None:
+        if not jumps.get(key):
+            return new if key in jumps else None
+        return marker("floor", new.dep(0)) if new.op() == ca.OP_FLOOR else marker("relation", new)
+
+    return _Written(decided).honest(merged)
+
+
+def event_steps(residual: Any) -> set[int]:
+    """Return the identities of the steps of a residual that become events; a step written twice is one node."""
+    return {identity for (identity, _), jump in _jumps(ca.SX(residual)).items() if jump}
+
+
+def _jumps(whole: Any) -> dict[_Key, bool]:
+    """Return the steps of an expression that may be events, and whether it jumps with them."""
+    steps: dict[_Key, Any] = {}
+
+    def seen(key: _Key, plain: Any, new: Any) -> Any:
+        steps[key] = plain
+        return new
+
+    _Written(seen).write(whole)
+    points = _Points(whole) if steps else None
+    return {key: points.jumps(key, plain) for key, plain in steps.items()} if points else {}
+
+
+def honest(expression: Any) -> Any:
+    """Return an expression whose steps make no event, but show in its slopes."""
+    whole = ca.SX(expression)
+    return _Written(lambda *_: None).honest(whole) if _has_steps(whole) else whole
+
+
+def _has_steps(whole: Any) -> bool:
+    function = ca.Function("steps", [], [whole], {"allow_free": True})
+    return any(function.instruction_id(k) in STEPS for k in range(function.n_instructions()))
+
+
+class _Written:
+    """Writes an expression anew, from its leaves.
+
+    Args:
+        choose: what a step becomes, from its key, the step as it was and with new operands; None: it makes no event.
+    """
+
+    def __init__(self, choose: Callable[[_Key, Any, Any], Any | None]) -> None:
+        self._choose = choose
+        self._hidden: dict[int, Any] = {}
+        self._known: dict[int, tuple[Any, Any]] = {}  # with the node, so that no other one can get its identity
+
+    def honest(self, root: Any) -> Any:
+        """Return the expression with zeros that have a slope by every variable that decides a step without event."""
+        result = self.write(root)
+        for one in self._hidden.values():
+            result = result + ca.fmin(ca.tanh(one) + 2.0, 0.0)
+        return result
+
+    def write(self, root: Any) -> Any:
+        """Return the expression."""
+        pending = [root]
+        while pending:
+            node = pending.pop()
+            key = node.element_hash()
+            if key in self._known:
+                continue
+            if mark := silence(node):
+                condition = node.dep(0)
+                if mark != CONTINUOUS:
+                    self._hide(condition)
+                self._known[key] = node, condition
+                continue
+            parts = operands(node)
+            if missing := [one for one in parts if one.element_hash() not in self._known]:
+                pending += [node, *missing]
+            else:
+                self._known[key] = node, self._of_node(node, parts)
+        return self._known[root.element_hash()][1]
+
+    def _of_node(self, node: Any, parts: list[Any]) -> Any:
+        olds = [one.element_hash() for one in parts]
+        news = [self._known[one][1] for one in olds]
+        operation = node.op()
+        if operation == ca.OP_SIGN and moves(node):
+            key, (old,), (new,) = node.element_hash(), parts, news
+            return self._step((key, 0), old > 0, new > 0) - self._step((key, 1), old < 0, new < 0)
+        if olds != [one.element_hash() for one in news]:
+            whole = ca.SX.unary(operation, *news) if len(news) == 1 else ca.SX.binary(operation, *news)
+        else:
+            whole = node
+        if operation in _EVENTS:
+            return self._step((node.element_hash(), 0), node, whole)
+        if operation in _SILENT:
+            self._hide(whole)
+        return whole
+
+    def _step(self, key: _Key, plain: Any, new: Any) -> Any:
+        chosen = self._choose(key, plain, new) if moves(new) else new
+        if chosen is None:
+            self._hide(new)
+            return new
+        return chosen
+
+    def _hide(self, step: Any) -> None:
+        for one in symbols_in(step):
+            if one.owner is not None and is_a(one, Variable):
+                self._hidden[id(one)] = one
+
+
+class _Points:
+    """An expression at generic points."""
+
+    def __init__(self, whole: Any) -> None:
+        symbols = symbols_in(whole)
+        moving = [one for one in symbols if one is TIME or (one.owner is not None and is_a(one, Variable))]
+        others = [one for one in symbols if not any(one is other for other in moving)]
+        fixed = [one for one in others if one.owner is not None and is_fixed(one)]
+        whole_numbers = [one for one in others if not any(one is other for other in fixed)]
+        self._whole, self._symbols = whole, ca.vertcat(*moving, *fixed, *whole_numbers)
+        self._between = pairs(len(moving), len(fixed), [_numbers(one) for one in whole_numbers])
+
+    def jumps(self, key: _Key, step: Any) -> bool:
+        """Return whether the expression jumps with a step, while other steps follow."""
+        chosen = Symbol(None, "step")
+        opened = _Written(lambda other, _, new: chosen if other == key else new).write(self._whole)
+        taken_of = step.dep(0) if step.op() == ca.OP_FLOOR else step.dep(0) - step.dep(1)
+        values = ca.Function("step", [self._symbols], [step, taken_of])
+        result = ca.Function("result", [self._symbols, chosen], [opened])
+
+        def at(points: Matrix) -> tuple[Matrix, Matrix]:
+            value, of = values.map(points.shape[1])(points)
+            return value.full()[0], of.full()[0]
+
+        def gap(points: Matrix, first: Matrix, second: Matrix) -> tuple[Matrix, Matrix]:
+            one, other = (result.map(points.shape[1])(points, value[None]).full()[0] for value in (first, second))
+            with np.errstate(invalid="ignore"):
+                return abs(one - other), abs(one)
+
+        return not meets(at, gap, self._between)
+
+
+def _numbers(symbol: Symbol) -> int:
+    """Return how many values a mode has, or some for another discrete value."""
+    mode = None if symbol.owner is None else getattr(symbol.owner, "modes", {}).get(symbol.name)
+    return _SOME if mode is None else len(mode.names)

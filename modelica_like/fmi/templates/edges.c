@@ -1,0 +1,241 @@
+/* Edges, at which slopes change or jump without an event: an accepted step has to see what lies between them. */
+#include "core.h"
+
+#define PARTS 8       /* of a step in which edges are located */
+#define LOCATED 1e-13 /* of the step */
+#define BEHIND 1e-12  /* of a step that ends at an edge: the next one begins behind it */
+#define ROUNDS 60
+#define REACH 2
+#define ROUGHLY 1e-8 /* of a part: edges that stand alone and are smooth need no better */
+#define NEAR 0.1     /* an extremum that comes this close to zero is looked at */
+#define UNSEEN 10    /* error of a window between two edges, in tolerances, from which on the step ends before it */
+#define ALREADY 1e-9 /* of the step: edges at its beginning, on which it stands */
+#define FINE 0.9     /* of the advance of a phase that a step may have */
+
+static double *edges_at(Instance *c, double t, double *point, double *values) {
+    evaluate_special(c, &c->model->tapes.edges, t, point, values);
+    return values;
+}
+
+static double *edges_inside(Instance *c, double t, double *values) {
+    double *point = c->vector + c->model->n_z;
+    piece_at(c->model, c->piece, t, point);
+    return edges_at(c, t, point, values);
+}
+
+static int differs(double before, double after) { return (before > 0) != (after > 0); }
+
+/* Does the parabola through three equidistant values touch zero between them, where their signs are equal? */
+static int touches(double first, double middle, double last) {
+    double slope = last - first, bend = first - 2 * middle + last, place = -0.5 * slope / bend;
+    double extremum = middle + 0.25 * slope * place;
+    return fabs(place) < 1 && extremum * first < NEAR * first * first;
+}
+
+static int any_edge(int begin, int end, const double *first, const double *middle, const double *last) {
+    for (int k = begin; k < end; k++)
+        if (differs(first[k], middle[k]) || differs(middle[k], last[k]) || touches(first[k], middle[k], last[k]))
+            return 1;
+    return 0;
+}
+
+static int any_between(const Instance *c, const double *before, const double *after) {
+    for (int k = 0; k < c->model->settings->n_edges; k++)
+        if (differs(before[k], after[k])) return 1;
+    return 0;
+}
+
+/* The latest of the places, from 0 to 1, where straight lines between two points cross zero: that of the argument of a
+ * kink, not that of a kink which is flat before it. */
+static double place_between(const Instance *c, const double *before, const double *after) {
+    double place = 0;
+    for (int k = 0; k < c->model->settings->n_edges; k++)
+        if (differs(before[k], after[k])) place = fmax(place, before[k] / (before[k] - after[k]));
+    return place;
+}
+
+/* Are all edges between two points as good as zero now? `sizes` are their changes over a part. */
+static int all_near(
+    const Instance *c, const double *before, const double *after, const double *now, const double *sizes) {
+    for (int k = 0; k < c->model->settings->n_edges; k++)
+        if (differs(before[k], after[k]) && !(fabs(now[k]) <= 2 * ROUGHLY * sizes[k])) return 0;
+    return 1;
+}
+
+/* The time just behind the first edge of the piece after a time, or infinity. At `low`,
+ * edges have the values `before`, which become those of the time returned. The argument of a kink may have kinks: no
+ * shape is taken for granted. */
+static double next_edge(Instance *c, double low, double *before, int precisely) {
+    const Piece *piece = c->piece;
+    double h = piece->end - piece->begin, high = low, part = h / PARTS;
+    size_t n = (size_t)c->model->tapes.edges.n_outputs, size = n * sizeof(double);
+    double *after = before + n, *now = after + n, *sizes = now + n;
+    for (int k = 1 + (int)((low - piece->begin) / part); k <= PARTS && high == low; k++) {
+        double t = k < PARTS ? piece->begin + k * part : piece->end;
+        if (any_between(c, before, edges_inside(c, t, after))) high = t;
+        else memcpy(before, after, size), low = high = t;
+    }
+    if (high == low) return INFINITY;
+    for (size_t k = 0; k < n; k++) sizes[k] = fabs(before[k] - after[k]);
+    for (int round = 0, near = 0; round < ROUNDS && high - low > LOCATED * h; round++) {
+        double place = round % 4 == 3 ? 0.5 : place_between(c, before, after);
+        double t = low + place * (high - low) + (near ? ROUGHLY * part : 0);
+        if (!(t < high)) t = 0.5 * (low + high);
+        if (!(t > low)) t = low + fmin(ROUGHLY * part, 0.5 * (high - low));
+        edges_inside(c, t, now);
+        int behind = any_between(c, before, now);
+        near = !precisely && all_near(c, before, after, now, sizes);
+        memcpy(behind ? after : before, now, size);
+        *(behind ? &high : &low) = t;
+        if (behind && near) break;
+    }
+    memcpy(before, after, size);
+    return high;
+}
+
+/* The last time before the first edge of the piece after `t`, or infinity; the time just behind it. */
+double edge_ahead(Instance *c, double t, double *behind) {
+    double *now = c->edges_middle, most = 2 * LOCATED * (c->piece->end - c->piece->begin);
+    *behind = INFINITY;
+    if (c->model->settings->n_edges == 0) return INFINITY;
+    edges_inside(c, t, now);
+    *behind = next_edge(c, t, now, 1);
+    return fmax(t, fmin(*behind - most, nextafter(*behind, t)));
+}
+
+/* Does a tangent, whose dots are loaded, move an edge on which the piece stands by more than a part? */
+int leads_off_edge(Instance *c, double least) {
+    int n = c->model->settings->n_slope_edges, any = 0;
+    const double *here = c->edges_middle, *end = here + c->model->tapes.edges.n_outputs;
+    double *moved = c->edges_middle + 2 * c->model->tapes.edges.n_outputs;
+    if (n > 0) tangent_now(c, &c->model->tapes.edges, moved);
+    for (int k = 0; k < n; k++) any |= fabs(here[k]) <= AT_EDGE && fabs(end[k]) <= AT_EDGE && fabs(moved[k]) > least;
+    return any;
+}
+
+/* What the states change in a window otherwise than by their slopes, in tolerances. The matrix of the step takes away
+ * what decays in it, as from the estimate of its error. */
+static double window_error(Instance *c, double begin, double end) {
+    const Model *m = c->model;
+    double *point = c->vector + m->n_z, *slopes = c->edge_slopes, *change = c->edge_change,
+           h = c->piece->end - c->piece->begin;
+    memset(change, 0, (size_t)m->n_unknowns * sizeof(double));
+    for (int g = -1; g <= 1; g += 2) { /* Gauss's rule of order four */
+        double t = 0.5 * (begin + end) + g * 0.28867513459481287 * (end - begin);
+        piece_at(m, c->piece, t, point);
+        if (!solve_implicit(c, t, point, 1)) return 0;
+        evaluate_special(c, &m->tapes.rates, t, point, slopes);
+        for (int k = 0; k < m->n_x; k++) change[k] += 0.5 * (end - begin) * slopes[k];
+    }
+    piece_at(m, c->piece, begin, point);
+    for (int k = 0; k < m->n_x; k++) change[k] += point[k];
+    piece_at(m, c->piece, end, point);
+    for (int k = 0; k < m->n_x; k++) change[k] = (change[k] - point[k]) * step_diagonal(h);
+    qr_solve(&m->step, c, change);
+    return error_norm(c, c->piece->points, last_of(m, c->piece), change);
+}
+
+/* Guards at a time of the piece. */
+static const double *guards_inside(Instance *c, double t) {
+    double *point = c->vector + c->model->n_z;
+    piece_at(c->model, c->piece, t, point);
+    if (c->model->n_guards > 0) evaluate_special(c, &c->model->tapes.guards, t, point, c->edge_guards);
+    return c->edge_guards;
+}
+
+/* Is an edge of slopes, or a guard, zero now and at the end of the piece? Nothing but parameters may lead off it.
+ * `zero` marks the guards. */
+int stands_on_edge(Instance *c, unsigned char *zero) {
+    const Model *m = c->model;
+    int any = 0;
+    double *here = c->edges_middle, *end = here + m->tapes.edges.n_outputs;
+    for (int side = 0; side < 2; side++) {
+        double t = side == 0 ? c->state.t : c->piece->end;
+        const double *guards = guards_inside(c, t);
+        for (int k = 0; k < m->n_guards; k++)
+            zero[k] = (side == 0 || zero[k]) && fabs(guards[k]) <= AT_EDGE && guard_active(c, k);
+        if (m->settings->n_slope_edges > 0) edges_inside(c, t, side == 0 ? here : end);
+    }
+    for (int k = 0; k < m->settings->n_slope_edges; k++) any |= fabs(here[k]) <= AT_EDGE && fabs(end[k]) <= AT_EDGE;
+    return any | any_of(zero, m->n_guards);
+}
+
+/* Is a guard positive at a time inside the piece that is not at its ends? `positive` are those that are. */
+static int has_risen(Instance *c, double t, int inside) {
+    const double *guards = guards_inside(c, t);
+    int any = 0;
+    for (int g = 0; g < c->model->n_guards; g++)
+        if (!inside) c->positive[g] |= guards[g] > 0 || !guard_active(c, g);
+        else any |= guards[g] > 0 && !c->positive[g];
+    return any;
+}
+
+/* Goes through the windows of a step and returns the smaller length that it must have, or infinity. */
+static double judge_windows(Instance *c, double least, int of_slopes, int of_guards, int precisely) {
+    double begin = c->piece->begin, h = c->piece->end - begin, landing = h, *now = c->edges_middle;
+    double resolved = begin + TIME_RESOLUTION * fmax(1, fabs(begin));
+    int unseen = 0;
+    memcpy(now, c->edges, (size_t)c->model->tapes.edges.n_outputs * sizeof(double));
+    for (double before = begin, edge = begin; edge < c->piece->end && !(unseen && landing < h); before = edge) {
+        edge = fmin(next_edge(c, before, now, precisely), c->piece->end);
+        double between = 0.5 * (before + edge);
+        if (of_guards && between > resolved && has_risen(c, between, 1)) return between - begin;
+        if (of_guards && edge > resolved && has_risen(c, edge, 1)) return edge - begin;
+        unseen |= of_slopes && window_error(c, before, edge) > UNSEEN;
+        if (landing == h && edge - begin > fmax(least, ALREADY * h)) landing = edge - begin;
+    }
+    return unseen && landing < h ? landing * (1 + BEHIND) : INFINITY;
+}
+
+/* Are all edges farther away than they come by their changes in this step, and in the one before? */
+static int out_of_reach(const Instance *c, double h) {
+    int n = c->model->tapes.edges.n_outputs;
+    const double *first = c->edges, *last = first + n, *before = last + n;
+    for (int k = 0; k < c->model->settings->n_edges && c->edges_kept > 0; k++) {
+        double way = fmax(fabs(last[k] - first[k]), fabs(first[k] - before[k]) * h / c->edges_kept);
+        if (differs(first[k], last[k]) || (way > 0 && fmin(fabs(first[k]), fabs(last[k])) < REACH * way)) return 0;
+    }
+    return c->edges_kept > 0;
+}
+
+/* Judges an accepted step. Returns the smaller length that it must have, or infinity: to the first edge, if it has not
+ * seen a window between edges, or as waves ask for, none below `least`; `most` is how long the next one may be. */
+double seen_length(Instance *c, double least, double *most) {
+    const Model *m = c->model;
+    int n = m->tapes.edges.n_outputs, n_edges = m->settings->n_edges, of_slopes, of_guards;
+    double begin = c->piece->begin, h = c->piece->end - begin, advance = 0, length;
+    double *first = c->edges, *last = c->edges + n, *middle = c->edges_middle;
+    if (!c->edges_valid) edges_at(c, begin, c->piece->points, first), c->edges_kept = 0;
+    c->edges_valid = 1;
+    edges_at(c, c->piece->end, last_of(m, c->piece), last);
+    if (n > n_edges) edges_inside(c, begin + 0.5 * h, middle);
+    for (int k = n_edges; k < n; k++) /* a phase may jump, but not in both halves of a step */
+        advance = fmax(advance, 2 * fmin(fabs(last[k] - middle[k]), fabs(middle[k] - first[k])));
+    *most = advance > 0 ? FINE * h / advance : INFINITY;
+    if (advance > 1) return *most;
+    if (n_edges == 0) return INFINITY;
+    if (out_of_reach(c, h)) return INFINITY;
+    if (n == n_edges) edges_inside(c, begin + 0.5 * h, middle);
+    of_slopes = any_edge(0, m->settings->n_slope_edges, first, middle, last);
+    of_guards = any_edge(m->settings->n_slope_edges, n_edges, first, middle, last);
+    if (!of_slopes && !of_guards) return INFINITY;
+    memset(c->positive, 0, (size_t)m->n_guards);
+    if (of_guards) has_risen(c, begin, 0), has_risen(c, c->piece->end, 0);
+    length = judge_windows(c, least, of_slopes, of_guards, 0);
+    return isfinite(length) ? judge_windows(c, least, of_slopes, of_guards, 1) : INFINITY;
+}
+
+/* Is there an edge within the piece? Where slopes jump, no step is short enough for its error to be small. */
+int is_over_edge(Instance *c) {
+    double *first = edges_at(c, c->piece->begin, c->piece->points, c->edges_middle);
+    double *last = first + c->model->tapes.edges.n_outputs;
+    return any_between(c, first, edges_at(c, c->piece->end, last_of(c->model, c->piece), last));
+}
+
+/* The step has been taken. */
+void keep_edges(Instance *c) {
+    size_t n = (size_t)c->model->tapes.edges.n_outputs;
+    memcpy(c->edges + 2 * n, c->edges, n * sizeof(double));
+    memcpy(c->edges, c->edges + n, n * sizeof(double));
+    c->edges_kept = c->edges_valid ? c->piece->end - c->piece->begin : 0;
+}

@@ -1,0 +1,1 @@
+"""Numbers read off runs: what is asked, and how it follows from dense output."""

@@ -1,0 +1,184 @@
+"""Readings off the dense output of a run, stretch by stretch as it comes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import MissingValue, ValueOutOfRange
+from modelica_like.runs.polynomials import SAME, Curves
+from modelica_like.runs.readings import Output, Part, is_series, read_output
+from modelica_like.solve.dense import Dense
+from modelica_like.solve.recorded import RecordedSolution
+from modelica_like.solve.recorder import Recorder, Segment
+from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
+
+_SAME_END = 1e-6
+"""Of a run: events are located within its tolerances, so a moment so near to its end is its end."""
+
+
+class Number(float):
+    """A number read off a run.
+
+    Attributes:
+        name: of the reading.
+        unit: its coherent SI unit.
+        time: of an extreme in s, else nan.
+        sign: of the value of which it is the largest amount, else 1.
+        change: of runs of FMUs: by how much twice as many results have changed it; else 0.
+    """
+
+    name: str
+    unit: str
+    time: float
+    sign: int
+    change: float = 0.0
+
+
+class Collector:
+    """Reads parts off the stretches of a run as they come.
+
+    Args:
+        model: the compiled model.
+        outputs: readings, without series.
+        atol: absolute tolerance of the run.
+    """
+
+    def __init__(self, model: CompiledDae, outputs: Sequence[Output], atol: float) -> None:
+        self._model, self.outputs = model, list(outputs)
+        self._parts = [one.parts(model) for one in outputs]
+        self._every = [part for parts in self._parts for part in parts]
+        self._along = [k for k, part in enumerate(self._every) if part.kind not in ("change", "impact")]
+        self._between = [k for k in self._along if self._every[k].kind in ("integral", "max", "first")]
+        self._curves, self._fits = (self._curves_of(numbers, atol) for numbers in (self._along, self._between))
+        self._values = np.array([0.0 if one.kind in ("integral", "impact") else np.nan for one in self._every])
+        self._times = np.full(len(self._every), np.nan)
+
+    @property
+    def along(self) -> bool:
+        """Whether dense output is needed."""
+        return any(self._every[k].kind != "end" for k in self._along)
+
+    def _curves_of(self, numbers: Sequence[int], atol: float) -> Curves:
+        parts = [self._every[k] for k in numbers]
+        key = tuple((one.text, one.form, one.change) for one in parts)
+        return Curves(self._model, key, lambda: [ca.SX(one.expression(self._model)) for one in parts], atol)
+
+    def feed(self, dense: Dense) -> None:
+        """Read stretches that follow those before."""
+        if not self._along or not len(dense.begins):
+            return
+        for row, k in enumerate(self._along):
+            if self._every[k].kind == "at":
+                self._read_at(dense, k, row, self._every[k].moment)
+        if not self._between:
+            return
+        fitted = self._fits.fitted(dense)
+        integrals = fitted.integrals()
+        for row, k in enumerate(self._between):
+            part = self._every[k]
+            if part.kind == "integral":
+                self._values[k] += integrals[row]
+            elif part.kind == "max":
+                self._take(k, *fitted.largest(row))
+            elif np.isnan(self._values[k]):
+                self._values[k] = fitted.first(row)
+
+    def _take(self, k: int, value: float, time: float) -> None:
+        known = self._values[k]
+        if not value <= known + SAME * abs(known):
+            self._times[k] = time
+        self._values[k] = np.fmax(known, value)
+
+    def _read_at(self, dense: Dense, k: int, row: int, moment: float) -> None:
+        piece = int(np.searchsorted(dense.begins, moment, side="right")) - 1
+        if piece >= 0 and moment <= dense.ends[piece]:
+            pieces, times = np.array([piece]), np.array([moment])
+            x, z = dense.points(pieces, times)
+            self._values[k] = self._curves.at(times, x, z, dense.d[:, pieces])[row, 0]
+
+    def finish(self, record: Recorder | Solution) -> list[Number]:
+        """Return the numbers, with both sides of every event of the run and with its end."""
+        segments = record.segments
+        if self._along:
+            self._read_ends(segments)
+        for k, part in enumerate(self._every):
+            if part.kind == "impact":
+                self._values[k] = sum(one.energy for one in record.impacts if part.text in ("", one.component))
+            elif part.kind == "change":
+                self._values[k] = self._change(record, part)
+        span, first = float(segments[-1].times[-1] - segments[0].times[0]), 0
+        numbers: list[Number] = []
+        for output, parts in zip(self.outputs, self._parts, strict=True):
+            values, times = (one[first : first + len(parts)] for one in (self._values, self._times))
+            best = int(np.argmax(values)) if output.kind == "peak" else 0
+            number = Number(output.combined(values, span))
+            number.name, number.unit, number.time = output.name, str(output.unit), float(times[best])
+            number.sign = -1 if best else 1
+            numbers.append(number)
+            first += len(parts)
+        return numbers
+
+    def _read_ends(self, segments: Sequence[Segment]) -> None:
+        places = [(one, k) for one in segments for k in (0, -1)]
+        times = np.array([one.times[k] for one, k in places])
+        x, z = (np.array([getattr(one, name)[:, k] for one, k in places]).T for name in "xz")
+        values = self._curves.at(times, x, z, np.array([one.d for one, _ in places]).T)
+        latest = times[-1] + _SAME_END * (times[-1] - times[0])
+        for row, k in enumerate(self._along):
+            part = self._every[k]
+            if part.kind == "end" or (part.kind == "at" and times[-1] <= part.moment <= latest):
+                self._values[k] = values[row, -1]
+            elif part.kind == "max":
+                best = int(np.argmax(values[row]))
+                self._take(k, float(values[row, best]), float(times[best]))
+            elif part.kind == "first" and (values[row] > 0).any():
+                self._values[k] = np.fmin(self._values[k], times[int(np.argmax(values[row] > 0))])
+
+    def _change(self, record: Recorder | Solution, part: Part) -> float:
+        before, after, number = part.change
+        names = self._model.flat_discretes[self._model.discrete_position[part.text]].names
+        found = [
+            one.time
+            for one in record.events
+            if one.mode == part.text
+            and (before < 0 or one.before == names[before])
+            and (after < 0 or one.after == names[after])
+        ]
+        return found[number - 1] if len(found) >= number else np.nan
+
+
+def collector(model: CompiledDae, names: Sequence[str], atol: float) -> Collector:
+    """Return a collector of readings by name.
+
+    Raises:
+        UnknownName: a reading is not known.
+    """
+    for name in names:
+        if is_series(name):
+            raise ValueOutOfRange(f"{name} is a trajectory, not a number.", advice="Take it from the results.")
+    return Collector(model, [read_output(model, name) for name in names], atol)
+
+
+def dense_of(solution: Trajectories, what: str) -> Dense:
+    """Return the dense output that a run has kept.
+
+    Raises:
+        MissingValue: it has none.
+    """
+    if isinstance(solution, RecordedSolution):
+        raise MissingValue(
+            f"{what} cannot be read off {solution.model.name}: between its results nothing is known.",
+            advice=solution.advice,
+        )
+    assert isinstance(solution, Solution)
+    if solution.dense is None:
+        raise MissingValue(
+            f"{what} cannot be read off this run: what happens between its results was not kept.",
+            advice=f'Ask before the run: simulate(…, readings=["{what}"]).',
+        )
+    return solution.dense()

@@ -1,0 +1,238 @@
+"""Expressions along a run as polynomials, refined until they fit: extremes, integrals and crossings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.polynomial import legendre
+
+from modelica_like.compile.buffers import Along
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.solve.dense import Dense
+
+_DEGREE = 6
+_INNER: Any = legendre.legroots(legendre.legder([0.0] * _DEGREE + [1.0]))
+NODES: Any = np.concatenate([[-1.0], _INNER, [1.0]])
+"""Of Lobatto's rule of order twelve, in [-1, 1]."""
+_TO_SERIES: Any = np.linalg.inv(legendre.legvander(NODES, _DEGREE))
+WEIGHTS: Any = _TO_SERIES[0]
+"""Of the mean over [-1, 1]: that of Legendre's series is its first term."""
+_GRID: Any = np.cos(np.linspace(np.pi, 0.0, 4 * _DEGREE + 1))
+_TO_GRID: Any = legendre.legvander(_GRID, _DEGREE) @ _TO_SERIES
+_FIT = 1e-9
+"""Last terms of a series, relative to the largest amount in the run, below which it counts as the value."""
+_DEEPEST = 30
+_PATIENCE = 12
+"""Halvings that lower the last terms by less than a fifth, after which the value jumps: it is known where."""
+_STUBBORN = 0.8
+_NOISE, _LESS = 1e3, 3
+"""Last terms, relative to what is allowed, below which they are noise after fewer such halvings."""
+_CROWD = 5000
+"""Pieces that are halved, and do not change, are noise if they are more than this and four times those of the run."""
+_NEWTON, _BISECTIONS = 20, 54
+"""To the last digit of a place."""
+_RISE = 0.1
+"""Of the range in a piece: at most 1 - cos(degree/2 times the distance of places)."""
+SAME = 1e-12
+"""Of a value: others are as large up to rounding, and the first of them counts."""
+_CANDIDATES = 50
+"""Others are as large up to rounding."""
+_TOGETHER = 2**16
+"""Values that are read together."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Values of expressions along smooth pieces, as polynomials.
+
+    Attributes:
+        begins: of the pieces in s, in order, shape (m,).
+        ends: shape (m,).
+        values: at the nodes, shape (expressions, m, nodes).
+    """
+
+    begins: Vector
+    ends: Vector
+    values: Vector
+
+    def _grid(self, row: int) -> Vector:
+        """Values of an expression at the grid of every piece, exact at both ends; shape (m, places)."""
+        grid = self.values[row] @ _TO_GRID.T
+        grid[:, [0, -1]] = self.values[row][:, [0, -1]]
+        return grid
+
+    def integrals(self) -> Vector:
+        """Return the integrals over all pieces, shape (expressions,)."""
+        return (self.values @ WEIGHTS) @ (self.ends - self.begins)
+
+    def largest(self, row: int) -> tuple[float, float]:
+        """Return the largest value of an expression and its time, or -inf."""
+        if not len(self.begins):
+            return -np.inf, np.nan
+        grid = self._grid(row)
+        tops, best = grid.max(axis=1), float(grid.max())
+        # Between two places of the grid a polynomial of this degree rises no further.
+        near = np.flatnonzero(tops + _RISE * np.ptp(grid, axis=1) >= best)
+        same = best - SAME * abs(best)
+        near = near[np.argsort(-np.minimum(tops[near], same), kind="stable")][:_CANDIDATES]
+        found = [self._top(row, piece, grid[piece]) for piece in near.tolist()]
+        best = max(value for value, _ in found)
+        return best, min(time for value, time in found if value >= best - SAME * abs(best))
+
+    def _top(self, row: int, piece: int, grid: Vector) -> tuple[float, float]:
+        same = SAME * float(np.abs(grid).max())
+        k = int(np.argmax(grid >= grid.max() - same))
+        series = _TO_SERIES @ self.values[row, piece]
+        place = _climbed(series, _GRID[max(k - 1, 0)], _GRID[k], _GRID[min(k + 1, len(_GRID) - 1)])
+        value = float(legendre.legval(place, series))
+        value, place = (value, place) if value > grid[k] + same else (float(grid[k]), _GRID[k])
+        return value, float(self.times(piece, place))
+
+    def turning(self, row: int) -> Vector:
+        """Return the values of an expression at its turning points and at the ends of pieces, in order."""
+        grid = self._grid(row)
+        found: list[float] = []
+        for piece, line in enumerate(grid):
+            rises = np.diff(line)
+            found.append(float(line[0]))
+            for k in np.flatnonzero(rises[:-1] * rises[1:] < 0) + 1:
+                series = _TO_SERIES @ self.values[row, piece] * np.sign(rises[k - 1])
+                place = _climbed(series, _GRID[k - 1], _GRID[k], _GRID[k + 1])
+                found.append(float(np.sign(rises[k - 1]) * legendre.legval(place, series)))
+            found.append(float(line[-1]))
+        return np.array(found)
+
+    def within(self, begin: float, end: float) -> Fitted:
+        """Return what lies between two times in s."""
+        kept = (self.ends > begin) & (self.begins < end)
+        begins, ends, values = self.begins[kept], self.ends[kept], self.values[:, kept]
+        for k in np.flatnonzero((begins < begin) | (ends > end)):
+            low, high = max(begin, begins[k]), min(end, ends[k])
+            times = low + 0.5 * (1.0 + NODES) * (high - low)
+            places = 2.0 * (times - begins[k]) / (ends[k] - begins[k]) - 1.0
+            values[:, k] = values[:, k] @ _TO_SERIES.T @ legendre.legvander(places, _DEGREE).T
+            begins[k], ends[k] = low, high
+        return Fitted(begins, ends, values)
+
+    def places(self, row: int, levels: Vector) -> tuple[Any, Vector]:
+        """Return the pieces and the places in [-1, 1] where a rising expression has values, both as the levels.
+
+        Args:
+            row: of the expression, which must not fall.
+            levels: rising values between its first and its last one, shape (n,).
+        """
+        pieces = np.clip(np.searchsorted(self.values[row, :, -1], levels), 0, len(self.ends) - 1)
+        low, high = np.full((2, len(levels)), [[-1.0], [1.0]])
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            below = self.at(row, pieces, middle) < levels
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        return pieces, high
+
+    def times(self, pieces: Any, places: Any) -> Vector:
+        """Return the times of places in [-1, 1] of pieces."""
+        return self.begins[pieces] + 0.5 * (1.0 + places) * (self.ends - self.begins)[pieces]
+
+    def at(self, row: int, pieces: Any, places: Vector) -> Vector:
+        """Return the values of an expression at places in [-1, 1] of pieces."""
+        series = self.values[row] @ _TO_SERIES.T
+        return np.einsum("nk,nk->n", legendre.legvander(places, _DEGREE), series[pieces])
+
+    def last(self, row: int) -> float:
+        """Return the last time at which an expression is above zero; nan if it never is."""
+        return -Fitted(-self.ends[::-1], -self.begins[::-1], self.values[:, ::-1, ::-1]).first(row)
+
+    def first(self, row: int) -> float:
+        """Return the first time at which an expression is above zero; nan if it never is."""
+        above = self._grid(row) > 0
+        if not above.any():
+            return np.nan
+        piece = int(np.argmax(above.any(axis=1)))
+        k, series = int(np.argmax(above[piece])), _TO_SERIES @ self.values[row, piece]
+        low, high = _GRID[max(k - 1, 0)], _GRID[k]
+        while low < (middle := 0.5 * (low + high)) < high:
+            low, high = (low, middle) if legendre.legval(middle, series) > 0 else (middle, high)
+        return float(self.times(piece, high))
+
+
+def _climbed(series: Vector, low: float, place: float, high: float) -> float:
+    """Return where the slope of a series is zero near its largest value on a grid, by safeguarded Newton iterations."""
+    slope = legendre.legder(series)
+    bend = legendre.legder(slope)
+    for _ in range(_NEWTON):
+        s = legendre.legval(place, slope)
+        low, high = (place, high) if s > 0 else (low, place)
+        step = -s / (legendre.legval(place, bend) or 1.0)
+        new = place + step if low <= place + step <= high else 0.5 * (low + high)
+        if new == place:
+            break
+        place = float(new)
+    return float(place)
+
+
+class Curves:
+    """Expressions along a run.
+
+    Args:
+        model: the compiled model.
+        expressions: SX columns in the model's arguments; `key` identifies them in the model's cache.
+        noise: amount below which a value is noise.
+    """
+
+    def __init__(self, model: CompiledDae, key: Any, expressions: Any, noise: float) -> None:
+        self._model, self._noise = model, noise
+
+        def make() -> Along:
+            column = ca.densify(ca.vertcat(*expressions()))
+            return Along(ca.Function("read", list(model.arguments.values()), [column], {"cse": True}))
+
+        self._function = model.once(("curves", key), make)
+        self.sizes = np.zeros(self._function.rows[0])
+
+    def at(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
+        """Return values at points, shape (expressions, n)."""
+        values = self._function(times, x, z, self._model.p, self._model.u, d)[0]
+        self.sizes = np.maximum(self.sizes, np.abs(values).max(axis=1, initial=0.0))
+        return values
+
+    def fitted(self, dense: Dense) -> Fitted:
+        """Return them as polynomials; pieces are halved until each is one."""
+        count, size = len(self.sizes), max(_TOGETHER // (max(len(self.sizes), 1) * len(NODES)), 1)
+        begins, ends, owner = dense.begins, dense.ends, np.arange(len(dense.begins))
+        before, stuck, kept = np.full(len(owner), np.inf), np.zeros(len(owner), int), []
+        for depth in range(_DEEPEST + 1):
+            parts = [
+                self._values(dense, owner[k : k + size], begins[k : k + size], ends[k : k + size])
+                for k in range(0, len(owner), size)
+            ]
+            values = np.concatenate([np.zeros((count, 0, len(NODES))), *parts], axis=1)
+            tails = np.abs(values @ _TO_SERIES[-2:].T) @ [0.1, 1.0]
+            allowed = np.maximum(_FIT * self.sizes, self._noise)[:, None]
+            excess = (tails / allowed).max(axis=0, initial=0.0)
+            stuck = np.where(excess > _STUBBORN * before, stuck + 1, 0)
+            crowd = np.count_nonzero(excess > 1) > _CROWD + 4 * len(dense.begins)
+            patience = 1 if crowd else np.where(excess > _NOISE, _PATIENCE, _LESS)
+            rough = (excess > 1) & (stuck < patience) & (depth < _DEEPEST)
+            kept.append((begins[~rough], ends[~rough], values[:, ~rough]))
+            if not rough.any():
+                break
+            middles = 0.5 * (begins + ends)[rough]
+            begins, ends = _mixed(begins[rough], middles), _mixed(middles, ends[rough])
+            owner, before, stuck = (np.repeat(one[rough], 2) for one in (owner, excess, stuck))
+        begins, ends = (np.concatenate([one[k] for one in kept]) for k in (0, 1))
+        order = np.argsort(begins, kind="stable")
+        return Fitted(begins[order], ends[order], np.concatenate([one[2] for one in kept], axis=1)[:, order])
+
+    def _values(self, dense: Dense, owner: Any, begins: Vector, ends: Vector) -> Vector:
+        times = begins[:, None] + 0.5 * (1.0 + NODES) * (ends - begins)[:, None]
+        times[:, -1] = ends
+        pieces = np.repeat(owner, len(NODES))
+        x, z = dense.points(pieces, times.ravel())
+        return self.at(times.ravel(), x, z, dense.d[:, pieces]).reshape(len(self.sizes), *times.shape)
+
+
+def _mixed(first: Vector, second: Vector) -> Vector:
+    return np.stack([first, second], axis=1).ravel()

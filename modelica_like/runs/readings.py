@@ -1,0 +1,286 @@
+"""Names of readings, such as `table.s`, `peak(2*clutch.tau)`, `clutch.lock_time`, and what they consist of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.solve.recorder import Event
+from modelica_like.solve.signals import formula_of, si_value, unit_of
+from modelica_like.units import ONE, Unit, parse_unit, to_si
+
+_CALL = re.compile(r"\s*(max|min|peak|integral|mean|rms|at|first|duration|series|time)\s*\((.*)\)\s*$")
+_CONDITION = re.compile(r"(.+?)(<=?|>=?)(.+)")
+_CHANGE = re.compile(
+    r"\s*(?P<mode>[^:\s]+)\s*(?::\s*(?P<before>\w+)\s*)?(?:→|->)\s*(?P<after>\w+)\s*(?:,\s*(?P<number>\d+))?\s*$"
+)
+_ENERGY = {"loss_energy": 1, "source_energy": 2}
+_POWERS = {"stored_energy": 0, "loss_power": 1, "source_power": 2}
+_SECOND, _JOULE, _WATT = parse_unit("s"), parse_unit("J"), parse_unit("W")
+
+
+_SIGNED: dict[str, tuple[str, ...]] = {"max": ("plain",), "min": ("negative",), "peak": ("plain", "negative")}
+INTEGRATED = ("integral", "mean", "rms", "duration")
+"""Kinds with an integral."""
+Form = Literal["plain", "negative", "square", "mode"]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What engines read off a run: a reading follows from few kinds of parts.
+
+    Attributes:
+        kind: value at the end or at a moment, largest value, integral, first time above zero, time of a mode change,
+            energy in J lost in impacts.
+        text: variable, energy term or formula; the mode of a change; the component of impacts (empty: all).
+        form: of its value: as it is, negative, its square, or 1 where a mode has the number `change[1]`, else 0.
+        moment: in s.
+        change: numbers of the modes before and after (-1: any), and which of several such changes.
+    """
+
+    kind: Literal["end", "at", "max", "integral", "first", "change", "impact"]
+    text: str
+    form: Form = "plain"
+    moment: float = 0.0
+    change: tuple[int, int, int] = (-1, -1, 1)
+
+    def expression(self, model: CompiledDae) -> Any:
+        """Return its value at an instant as an SX in the model's arguments."""
+        if self.form == "mode":
+            return ca.SX(model.arguments["d"][model.discrete_position[self.text]] == self.change[1])
+        value = expression_of(model, self.text)[0]()
+        return {"plain": value, "negative": -value, "square": value**2}[self.form]
+
+
+@dataclass(frozen=True)
+class Output:
+    """A number to read off a run.
+
+    Attributes:
+        name: as given.
+        unit: its unit.
+        kind: `end`, `at`, `max`, `min`, `peak` (largest amount), `integral`, `mean`, `rms`, `first` (when a condition
+            is true for the first time), `duration` (how long a mode lasts in all), `time` (of a mode change) or
+            `series`.
+        path: the variable, the formula, or the mode.
+        moment: time of `at` in s.
+        change: which mode change: names before (may be empty) and after, and its number among those.
+    """
+
+    name: str
+    unit: Unit
+    kind: str
+    path: str
+    moment: float = 0.0
+    change: tuple[str, str, int] = ("", "", 1)
+
+    def is_change(self, event: Event) -> bool:
+        """Return whether an event is such a mode change."""
+        before, after, _ = self.change
+        return event.mode == self.path and before in ("", event.before) and after in ("", event.after)
+
+    def parts(self, model: CompiledDae) -> list[Part]:
+        """Return what it consists of."""
+        owner, _, last = self.path.rpartition(".")
+        if self.kind in _SIGNED:
+            return [Part("max", self.path, form) for form in _SIGNED[self.kind]]  # type: ignore[arg-type]
+        if self.kind in ("time", "duration"):
+            names = model.flat_discretes[model.discrete_position[self.path]].names
+            before, after = (names.index(name) if name else -1 for name in self.change[:2])
+            if self.kind == "duration":
+                return [Part("integral", self.path, "mode", change=(-1, after, 1))]
+            return [Part("change", self.path, change=(before, after, self.change[2]))]
+        if self.kind in ("integral", "mean", "rms"):
+            parts = [Part("integral", self.path, "square" if self.kind == "rms" else "plain")]
+            struck = self.kind == "integral" and last == "loss_energy"
+            return [*parts, Part("impact", owner)] if struck else parts
+        return [Part(self.kind, self.path, moment=self.moment)]  # type: ignore[arg-type]
+
+    def combined(self, parts: Vector, span: Any) -> Vector:
+        """Return the number from its parts, shape (…, parts), over runs of so many seconds; shape (…,)."""
+        match self.kind:
+            case "min":
+                return -parts[..., 0]
+            case "peak":
+                return np.max(parts, axis=-1)
+            case "mean" | "rms":
+                mean = parts[..., 0] / span
+                return mean if self.kind == "mean" else np.sqrt(mean)
+            case _:
+                return np.sum(parts, axis=-1)
+
+
+def listed(names: str | Sequence[str], what: str) -> list[str]:
+    """Return one name or several as a list.
+
+    Raises:
+        ValueOutOfRange: there is none.
+    """
+    found = [names] if isinstance(names, str) else list(names)
+    if not found:
+        raise ValueOutOfRange(f"There is no {what}: give at least one name.")
+    return found
+
+
+def is_series(name: str) -> bool:
+    """Return whether this is a trajectory, not a number."""
+    return name.replace(" ", "").startswith("series(")
+
+
+def does_not_happen(name: str) -> UnknownName:
+    """Return the error about a mode change or condition that a run does not have."""
+    return UnknownName(f"'{name}' does not happen in this run.")
+
+
+def read_output(model: CompiledDae, name: str) -> Output:
+    """Read the name of an output.
+
+    Raises:
+        UnknownName: the model has no such output.
+    """
+    called = _CALL.match(name)
+    if called is None:
+        return _plain(model, name.strip())
+    kind, inside = called.group(1), called.group(2).strip()
+    if kind in ("max", "min") and _is_formula(name):
+        return _plain(model, name.strip())
+    if kind == "time":
+        return _mode_change(model, name, inside)
+    if kind == "duration":
+        mode, _, state = (part.strip() for part in inside.rpartition(":"))
+        _check_mode(model, mode, state)
+        return Output(name, _SECOND, kind, mode, change=("", state, 1))
+    if kind == "first":
+        return Output(name, _SECOND, kind, _condition(model, name, inside))
+    path, _, moment = inside.rpartition(",") if kind == "at" else (inside, "", "")
+    unit = expression_of(model, path.strip())[1]
+    if kind == "integral":
+        unit = _JOULE if str(unit) == "W" else unit * _SECOND
+    return Output(name, unit, kind, path.strip(), to_si(moment.strip(), _SECOND, name) if kind == "at" else 0.0)
+
+
+def _is_formula(name: str) -> bool:
+    """Whether this is `max` or `min` of two values at one time."""
+    try:
+        return formula_of(name) is not None
+    except NetlistError:
+        return False
+
+
+def _condition(model: CompiledDae, name: str, inside: str) -> str:
+    """Return a formula that is positive where a condition is true."""
+    sides = _CONDITION.fullmatch(inside)
+    if sides is None:
+        raise UnknownName(
+            f"'{name}' has no condition.",
+            advice="Compare two values: first(motor.w > 100 rad/s), first(a.tau < b.tau).",
+        )
+    left, sign, right = (part.strip() for part in sides.groups())
+    formula = f"{left} - ({right})" if sign[0] == ">" else f"{right} - ({left})"
+    expression_of(model, formula)
+    return formula
+
+
+def _plain(model: CompiledDae, name: str) -> Output:
+    owner, _, last = name.rpartition(".")
+    if name in model.position:
+        return Output(name, expression_of(model, name)[1], "end", name)
+    if last in _ENERGY and owner in model.components:
+        return Output(name, _JOULE, "integral", name)
+    if last in ("lock_time", "unlock_time"):
+        found = _holding_mode(model, owner)
+        if found is not None:
+            mode, held = found
+            return Output(name, _SECOND, "time", mode, change=("", held, 1) if last == "lock_time" else (held, "", 1))
+    return Output(name, expression_of(model, name)[1], "end", name)
+
+
+def _holding_mode(model: CompiledDae, owner: str) -> tuple[str, str] | None:
+    """The mode of a component in which it holds a motion, and the name of that."""
+    for one in model.holds:
+        if one.component == owner:
+            mode = model.flat_discretes[one.mode]
+            return mode.path, mode.names[one.number]
+    return None
+
+
+def _mode_change(model: CompiledDae, name: str, inside: str) -> Output:
+    parts = _CHANGE.match(inside)
+    if parts is None:
+        raise UnknownName(
+            f"'{name}' does not say which mode change.",
+            advice="Write time(clutch.mode: forward -> stuck), and a number if it happens again: "
+            "time(clutch.mode -> stuck, 2).",
+        )
+    mode = parts["mode"]
+    _check_mode(model, mode, *(one for one in (parts["before"], parts["after"]) if one is not None))
+    return Output(
+        name, _SECOND, "time", mode, change=(parts["before"] or "", parts["after"], int(parts["number"] or 1))
+    )
+
+
+def _check_mode(model: CompiledDae, mode: str, *names: str) -> None:
+    modes = {one.path: one.names for one in model.flat_discretes if one.names}
+    if mode not in modes:
+        raise UnknownName(f"{model.name} has no mode '{mode}'{did_you_mean(mode, modes) or '.'}")
+    for one in names:
+        if one not in modes[mode]:
+            raise UnknownName(
+                f"{mode} has no mode '{one}'{did_you_mean(one, modes[mode]) or '.'} It has {', '.join(modes[mode])}."
+            )
+
+
+def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Unit]:
+    """Return a function that makes the SX of a variable, energy term or formula in the model's arguments, and the unit.
+
+    Raises:
+        UnknownName: there is no such variable.
+        NetlistError, UnitError: it is no formula, or its units do not fit together.
+    """
+    arguments = model.arguments.values()
+    if path in model.position:
+        k = model.position[path]
+        return lambda: model.variables(*arguments)[k], model.units[path]
+    fixed = {"p": model.parameter_position, "d": model.discrete_position, "t": {"time": 0}}
+    for symbol, positions in fixed.items():
+        if path in positions:
+            unit = _SECOND if symbol == "t" else model.units.get(path, ONE)
+            value = ca.SX(model.arguments[symbol][positions[path]])
+            return partial(ca.SX, value), unit
+    formula = formula_of(path)
+    if formula is not None:
+        parts = {name: expression_of(model, name) for name in formula.names()}
+        unit = unit_of(formula, {name: str(unit) for name, (_, unit) in parts.items()}, model.name)
+        quantity: Callable[[str], Any] = lambda text: ca.SX(si_value(text))  # noqa: E731
+        return lambda: formula.evaluate(lambda name: parts[name][0](), quantity), parse_unit(unit)
+    owner, _, last = path.rpartition(".")
+    columns = _POWERS | _ENERGY
+    if last in columns and owner in model.components:
+        # The model itself means all its components together.
+        rows = [model.components.index(owner)] if owner else list(range(len(model.components)))
+        unit = _JOULE if last in (*_ENERGY, "stored_energy") else _WATT
+        return lambda: ca.sum1(model.energy(*arguments)[rows, columns[last]]), unit
+    known = [*model.position, *(f"{one}.{last}" for one in model.components if last in columns)]
+    if owner in model.components:
+        known += [f"{owner}.{word}" for word in (*columns, "lock_time", "unlock_time")]
+    raise UnknownName(
+        f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}",
+        advice="Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(…), at(…, time), first(… > …), "
+        "duration(mode: name), series(…), time(mode: before -> after), and of components loss_energy, source_energy, "
+        "lock_time, unlock_time.",
+    )
+
+
+def quadratures(model: CompiledDae, outputs: Sequence[Output]) -> tuple[Any, str]:
+    """Return all integrands of outputs as one SX column, and a name for them."""
+    parts = [part for one in outputs for part in one.parts(model) if part.kind == "integral"]
+    column = ca.vertcat(*(part.expression(model) for part in parts)) if parts else ca.SX(0, 1)
+    return column, ";".join(f"{part.text} {part.form} {part.change}" for part in parts)

@@ -1,0 +1,216 @@
+"""Readings off results alone, of runs without equations: polynomials through neighbours, repeated until they settle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.compiled import Vector
+from modelica_like.errors import MissingValue, UnitError
+from modelica_like.runs.collect import Collector, Number, collector, dense_of
+from modelica_like.runs.polynomials import Curves, Fitted
+from modelica_like.runs.readings import expression_of, read_output
+from modelica_like.solve.dense import Dense
+from modelica_like.solve.recorded import RecordedModel, RecordedSolution
+from modelica_like.solve.recorder import Segment
+from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import ENERGY_TERMS, Trajectories
+from modelica_like.units import ONE, Unit, parse_unit
+
+_WIDE, _NARROW, _STRAIGHT = 6, 4, 2
+"""Results that a polynomial goes through: the best, the one that it is compared with, and a straight line."""
+_ROUGH = 0.01
+"""Difference of both, over the range of the results, above which what happens in between is unknown: a line is safe."""
+_TESTED = (0.25, 0.5, 0.75)
+_NOISE = 1e-12
+_TIMES = ("time", "first", "duration")
+SETTLED = 1e-5
+"""Of the largest amount (of times: of the run): what may change with twice as many results, twice in a row."""
+_LEAST, _MOST = 200, 100_000
+"""Numbers of results with which repeating begins and ends."""
+
+
+class OfResults(Dense):
+    """What results tell of the time between them: lines in a table, polynomials of degree five in runs of FMUs."""
+
+    def __init__(self, run: RecordedSolution) -> None:
+        self._time, self._values = run.time, run.continuous
+        rows = np.arange(len(run.time))
+        # Time stands still at an event, and modes change.
+        breaks = (np.diff(run.time) <= 0) | (np.diff(run.discretes) != 0).any(axis=0)
+        stretch = np.concatenate([[0], np.cumsum(breaks)])
+        first, last = (np.searchsorted(stretch, stretch, side=side) for side in ("left", "right"))
+        self._left = rows[:-1][np.diff(run.time) > 0]
+        self._first, self._last = first[self._left], last[self._left] - 1
+        # A mode changes at an unknown time between two results: there is a straight line.
+        self._last = np.maximum(self._last, self._left + 1)
+        self.begins, self.ends = run.time[self._left], run.time[self._left + 1]
+        self.d = run.discretes[:, self._left]
+        self.stretches = tuple(
+            Segment(run.time[some], run.continuous[:, some], np.zeros((0, len(some))), run.discretes[:, some[0]])
+            for some in np.split(rows, np.flatnonzero(breaks) + 1)
+        )
+        every = np.arange(len(self._left))
+        self._straight = np.full((len(self._values), len(every)), run.measured) | breaks[self._left]
+        for share in _TESTED if not run.measured else ():
+            times = self.begins + share * (self.ends - self.begins)
+            (wide, spread), (narrow, _) = (self._through(every, times, width) for width in (_WIDE, _NARROW))
+            self._straight |= np.abs(wide - narrow) > _ROUGH * spread
+
+    def points(self, pieces: Any, times: Vector) -> tuple[Vector, Vector]:
+        """Return the values of all columns."""
+        straight = self._straight[:, pieces]
+        values = self._through(pieces, times, _STRAIGHT)[0]
+        if not straight.all():
+            values = np.where(straight, values, self._through(pieces, times, _WIDE)[0])
+        return values, np.zeros((0, len(times)))
+
+    def _through(self, pieces: Any, times: Vector, width: int) -> tuple[Vector, Vector]:
+        """Values at times of the polynomials through results around pieces, and the ranges of those results."""
+        left, low, high = (one[pieces] for one in (self._left, self._first, self._last))
+        widths = np.minimum(width, high - low + 1)
+        values, spread = np.zeros((2, len(self._values), len(times)))
+        for size in np.unique(widths).tolist():
+            some = np.flatnonzero(widths == size)
+            begin = np.clip(left[some] - (size // 2 - 1), low[some], high[some] - size + 1)
+            near = begin[:, None] + np.arange(size)
+            knots, others = self._time[near], ~np.eye(size, dtype=bool)
+            ratios = (times[some, None, None] - knots[:, None, :]) / np.where(
+                others, knots[:, :, None] - knots[:, None, :], 1.0
+            )
+            weights = np.prod(ratios, axis=2, where=others)
+            values[:, some] = np.einsum("cnk,nk->cn", self._values[:, near], weights)
+            spread[:, some] = np.ptp(self._values[:, near], axis=2)
+        return values, spread
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """The columns of results as a model whose states are its variables."""
+
+    recorded: RecordedModel
+
+    def __post_init__(self) -> None:
+        known, own = self.recorded, vars(self)
+        constants = {name: value for name, value in known.parameters.items() if np.isscalar(value)}
+        own.update(
+            name=known.name, position=known.position, discrete_position=known.discrete_position, holds=(),
+            components=known.components, flat_variables=known.flat_variables, u=np.zeros(0),
+            parameter_position={name: k for k, name in enumerate(constants)}, p=np.array([*constants.values()], float),
+            units={one.path: _unit(one.unit) for one in (*known.flat_variables, *known.flat_discretes)},
+            flat_discretes=[SimpleNamespace(path=one.path, names=_names(one.names)) for one in known.flat_discretes],
+        )  # fmt: skip
+        sizes = {"t": 1, "x": len(known.position), "z": 0, "p": len(constants), "u": 0, "d": len(own["flat_discretes"])}
+        own["arguments"] = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
+
+    def variables(self, *arguments: Any) -> Any:
+        return arguments[1]
+
+    def energy(self, *arguments: Any) -> Any:
+        rows = [[f"{one}.{term}" for term in ENERGY_TERMS] for one in self.recorded.components]
+        x, known = arguments[1], self.recorded.position
+        return ca.vertcat(*(ca.horzcat(*(x[known[one]] if one in known else 0 for one in row)) for row in rows))
+
+    def once(self, _: Any, make: Callable[[], Any]) -> Any:
+        return make()
+
+
+def _unit(text: str) -> Unit:
+    try:
+        return parse_unit(text or "1")
+    except UnitError:  # a unit of another tool
+        return ONE
+
+
+def _names(names: Any) -> tuple[str, ...]:
+    return tuple(names.get(k, "") for k in range(int(max(names)) + 1)) if names else ()
+
+
+def read_results(run: RecordedSolution, names: Sequence[str]) -> tuple[list[Number], Vector]:
+    """Read numbers off results alone, and the size of each: the largest amount of what is read, or of times the run.
+
+    Raises:
+        UnknownName: a reading is not known.
+    """
+    model: Any = _Columns(run.model)
+    outputs, dense = [read_output(model, name) for name in names], OfResults(run)
+    sized = [replace(one, kind="peak") if one.kind not in _TIMES else replace(one, kind="end", path="time")
+             for one in outputs]  # fmt: skip
+    asked = Collector(model, [*outputs, *sized], _NOISE)
+    asked.feed(dense)
+    record: Any = SimpleNamespace(segments=dense.stretches, events=run.events, impacts=())
+    numbers, span = asked.finish(record), float(run.time[-1] - run.time[0])
+    sizes = [span if one.kind in _TIMES else abs(size) * (span if one.kind == "integral" else 1.0)
+             for one, size in zip(outputs, numbers[len(outputs):], strict=True)]  # fmt: skip
+    return numbers[: len(outputs)], np.array(sizes)
+
+
+def read_after(run: Trajectories, names: Sequence[str]) -> list[Number]:
+    """Read numbers off the dense output that a run has kept, or off the rows of a measured table.
+
+    Raises:
+        UnknownName: a reading is not known.
+        MissingValue: its dense output was not kept.
+    """
+    if isinstance(run, RecordedSolution) and run.measured:
+        return read_results(run, names)[0]
+    known: Any = run if isinstance(run, Solution) else dense_of(run, names[0])
+    asked = collector(known.model, names, known.options.atol)
+    if asked.along:
+        asked.feed(dense_of(known, names[0]))
+    return asked.finish(known)
+
+
+def along(run: Any, *texts: str) -> tuple[Fitted, str]:
+    """Return variables and formulas as polynomials over a whole run, and the unit of the first one.
+
+    Raises:
+        UnknownName: there is no such variable.
+        MissingValue: the dense output of the run was not kept.
+    """
+    dense: Dense = OfResults(run) if run.measured else dense_of(run, texts[0])
+    model: Any = _Columns(run.model) if run.measured else run.model
+    noise = _NOISE if run.measured else run.options.atol
+    expressions = [expression_of(model, text) for text in texts]
+    curves = Curves(model, texts, lambda: [ca.SX(make()) for make, _ in expressions], noise)
+    return curves.fitted(dense), str(expressions[0][1])
+
+
+def settled(run: RecordedSolution, again: Callable[[int], RecordedSolution], names: Sequence[str]) -> dict[str, Number]:
+    """Read numbers off a run that is repeated with twice as many results until they no longer change.
+
+    Args:
+        run: its results.
+        again: repeats it with so many times as many.
+        names: of the readings.
+
+    Raises:
+        UnknownName: a reading is not known.
+        MissingValue: a number still changes with many results.
+    """
+    before, _ = read_results(run, names)
+    calm, times, here, changes = 0, max(ceil(_LEAST / len(run.time)) // 2, 1), run, np.full(len(names), np.inf)
+    unsettled = changes > 0
+    while calm < 2 and len(here.time) < _MOST:
+        times *= 2
+        here = again(times)
+        now, sizes = read_results(here, names)
+        changes = np.where(np.isnan(now) & np.isnan(before), 0.0, np.abs(np.subtract(now, before)))
+        unsettled = ~(changes <= SETTLED * sizes + _NOISE)
+        calm, before = 0 if unsettled.any() else calm + 1, now
+    if calm < 2:
+        worst = int(np.argmax(unsettled))
+        raise MissingValue(
+            f"{names[worst]} of {run.model.name} is not known: it changes by {changes[worst]:.2g} between "
+            f"{len(here.time) // 2} and {len(here.time)} results.",
+            advice="Ask for a shorter run, or simulate the netlist.",
+        )
+    for number, change in zip(before, changes, strict=True):
+        number.change = float(change)
+    return dict(zip(names, before, strict=True))

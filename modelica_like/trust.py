@@ -1,0 +1,136 @@
+"""Trusted folders: modules beside a netlist run only there, because a module can do all that its user can."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+
+from modelica_like.errors import NetlistError
+from modelica_like.writing import write_text
+
+Decide = Callable[[Path], bool]
+"""Tells whether the modules of a folder may run."""
+_HOME = Path(__file__).resolve().parent
+_EXAMPLES = next((one / "examples" for one in (_HOME, _HOME.parent) if (one / "examples").is_dir()), _HOME)
+"""They come with this package, whose code runs anyway: in its wheel, or beside it."""
+_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+
+def _nobody(folder: Path) -> bool:
+    return False
+
+
+_decision: ContextVar[Decide] = ContextVar("decision", default=_nobody)
+
+
+@contextmanager
+def trusting(decide: Decide | None = None) -> Generator[None]:
+    """Run the modules beside all netlists that are read inside, not only those in trusted folders.
+
+    Args:
+        decide: is asked about each folder that is not trusted; by default all folders are.
+    """
+    token = _decision.set(decide or (lambda folder: True))
+    try:
+        yield
+    finally:
+        _decision.reset(token)
+
+
+def may_run(folder: Path) -> bool:
+    """Tell whether the modules of a folder may run.
+
+    Raises:
+        NetlistError: the list of trusted folders is damaged, or others can write it.
+    """
+    places = {folder, *folder.parents}
+    return not places.isdisjoint([_EXAMPLES, *trusted_folders()]) or _decision.get()(folder)
+
+
+def trusted_folders() -> list[Path]:
+    """Return the folders that the user trusts, with all that is in them.
+
+    Raises:
+        NetlistError: the list is damaged, or others can write it.
+    """
+    store = _store()
+    try:
+        status, text = store.stat(), store.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return []
+    except (OSError, UnicodeDecodeError) as error:
+        raise NetlistError(f"The list of trusted folders, '{store}', cannot be read: {error}.") from None
+    if os.name == "posix" and (status.st_uid not in (0, os.getuid()) or status.st_mode & _OTHERS):
+        raise NetlistError(
+            f"The list of trusted folders, '{store}', can be written by others.",
+            advice=f"Look through it, and then: chmod go-w '{store}'",
+        )
+    try:
+        return [Path(folder) for folder in json.loads(text)["folders"]]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise NetlistError(f"The list of trusted folders, '{store}', is damaged.", advice="Remove it.") from None
+
+
+def trust(folder: str | Path) -> Path:
+    """Trust a folder from now on: netlists in it, and in the folders below, may use modules beside them.
+
+    Returns:
+        The folder, without links.
+
+    Raises:
+        NetlistError: there is no such folder, or everyone can write there.
+        OSError: the list cannot be written.
+    """
+    place = Path(folder).resolve()
+    if not place.is_dir():
+        raise NetlistError(f"'{folder}' is not a folder.")
+    if os.name == "posix" and place.stat().st_mode & stat.S_IWOTH:
+        raise NetlistError(
+            f"'{place}' cannot be trusted: everyone can write there.",
+            advice="Trust a folder of yours, such as one in it.",
+        )
+    _write([*trusted_folders(), place])
+    return place
+
+
+def distrust(folder: str | Path) -> Path:
+    """Trust a folder no longer.
+
+    Returns:
+        The folder, without links.
+
+    Raises:
+        NetlistError: it is not on the list.
+        OSError: the list cannot be written.
+    """
+    place, known = Path(folder).resolve(), trusted_folders()
+    if place not in known:
+        above = next((one for one in place.parents if one in known), None)
+        raise NetlistError(f"'{place}' is not on the list" + (f"; '{above}', around it, is." if above else "."))
+    _write([one for one in known if one != place])
+    return place
+
+
+def _write(folders: list[Path]) -> None:
+    store = _store()
+    store.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    write_text(store, json.dumps({"folders": sorted({str(one) for one in folders})}, indent=1) + "\n")
+    store.chmod(0o600)
+
+
+def _store() -> Path:
+    """Return the list: in `$MODELICA_LIKE_CONFIG`, or in a folder of the user."""
+    given = os.environ.get("MODELICA_LIKE_CONFIG")
+    if given:
+        return Path(given) / "trusted.json"
+    if sys.platform == "win32":
+        base = Path(os.environ.get("APPDATA", Path.home() / "AppData" / "Roaming"))
+    else:
+        base = Path(os.environ.get("XDG_CONFIG_HOME", Path.home() / ".config"))
+    return base / "modelica-like" / "trusted.json"

@@ -1,0 +1,53 @@
+"""Errors of runs that would take too long, or more memory than there is."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from modelica_like import Options, simulate
+from modelica_like.errors import ModelicaLikeError, StepFailed, ValueOutOfRange
+from modelica_like.language import Component, Equations, Variable, der, var
+from modelica_like.solve import options
+
+Check = Callable[[type[ModelicaLikeError], Callable[[], object], str], None]
+
+
+class Swing(Component):
+    """It swings with 10^7 rad/s: a step is about 10^-8 s long."""
+
+    units_checked = False
+    x: Variable = var("1", "amplitude", state="always", default=1.0)
+    v: Variable = var("1/s", "its rate", state="always", default=0.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.v
+        yield der(self.v) == -1e14 * self.x
+
+
+def test_steps_of_a_native_run_are_limited(check_message: Check) -> None:
+    text = (
+        "The run-time gave up at about t = 0 s: it took more than 20,000 steps (max_steps) for 1 s.\n"
+        "v changes fastest relative to its tolerance.\n"
+        "Look for a stiff spring, a vanishing mass or a speed without bound; then try other tolerances."
+    )
+    limited = Options(max_steps=20_000)
+    check_message(StepFailed, lambda: simulate(Swing(), 100.0, options=limited, solver="native"), text)
+
+
+def test_the_limit_of_steps_is_not_one_of_the_whole_run() -> None:
+    run = simulate(Swing(), 1e-3, options=Options(max_steps=10_000), solver="native")
+    assert run.statistics.steps > 10_000
+    assert run.time[-1] == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_results_that_do_not_fit_are_told_before_the_run(
+    solver: Any, check_message: Check, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(options, "memory", lambda: 1e8)
+    text = (
+        "10,000,000 results of 2 states and implicit unknowns take 0.32 GB, and this machine has 0.1 GB.\n"
+        "Take fewer points; `readings` are read off every step, whatever is written."
+    )
+    check_message(ValueOutOfRange, lambda: simulate(Swing(), 1e-6, points=10_000_000, solver=solver), text)

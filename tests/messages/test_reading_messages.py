@@ -1,0 +1,88 @@
+# ruff: noqa: E501 messages stand here as they are told
+"""What is said where a number cannot be read off a run."""
+
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modelica_like import ModelicaLikeError, build, calibrate, load_spectrum, sensitivities, simulate
+from modelica_like.errors import MissingValue, NetlistError, UnknownName, ValueOutOfRange
+from modelica_like.runs.readings import read_output
+from modelica_like.runs.results import settled
+from modelica_like.sizing import load_of
+from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+
+DRIVE = Path(__file__).parents[2] / "examples" / "machine_table_direct.toml"
+
+
+def run(until: float = 0.1) -> object:
+    return simulate(DRIVE, until)
+
+
+def recorded() -> RecordedSolution:
+    model = RecordedModel("drive", (RecordedVariable("clutch.tau", "N.m"),), (), {})
+    return RecordedSolution(model, np.arange(3.0), np.zeros((1, 3)), np.zeros((0, 3)), 0.0)
+
+
+def unsteady(times: int) -> RecordedSolution:
+    model = RecordedModel("drive", (RecordedVariable("clutch.tau", "N.m"),), (), {})
+    time = np.linspace(0, 1, times + 1)
+    return RecordedSolution(model, time, np.full((1, times + 1), np.log2(times)), np.zeros((0, times + 1)), 0.0)
+
+
+CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
+    "a run without its polynomials": (MissingValue, lambda: pickle.loads(pickle.dumps(run())).read("max(clutch.tau)"), """\
+max(clutch.tau) cannot be read off this run: what happens between its results was not kept.
+Ask before the run: simulate(…, readings=["max(clutch.tau)"])."""),
+    "results only": (MissingValue, lambda: load_spectrum(recorded(), "clutch.tau"), """\
+clutch.tau cannot be read off drive: between its results nothing is known.
+Ask before the run: run_fmu(…, readings=[…]), or simulate the netlist."""),
+    "a number of an FMU": (MissingValue, lambda: load_of(recorded(), "clutch.tau"), """\
+peak(clutch.tau) cannot be read off drive: between its results nothing is known.
+Ask before the run: run_fmu(…, readings=[…]), or simulate the netlist."""),
+    "a number that never settles": (MissingValue, lambda: settled(recorded(), unsteady, ["max(clutch.tau)"]), """\
+max(clutch.tau) of drive is not known: it changes by 1 between 67584 and 135169 results.
+Ask for a shorter run, or simulate the netlist."""),
+    "no variable of an FMU": (UnknownName, lambda: settled(recorded(), unsteady, ["max(clutch.ta)"]), """\
+drive has no variable 'clutch.ta'; did you mean 'clutch.tau'?
+Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(…), at(…, time), first(… > …), duration(mode: name), series(…), time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time."""),
+    "a trajectory": (ValueOutOfRange, lambda: simulate(DRIVE, 0.1, readings=["series(clutch.tau)"]), """\
+series(clutch.tau) is a trajectory, not a number.
+Take it from the results."""),
+    "no condition": (UnknownName, lambda: read_output(build(DRIVE), "first(clutch.tau)"), """\
+'first(clutch.tau)' has no condition.
+Compare two values: first(motor.w > 100 rad/s), first(a.tau < b.tau)."""),
+    "a condition that never holds": (UnknownName, lambda: sensitivities(run(), "first(clutch.tau > 1e6 N.m)"), """\
+'first(clutch.tau > 1e6 N.m)' does not happen in this run."""),
+    "no function": (NetlistError, lambda: read_output(build(DRIVE), "max(median(clutch.tau))"), """\
+'median(clutch.tau)' is neither a quantity nor a formula; there is no function 'median'; did you mean 'min'.
+A quantity is a number with a unit ("8.5 kg.cm2"), a formula is arithmetic of parameters ("2*J")."""),
+    "a mode": (UnknownName, lambda: read_output(build(DRIVE), "duration(clutch.mode: sliding)"), """\
+clutch.mode has no mode 'sliding'. It has free, stuck, start_forward, start_backward, forward, backward."""),
+    "a load": (UnknownName, lambda: load_of(run(), "clutch.tau", "peek"), """\
+A load cannot be the 'peek' of a trajectory; did you mean 'peak'? It can be peak, largest, smallest, final, mean, rms, integral, reading."""),
+    "a file as data": (ValueOutOfRange, lambda: calibrate(DRIVE, ["meas.csv"], {"table.J": (1.0, 2.0)}), """\
+'meas.csv' is no measurement.
+Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the uncertainties."""),
+}  # fmt: skip
+
+
+def test_an_extreme_of_rounding_proposes_the_peak() -> None:
+    """The screw accelerates the table, and carries nothing at rest or constant speed."""
+    made = sensitivities(DRIVE, ["min(screw.flange_r.tau)", "min(clutch.tau)"], "load_torque")
+    assert made.remarks == (
+        "min(screw.flange_r.tau) is zero up to rounding, and so are its derivatives: screw.flange_r.tau has the other sign, "
+        "up to 8.95247 N.m. Ask for peak(screw.flange_r.tau), the largest amount.",
+    )
+    assert made.remarks[0] in str(made)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_messages(case: str) -> None:
+    kind, action, told = CASES[case]
+    with pytest.raises(kind) as caught:
+        action()
+    assert str(caught.value) == told

@@ -1,0 +1,261 @@
+"""Small texts as users write them, against closed forms."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from modelica_like import export_fmu, load, simulate
+from modelica_like.modelica_text.netlist_form import netlist_text
+from modelica_like.modelica_text.read import read_modelica
+from modelica_like.netlist import loads
+
+ROTATIONAL = "Modelica.Mechanics.Rotational.Components"
+TRANSLATIONAL = "Modelica.Mechanics.Translational"
+
+
+@pytest.fixture
+def text_file(tmp_path: Path) -> Any:
+    """Return a function that writes a text to a file."""
+
+    def write(text: str) -> Path:
+        (tmp_path / "a.mo").write_text(text)
+        return tmp_path / "a.mo"
+
+    return write
+
+
+def run(path: Path, **options: Any) -> Any:
+    return simulate(load(path), rtol=1e-10, atol=1e-12, **options)
+
+
+BRAKED = f"""
+model Braked
+  {ROTATIONAL}.Inertia J(J = 1, phi(fixed = true), w(start = 3));
+  {ROTATIONAL}.Damper d(d = 1);
+  {ROTATIONAL}.Fixed f;
+equation
+  connect(J.flange_b, d.flange_a);
+  connect(d.flange_b, f.flange);
+  annotation(experiment(StopTime = 1));
+end Braked;
+"""
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_start_that_is_not_fixed_holds_where_nothing_else_determines_it(text_file: Any, solver: Any) -> None:
+    result = run(text_file(BRAKED), solver=solver)
+    assert result["J.w"] == pytest.approx(3 * np.exp(-result.time), rel=1e-8)
+
+
+def test_the_netlist_and_the_fmu_of_a_text_start_like_it(text_file: Any, tmp_path: Path) -> None:
+    model, notes = read_modelica(text_file(BRAKED))
+    drive = loads(netlist_text(model, tmp_path, notes), str(tmp_path / "a.toml"))
+    assert simulate(drive, rtol=1e-10)["J.w"][0] == 3.0
+    assert not export_fmu(drive, tmp_path / "braked.fmu", "2.0", ("me",)).check.differs
+
+
+def test_what_is_fixed_wins_over_what_is_not(text_file: Any) -> None:
+    coupled = BRAKED.replace(
+        "equation",
+        f"  {ROTATIONAL}.Inertia K(J = 2, w(fixed = true, start = 6));\nequation\n  connect(K.flange_b, J.flange_a);",
+    )
+    result = run(text_file(coupled))
+    assert result["J.w"] == pytest.approx(6 * np.exp(-result.time / 3), rel=1e-8)
+
+
+def test_starts_of_a_source_and_of_a_free_mass(text_file: Any) -> None:
+    text = f"""
+    model A
+      {TRANSLATIONAL}.Sources.Speed speed(exact = true, s(start = 1));
+      {TRANSLATIONAL}.Components.Mass mass(m = 1);
+      Modelica.Blocks.Sources.Constant c(k = 2);
+      {TRANSLATIONAL}.Components.Mass free(m = 1, s(start = 3), v(start = 1));
+    equation
+      connect(c.y, speed.v_ref);
+      connect(speed.flange, mass.flange_a);
+      annotation(experiment(StopTime = 1));
+    end A;
+    """
+    final = run(text_file(text)).final
+    assert final["mass.s"] == pytest.approx(1 + 2)
+    assert final["free.s"] == pytest.approx(3 + 1)
+
+
+TICKING = """
+model Ticking
+  partial block Base
+    parameter Real period = 0.1;
+    Modelica.Blocks.Interfaces.RealInput u;
+    {visibility} output Boolean tick;
+  equation
+    tick = sample(0, period);
+  end Base;
+  block Hold
+    extends Base;
+    Modelica.Blocks.Interfaces.RealOutput y;
+    Real h(start = 0, fixed = true);
+  equation
+    when tick then
+      h = u;
+    end when;
+    y = h;
+  end Hold;
+  Modelica.Blocks.Sources.Ramp ramp(height = 1, duration = 1);
+  Hold a(period = 0.1);
+  Integer n(start = 0, fixed = true);
+equation
+  connect(ramp.y, a.u);
+  when a.tick and time > 0.45 then
+    n = pre(n) + 1;
+  end when;
+  annotation(experiment(StopTime = 0.95));
+end Ticking;
+"""
+
+
+@pytest.mark.parametrize("visibility", ["public", "protected"])
+def test_an_output_that_samples_ticks(text_file: Any, visibility: str) -> None:
+    result = run(text_file(TICKING.format(visibility=visibility)))
+    inside = np.abs(10 * result.time - np.round(10 * result.time)) > 1e-9
+    assert result["a.y"][inside] == pytest.approx(np.floor(10 * result.time[inside]) / 10)
+    assert result.final["n"] == 5  # at 0.5 to 0.9 s
+
+
+def test_an_output_has_a_value_before_events(text_file: Any) -> None:
+    """A switch with hysteresis: on where a sine rises above 0.5, off where it falls below -0.5."""
+    text = """
+    model A
+      block Hysteresis
+        Modelica.Blocks.Interfaces.RealInput u;
+        Modelica.Blocks.Interfaces.BooleanOutput y(start = false);
+      equation
+        y = not pre(y) and u > 0.5 or pre(y) and u >= -0.5;
+      end Hysteresis;
+      Hysteresis a;
+      Modelica.Blocks.Sources.Sine s(amplitude = 1, f = 1);
+      Real on(start = 0, fixed = true);
+    equation
+      connect(s.y, a.u);
+      der(on) = if a.y then 1 else 0;
+      annotation(experiment(StopTime = 2));
+    end A;
+    """
+    assert run(text_file(text)).final["on"] == pytest.approx(2 * (7 / 12 - 1 / 12))
+
+
+def own(parts: str, equations: str, until: float = 1.0) -> str:
+    """Return a model with parts and equations."""
+    return f"model A\n{parts}\nequation\n{equations}\n  annotation(experiment(StopTime = {until}));\nend A;\n"
+
+
+ROTOR = f"{ROTATIONAL}.Inertia J(J = 1, phi(fixed = true), w(fixed = true));"
+
+
+def test_a_parameter_may_be_shown_in_another_unit(text_file: Any) -> None:
+    parts = f'parameter Modelica.Units.SI.Torque limit(displayUnit = "kN.m") = 4; {ROTOR}'
+    parts += 'Modelica.Mechanics.Rotational.Sources.ConstantTorque t(tau_constant(displayUnit = "kN.m") = limit);'
+    assert run(text_file(own(parts, "connect(t.flange, J.flange_a);"))).final["J.w"] == pytest.approx(4)
+
+
+def test_numbers_stay_as_they_are_in_other_units(text_file: Any) -> None:
+    """Units are documentation in Modelica: nothing is converted."""
+    parts = 'parameter Real a(unit = "deg") = 90; Real x(unit = "deg", displayUnit = "deg") = a;'
+    parts += 'Real n(unit = "1/min", displayUnit = "rpm", start = 60, fixed = true);'
+    result = run(text_file(own(parts, "der(n) = -n;")))
+    assert result.final["x"] == 90
+    assert result["n"] == pytest.approx(60 * np.exp(-result.time))
+
+
+def test_bindings_of_a_connector_are_equations(text_file: Any) -> None:
+    text = """
+    model T
+      parameter Boolean useSupport = false;
+      Modelica.Mechanics.Rotational.Interfaces.Flange_b flange(tau = -t, phi = x);
+      Modelica.Mechanics.Rotational.Interfaces.Support support(tau = -flange.tau) if useSupport;
+      Real t, x;
+    equation
+      t = 2*time;
+    end T;
+    """
+    result = run(text_file(text + own(f"T t; {ROTOR}", "connect(t.flange, J.flange_a);")))
+    assert result["J.w"] == pytest.approx(result.time**2, abs=1e-8)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_class_with_equations_and_parts(text_file: Any, solver: Any) -> None:
+    text = """
+    model Source
+      Modelica.Mechanics.Rotational.Interfaces.Flange_b flange;
+      Modelica.Blocks.Sources.Sine sine(amplitude = 2, f = 1);
+      Real t;
+    equation
+      t = sine.y;
+      flange.tau = -t;
+    end Source;
+    """
+    result = run(text_file(text + own(f"Source s; {ROTOR}", "connect(s.flange, J.flange_a);", 0.5)), solver=solver)
+    speed = (1 - np.cos(2 * np.pi * result.time)) / np.pi
+    assert result["J.w"] == pytest.approx(speed, abs=1e-7)
+    assert result.energy().drift < 1e-6
+
+
+def test_arrays_of_connectors(text_file: Any) -> None:
+    """Two heat flows of 1 and 2 W into one capacity of 3 J/K."""
+    heat = "Modelica.Thermal.HeatTransfer"
+    text = f"""
+    model Collector
+      parameter Integer m = 3;
+      {heat}.Interfaces.HeatPort_a port_a[m];
+      {heat}.Interfaces.HeatPort_b port_b;
+    equation
+      port_b.Q_flow + sum(port_a.Q_flow) = 0;
+      port_a.T = fill(port_b.T, m);
+    end Collector;
+    """
+    parts = f"Collector c(m = 2); {heat}.Sources.FixedHeatFlow q[2](Q_flow = {{1, 2}});"
+    parts += f"{heat}.Components.HeatCapacitor k(C = 3, T(fixed = true, start = 300));"
+    result = run(text_file(text + own(parts, "connect(q.port, c.port_a); connect(c.port_b, k.port);")))
+    assert result["k.T"] == pytest.approx(300 + result.time)
+
+
+def test_end_is_the_size_of_an_array(text_file: Any) -> None:
+    parts = "parameter Integer n = 3; Real T[n](each start = 1, each fixed = true); parameter Real p[2] = {5, 7};"
+    parts += f"Real y = p[end] - p[end - 1]; {ROTATIONAL}.Inertia r[2](each J = 1); {ROTATIONAL}.Spring s(c = 1);"
+    equations = """
+    for i in 1:n - 1 loop der(T[i]) = T[i + 1] - T[i]; end for;
+    der(T[end]) = -T[end];
+    connect(r[end].flange_b, s.flange_a);
+    connect(r[1].flange_b, s.flange_b);
+    """
+    result = run(text_file(own(parts, equations)))
+    assert result.final["y"] == 2
+    assert result["T[3]"] == pytest.approx(np.exp(-result.time))
+    assert result["T[2]"] == pytest.approx((1 + result.time) * np.exp(-result.time))
+
+
+def test_a_base_with_its_position(text_file: Any) -> None:
+    text = f"""
+    model Brake
+      extends {TRANSLATIONAL}.Interfaces.PartialElementaryOneFlangeAndSupport2;
+      parameter Real k = 2;
+    equation
+      flange.f = k*der(s);
+    end Brake;
+    """
+    parts = f"Brake b; {TRANSLATIONAL}.Components.Mass m(m = 1, s(fixed = true), v(fixed = true, start = 1));"
+    result = run(text_file(text + own(parts, "connect(b.flange, m.flange_b);")))
+    assert result["m.v"] == pytest.approx(np.exp(-2 * result.time))
+
+
+def test_units_of_version_3_of_the_standard_library(text_file: Any) -> None:
+    parts = f"import SI = Modelica.SIunits; parameter SI.Inertia J = 2; {ROTATIONAL}.Inertia a(J = J);"
+    parts += "parameter Modelica.SIunits.AngularVelocity w = Modelica.SIunits.Conversions.from_rpm(60); Real x = w*a.J;"
+    assert run(text_file(own(parts, ""))).final["x"] == pytest.approx(2 * 2 * np.pi)
+
+
+@pytest.mark.parametrize("count", [200, 30_000])
+def test_long_sums_are_no_deep_trees(text_file: Any, count: int) -> None:
+    parts = f"Real x = {' + '.join(['time'] * count)} - {' - '.join(['1'] * count)};"
+    assert run(text_file(own(parts, ""))).final["x"] == pytest.approx(0, abs=1e-9)
