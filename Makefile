@@ -59,7 +59,7 @@ benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/energy.py
 	$(BIN)/python benchmarks/segments.py
 	$(BIN)/python benchmarks/events.py
-	$(BIN)/python benchmarks/chain.py 10 100 1000
+	$(BIN)/python benchmarks/chain.py 10 100 1000 5000
 	$(BIN)/python benchmarks/fmu_export.py 10 100 1000
 	$(BIN)/python benchmarks/gradient.py
 	$(BIN)/python benchmarks/linearize.py 100 1000

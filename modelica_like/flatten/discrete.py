@@ -245,7 +245,7 @@ class DiscreteEquations:
 
     def _write_ending(self, one: Ending, source: Source) -> None:
         """Declare the mode that ends the run where a `when` has set the ending: the instant is completed before."""
-        self._check_text(one.text, "terminate(…)", source)
+        self._check_text(one.text, "an assertion" if one.fails else "terminate(…)", source)
         path = f"terminate[{sum(one.path.startswith('terminate[') for one in self.hidden) + 1}]"
         one.name = f"reached {path}"
         self.hidden.append(Hidden(one.name, "whether the run ends"))
@@ -253,8 +253,8 @@ class DiscreteEquations:
         symbol.name = path
         self._kept += [one, symbol]
         mode = self._mode(path, one.text, symbol, ("runs", "ended"))
-        go = mode.go("runs", "ended", when=cast(Expr, cast(Any, one) > 0), notice=one.text)
-        self.events.append(replace(go, source=source, ends=True))
+        go = mode.go("runs", "ended", when=cast(Expr, cast(Any, one) > 0), notice=one.text, fails=one.fails)
+        self.events.append(replace(go, source=source, ends=not one.fails))
 
     def _write_assertion(self, one: Assertion, path: str) -> None:
         self._check_text(one.text, "an assertion", one.source)

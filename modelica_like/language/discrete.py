@@ -50,11 +50,11 @@ class Pre(Symbol):
 
 
 class Ending(Marker):
-    """Becomes 1 where a `when` ends the run, for the reason `text`."""
+    """Becomes 1 where a `when` ends the run, for the reason `text`: regularly, or as an error."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, *, fails: bool = False) -> None:
         super().__init__("ending", cast(Expr, ca.SX(0)))
-        self.text = text
+        self.text, self.fails = text, fails
 
 
 INITIAL, TERMINAL, HOMOTOPY = (Symbol(None, name) for name in ("initial()", "terminal()", "homotopy()"))

@@ -113,7 +113,7 @@ def _events(component: Component) -> list[str]:
 def _only_ends(one: Any) -> bool:
     """Return whether an event is a `when` that ends the run and does nothing else."""
     whole = one.branches if isinstance(one, When) else ()
-    return len(whole) == 1 and all(isinstance(key, Ending) for key in whole[0][1])
+    return len(whole) == 1 and all(isinstance(key, Ending) and not key.fails for key in whole[0][1])
 
 
 def _ending(one: When, component: Component) -> list[str]:

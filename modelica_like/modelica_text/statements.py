@@ -12,7 +12,7 @@ from modelica_like.modelica_text.members import element, exists, part_of, sizes
 from modelica_like.modelica_text.resolve import Resolver
 from modelica_like.modelica_text.tree import ClassText, Expr, Statement, calls_in
 from modelica_like.modelica_text.types import basic_type
-from modelica_like.modelica_text.written import MEMORY, TERMINATE, Happening
+from modelica_like.modelica_text.written import ASSERT, MEMORY, TERMINATE, Happening
 
 _INSTANTS = ("sample", "edge", "change", "initial", "terminal")
 
@@ -70,7 +70,8 @@ class Statements:
         sources = [source for _, _, source in (*self.equations, *self.initial) for _ in (0, 1)]
         for one in self.happenings:
             for conditions, new in one.branches:
-                numbers = [*conditions, *(value for name, value in new.items() if name != TERMINATE)]
+                demanded = (value.args[0] for name, value in new.items() if name.startswith(ASSERT))
+                numbers = [*conditions, *demanded, *(value for name, value in new.items() if not _is_ending(name))]
                 values += numbers
                 sources += [one.source] * len(numbers)
         for value, source in zip(values, sources, strict=True):
@@ -252,7 +253,8 @@ class Statements:
             if any(each.kind in ("boolean", "number") for each in conditions):
                 raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
             values = self._changes(body, text, local)
-            made |= {name for name in values if name not in {TERMINATE, *self._states(body, resolver)}}
+            states = self._states(body, resolver)
+            made |= {name for name in values if name not in states and not _is_ending(name)}
             branches.append((conditions, values))
         for name in made & self.assigned:
             raise ModelicaTextError(f"Two whens determine {name}.", where=source)
@@ -280,23 +282,39 @@ class Statements:
                 values[target.args[0][0]] = value
             elif call is not None and call.args[0] == "terminate":
                 values[TERMINATE] = Expr("string", (_words(call.args[1][0]),), one.line)
-            elif call is None or call.args[0] != "assert":
+            elif call is not None and call.args[0] == "assert":
+                demand = self._demanded(call, resolver, text)
+                values |= {} if demand is None else {f"{ASSERT}{len(values)}": Expr("demand", demand, one.line)}
+            else:
                 raise refused(f"'{one.kind}' in a 'when'", text, one.line)
         return values
 
     def _demand(self, call: Expr, resolver: Resolver, text: ClassText) -> None:
         """Read an assertion: it ends the run where it is broken."""
-        name, given, named = call.args
-        if name != "assert":
-            raise refused(f"{name}(…) among equations", text, call.line)
-        if "level" in dict(named) or len(given) > 2:
-            return  # a warning
+        if call.args[0] != "assert":
+            raise refused(f"{call.args[0]}(…) among equations", text, call.line)
+        demand = self._demanded(call, resolver, text)
+        if demand is not None:
+            condition, words = demand
+            self.happenings.append(Happening((((condition,), {}),), text.place(call.line), words.args[0]))
+
+    def _demanded(self, call: Expr, resolver: Resolver, text: ClassText) -> tuple[Expr, Expr] | None:
+        """Return the condition of an assertion and its words; None of a warning and of what always holds."""
+        _, given, named = call.args
+        level = given[2] if len(given) > 2 else dict(named).get("level")
+        if level is not None and not (level.kind == "name" and level.args[-1][0] == "error"):
+            return None
         condition = resolver(given[0])
         words = _words(given[1]) if len(given) > 1 else "an assertion is broken"
         if condition.kind != "boolean":
-            self.happenings.append(Happening((((condition,), {}),), text.place(call.line), words))
-        elif not condition.args[0]:
+            return condition, Expr("string", (words,), call.line)
+        if not condition.args[0]:
             raise ModelicaTextError(f"An assertion is broken: {words}.", where=text.place(call.line))
+        return None
+
+
+def _is_ending(name: str) -> bool:
+    return name.startswith((TERMINATE, ASSERT))
 
 
 def _condition(node: Expr) -> Expr:

@@ -31,11 +31,10 @@ from modelica_like.language import (
     previous,
     sample,
     sign,
-    terminate,
     when,
     where,
 )
-from modelica_like.language.discrete import is_a, silent
+from modelica_like.language.discrete import Ending, is_a, silent
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field
@@ -58,8 +57,9 @@ class Happening:
     text: str = ""
 
 
-TERMINATE = "terminate()"
-"""Among the new values of a `when`: it ends the run, with this text."""
+TERMINATE, ASSERT = "terminate()", "assert()"
+"""Among the new values of a `when`: it ends the run, with this text; and, followed by a number, where a condition is
+false then."""
 MEMORY = "_condition"
 """Behind the name of a Boolean signal: the condition itself, which has a value before events."""
 
@@ -111,13 +111,19 @@ class Written(Assembly):
             made = None
             for conditions, values in one.branches:
                 active = tuple(self.symbolic(condition) for condition in conditions)
-                numbers = {path: value for path, value in values.items() if path != TERMINATE}
-                new = {self._symbol(path): self.symbolic(value, events=None) for path, value in numbers.items()}
-                if TERMINATE in values:
-                    new |= terminate(f"says: {values[TERMINATE].args[0]}")
+                new = dict[Any, Any](self._changed(path, value) for path, value in values.items())
                 made = when(active, new) if made is None else made.elsewhen(active, new)
             if made is not None:
                 yield replace(made, source=one.source)
+
+    def _changed(self, path: str, value: Node) -> tuple[Any, Any]:
+        """Return what a `when` changes, and its new value."""
+        if path == TERMINATE:
+            return Ending(f"says: {value.args[0]}"), 1.0
+        if path.startswith(ASSERT):
+            holds, words = value.args
+            return Ending(words.args[0], fails=True), where(self.symbolic(holds, events=None), 0.0, 1.0, events=None)
+        return self._symbol(path), self.symbolic(value, events=None)
 
     def source_power(self) -> Expr | float:
         """Return minus the power that enters at own connectors, unless parts take it on."""

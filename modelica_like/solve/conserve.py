@@ -28,6 +28,8 @@ _STEPS = 10
 """Steps between two results up to which that holds; above, more may add up."""
 _PIECES = 8
 """Smooth pieces of a run at which the tolerances are looked at."""
+_SIGNS = 8
+"""Combinations of signs along which changes of energies are looked at: their mean errs by a third."""
 _SHORTER, _ATTEMPTS = 8.0, 3
 """Factor of step limits of repetitions, and the number of these: then steps are 512 times as short as what they had
 stepped over."""
@@ -109,7 +111,8 @@ def find_astray(run: Solution) -> Astray | None:
             suspects = suspects[np.abs(drifts[suspects]) > _allowed(run, segments)[suspects]]
         if not suspects.size:
             return None
-    wrong = (_wrong(run, k) for k in sorted(suspects.tolist(), key=lambda k: -abs(drifts[k])))
+    places = _Places(run)
+    wrong = (places.wrong(k) for k in sorted(suspects.tolist(), key=lambda k: -abs(drifts[k])))
     return next((one for one in wrong if one is not None), None)
 
 
@@ -126,20 +129,35 @@ def _drifts(
     return np.where(np.abs(total) > powers.unknown, total, 0.0), powers
 
 
-def _wrong(run: Solution, component: int) -> Astray | None:
-    """Find two neighbouring results with the largest drift, by halves; None if it is within the tolerances there."""
-    model, low, high = run.model, 0, sum(len(one.times) - 1 for one in run.segments)
-    while high - low > 1:
-        middle = (low + high) // 2
-        halves = (low, middle), (middle, high)
-        parts = [_drifts(model, [*_between(run.segments, *one)], run.options)[0] for one in halves]
-        low, high = max(zip(parts, halves, strict=True), key=lambda pair: abs(pair[0][component]))[1]
-    (piece,) = _between(run.segments, low, high)
-    drifts, powers = _drifts(model, [piece], run.options)
-    drift = float(drifts[component])
-    if abs(drift) <= _allowed(run, [piece])[component] + powers.precision:
-        return None
-    return Astray(model.components[component], drift, float(piece.times[0]), float(piece.times[-1]))
+class _Places:
+    """Looks for the results between which energies do not follow; what one component asks is kept for the others."""
+
+    def __init__(self, run: Solution) -> None:
+        self.run = run
+        self._parts = dict[tuple[int, int], tuple[Vector, Powers]]()
+        self._limits = dict[int, Vector]()
+
+    def wrong(self, component: int) -> Astray | None:
+        """Find two neighbouring results with the largest drift, by halves; None if the tolerances explain it."""
+        low, high = 0, sum(len(one.times) - 1 for one in self.run.segments)
+        while high - low > 1:
+            middle = (low + high) // 2
+            halves = (low, middle), (middle, high)
+            low, high = max(halves, key=lambda half: abs(self._part(*half)[0][component]))
+        drifts, powers = self._part(low, high)
+        (piece,) = _between(self.run.segments, low, high)
+        if low not in self._limits:
+            self._limits[low] = _allowed(self.run, [piece]) + powers.precision
+        drift = float(drifts[component])
+        if abs(drift) <= self._limits[low][component]:
+            return None
+        return Astray(self.run.model.components[component], drift, float(piece.times[0]), float(piece.times[-1]))
+
+    def _part(self, low: int, high: int) -> tuple[Vector, Powers]:
+        if (low, high) not in self._parts:
+            run = self.run
+            self._parts[low, high] = _drifts(run.model, [*_between(run.segments, low, high)], run.options)
+        return self._parts[low, high]
 
 
 def _between(segments: Sequence[Segment], low: int, high: int) -> Iterator[Segment]:
@@ -186,18 +204,24 @@ def _tolerated(run: Solution, piece: Segment, k: int) -> Vector:
 
 
 def _changes(model: CompiledDae, point: Point, weights: Vector) -> Vector:
-    """Largest changes of energies and their rates where states change by weights; sparse where nothing is implicit."""
+    """Mean changes of energies and their rates where states change by weights, each with its own sign.
+
+    Where nothing is implicit, they are found along some combinations of signs: all slopes of a long chain would be
+    many, because its last speed is the first one and all relative ones.
+    """
     if model.implicit:
-        return np.abs(slopes(model, point, "energies", function=lambda: _energies(model)).x) @ weights
+        return np.linalg.norm(slopes(model, point, "energies", function=lambda: _energies(model)).x * weights, axis=1)
 
     def make() -> ca.Function:
-        energies, some = _energies(model), ca.SX.sym("weights", len(weights))
+        energies, some = _energies(model), ca.SX.sym("changes", len(weights), _SIGNS)
         arguments = list(model.arguments.values())
-        slope = ca.jacobian(energies(*arguments), model.arguments["x"])
-        return ca.Function("changes", [*arguments, some], [ca.mtimes(ca.fabs(slope), some)])
+        changes = ca.jtimes(energies(*arguments), model.arguments["x"], some)
+        return ca.Function("changes", [*arguments, some], [ca.densify(ca.sqrt(ca.sum2(changes**2) / _SIGNS))])
 
     function = model.once("changes of energies", make)
-    changes = np.array(function(point.t, point.x, point.z, model.p, model.u, point.d, weights)).ravel()
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(weights), _SIGNS))
+    changed = function(point.t, point.x, point.z, model.p, model.u, point.d, weights[:, None] * signs)
+    changes = np.array(changed).ravel()
     return np.where(np.isfinite(changes), changes, math.inf)
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from modelica_like import Assembly, build, export_fmu, load, run_fmu, simulate
-from modelica_like.errors import ModelicaTextError
+from modelica_like.errors import LimitPassed, ModelicaTextError
 from modelica_like.language import Component, Equations, Events, Parameter, Variable, der, param, terminate, var, when
 from modelica_like.modelica_text.netlist_form import netlist_text
 from modelica_like.modelica_text.write import modelica_text
@@ -275,6 +275,29 @@ def test_terminate_ends_the_run(
     assert result.final["n"] == count
     assert result.ended is not None
     assert result.ended.reason == reason
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize("level", ["", ", AssertionLevel.error", ", level = AssertionLevel.error"])
+def test_an_assertion_in_a_when_is_judged_at_the_instant(
+    tmp_path: Path, solver: Literal["idas", "native"], level: str
+) -> None:
+    text = LIFT.replace('terminate("the lift is at the top")', f'assert(v < v_max, "too fast"{level})')
+    (tmp_path / "Lift.mo").write_text(text.replace("Real a = 3;", "Real a = 3, v_max = 1;"))
+    drive = load(tmp_path / "Lift.mo")
+    # At 1 m it has sqrt(2 a x) = 2.449 m/s. Later it is faster, which is asked at that instant only.
+    assert simulate(drive, 3.0, parameters={"v_max": 2.5}, solver=solver, rtol=1e-10).final["n"] == 1
+    with pytest.raises(LimitPassed, match="too fast") as caught:
+        simulate(drive, 3.0, parameters={"v_max": 2.4}, solver=solver, rtol=1e-10)
+    assert caught.value.run is not None
+    assert caught.value.run.time[-1] == pytest.approx(np.sqrt(2 / 3), rel=1e-8)
+
+
+def test_a_warning_is_no_assertion(tmp_path: Path) -> None:
+    (tmp_path / "Lift.mo").write_text(
+        LIFT.replace('terminate("the lift is at the top")', 'assert(v < 1, "fast", AssertionLevel.warning)')
+    )
+    assert simulate(load(tmp_path / "Lift.mo"), 3.0).time[-1] == 3.0
 
 
 def test_terminate_is_written(tmp_path: Path) -> None:
