@@ -1,6 +1,7 @@
 """Random laws that jump, with every engine, against Python and small steps: none is a constant, no jump is lost."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from modelica_like.modelica_text.write import modelica_text
 
 NEAR = 2e-4
 """The reference has 3e-5 s for a jump of at most 2, a few times in a run."""
-FEW = range(24)
+FEW = [*range(24), 473]
+"""In the last one, two looks are so near that their times are equal."""
 LAWS = int(os.environ.get("RANDOM_LAWS", "100"))
 MANY = [range(first, first + 50) for first in range(24, 24 + LAWS, 50)]
 REFUSED = 0.05
@@ -25,7 +27,7 @@ def agree(run: Any, end: dict[str, float], inside: str = "") -> bool:
     return all(abs(run[inside + name][-1] - end[name]) < NEAR for name in "xy")
 
 
-def check(numbers: range) -> None:
+def check(numbers: Sequence[int]) -> None:
     cases = [(number, case) for number in numbers if (case := clear(number))]
     refused, wrong = set[int](), list[tuple[int, str]]()
     for number, (drive, end) in cases:
