@@ -1,121 +1,151 @@
 """Machine elements for drive-trains, written in the language of `modelica_like`."""
 
+import sys
 from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
 from typing import Any
 
-# Modules and their public names, each loaded on first use: a netlist needs few of them. For type checkers and
-# editors, `__init__.pyi` has the same.
+# Modules by folder and their public names, each loaded on first use: a netlist needs few of them. For type checkers
+# and editors, `__init__.pyi` has the same.
 _NAMES = {
-    "absorbers": "CentrifugalPendulum TunedAbsorber",
-    "actuators": "ElectromagneticActuator HydraulicActuator PneumaticActuator",
     "adaptors": (
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
         "PositionToForceAdaptor TemperatureToHeatFlowAdaptor TorqueToAngleAdaptor VoltageToCurrentAdaptor"
     ),
-    "asynchronous_machines": "AsynchronousMachine AsynchronousMachineDQ",
-    "batteries": "Battery",
-    "belts": "TimingBelt",
-    "bristle_friction": "LuGreFriction",
-    "choppers": "HBridge",
-    "commutated_machines": "CommutatedDCMachine",
-    "contacts": "DogClutch RigidBacklash",
-    "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
-    "converters": "RotationalEMF TranslationalEMF",
-    "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
-    "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
-    "drag_losses": "ChurningGear DeepGrooveBearing OpenPlates",
-    "drivers": "Driver",
-    "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
-    "electrical": (
+    "blocks.control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
+    "blocks.linear_blocks": "Derivative SecondOrder StateSpace TransferFunction",
+    "blocks.nonlinear_blocks": "DeadZone Hysteresis PulseCounter Quantizer SlewRateLimiter VariableLimiter",
+    "blocks.point_to_point": "KinematicPTP2",
+    "blocks.sampled": "FrequencyMeter NormalNoise UniformNoise ZeroOrderHold",
+    "blocks.signal_tables": "Table1D Table2D",
+    "blocks.signals": "CoilForce Constant Product Pulse Ramp Sine Step Table TimeFormula Trapezoid",
+    "blocks.stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
+    "blocks.waves": "CombiTable Cosine Exponentials ExpSine LogFrequencySweep SawTooth Sinc VariableSine",
+    "clutches.actuators": "ElectromagneticActuator HydraulicActuator PneumaticActuator",
+    "clutches.contacts": "DogClutch RigidBacklash",
+    "clutches.friction": "BearingFriction Brake Clutch DryFriction MultiPlateClutch",
+    "clutches.one_way": "Freewheel OneWayClutch TorqueLimiter",
+    "clutches.speed_clutches": "CentrifugalClutch ViscousClutch",
+    "clutches.synchronisers": "Synchroniser",
+    "clutches.thermal_clutches": "ThermalBrake ThermalClutch",
+    "clutches.torque_converters": "TorqueConverter",
+    "electrical.analog": (
         "Capacitor ConstantCurrent ConstantVoltage CurrentSensor CurrentSink ElectricalPowerSensor Ground Inductor "
         "Pin Resistor SignalCurrent SignalVoltage Switch VariableResistor VoltageSensor"
     ),
-    "engines": "CombustionEngine",
-    "fixed": "Disc Fixed TranslationalFixed",
-    "flexible_shafts": "FlexibleShaft StribeckBearing",
-    "friction": "BearingFriction Brake Clutch DryFriction MultiPlateClutch",
-    "gear_meshes": "GearMesh",
-    "gearboxes": "Gearbox",
-    "gears": "IdealGear",
-    "hoists": "HoldingBrake Rope WinchDrum",
-    "inertias": "Inertia Mass",
+    "electrical.batteries": "Battery",
+    "electrical.choppers": "HBridge",
+    "electrical.converters": "RotationalEMF TranslationalEMF",
+    "electrical.switching": "Contactor Diode IdealDiode IdealSwitch IdealThyristor",
+    "gears.belts": "TimingBelt",
+    "gears.gear_meshes": "GearMesh",
+    "gears.gearboxes": "Gearbox",
+    "gears.ideal_gears": "IdealGear",
+    "gears.lossy_gears": "ConstantEfficiencyGear LossyGear",
+    "gears.planetary": "Differential IdealPlanetary LossyPlanetarySet PlanetarySet",
+    "gears.shift_schedule": "ShiftSchedule",
+    "gears.transmissions": "Lepelletier Ravigneaux",
+    "gears.variable_drives": "ChainDrive VariableGear",
+    "gears.worms": "WormGear",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
-    "linear_blocks": "Derivative SecondOrder StateSpace TransferFunction",
-    "linkages": "Cam FourBar SliderCrank",
-    "loads": "SpeedDependentLoad",
-    "lossy_gears": "ConstantEfficiencyGear LossyGear",
-    "machine_loads": "CentrifugalPump Conveyor CuttingLoad DisplacementLoad FormingForce",
-    "motions": (
+    "machines.asynchronous_machines": "AsynchronousMachine AsynchronousMachineDQ",
+    "machines.commutated_machines": "CommutatedDCMachine",
+    "machines.dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
+    "machines.servos": "PositionServo ServoMotor",
+    "machines.synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
+    "mechanics.fixed": "Disc Fixed TranslationalFixed",
+    "mechanics.inertias": "Inertia Mass",
+    "mechanics.motions": (
         "InitializeFlange Move RelativeStates TranslationalInitializeFlange TranslationalMove "
         "TranslationalRelativeStates"
     ),
-    "nonlinear_blocks": "DeadZone Hysteresis PulseCounter Quantizer SlewRateLimiter VariableLimiter",
-    "one_way": "Freewheel OneWayClutch TorqueLimiter",
-    "planetary": "Differential IdealPlanetary LossyPlanetarySet PlanetarySet",
-    "point_to_point": "KinematicPTP2",
-    "sampled": "FrequencyMeter NormalNoise UniformNoise ZeroOrderHold",
-    "screw_drives": "BallScrewDrive",
-    "sensors": (
+    "mechanics.sensors": (
         "AngleSensor ForceSensor MultiSensor PositionSensor PowerSensor RelativeAngleSensor RelativeSpeedSensor "
         "SpeedLimit SpeedSensor TorqueSensor"
     ),
-    "servos": "PositionServo ServoMotor",
-    "shaft_sensors": "AccelerationSensor PulseSensor RelativeAccelerationSensor",
-    "shaft_sources": (
-        "Accelerate InverseSpeedDependentTorque LinearSpeedDependentTorque Position QuadraticSpeedDependentTorque "
-        "SignTorque Torque2"
-    ),
-    "shift_schedule": "ShiftSchedule",
-    "signal_tables": "Table1D Table2D",
-    "signals": "CoilForce Constant Product Pulse Ramp Sine Step Table TimeFormula Trapezoid",
-    "slides": "ElastoGap MassWithStopAndFriction Rod StribeckFriction SupportFriction TranslationalBrake",
-    "sources": "ConstantForce ConstantSpeed ConstantTorque Force Speed Torque TorqueStep",
-    "speed_clutches": "CentrifugalClutch ViscousClutch",
-    "spindles": "BallScrew MachineTable",
-    "springs": (
+    "mechanics.sources": "ConstantForce ConstantSpeed ConstantTorque Force Speed Torque TorqueStep",
+    "mechanics.springs": (
         "Damper ElastoBacklash ElastoBacklash2 Spring SpringDamper TranslationalDamper TranslationalSpring "
         "TranslationalSpringDamper"
     ),
-    "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
-    "switching": "Contactor Diode IdealDiode IdealSwitch IdealThyristor",
-    "synchronisers": "Synchroniser",
-    "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
+    "rotational.absorbers": "CentrifugalPendulum TunedAbsorber",
+    "rotational.bristle_friction": "LuGreFriction",
+    "rotational.couplings": (
+        "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling"
+    ),
+    "rotational.drag_losses": "ChurningGear DeepGrooveBearing OpenPlates",
+    "rotational.eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
+    "rotational.flexible_shafts": "FlexibleShaft StribeckBearing",
+    "rotational.loads": "SpeedDependentLoad",
+    "rotational.machine_loads": "CentrifugalPump Conveyor CuttingLoad DisplacementLoad FormingForce",
+    "rotational.shaft_sensors": "AccelerationSensor PulseSensor RelativeAccelerationSensor",
+    "rotational.shaft_sources": (
+        "Accelerate InverseSpeedDependentTorque LinearSpeedDependentTorque Position QuadraticSpeedDependentTorque "
+        "SignTorque Torque2"
+    ),
+    "rotational.universal_joints": "UniversalJoint",
     "thermal": (
         "FixedTemperature HeatPort HeatSource PrescribedHeatFlow PrescribedTemperature TemperatureSensor "
         "ThermalConductor ThermalMass"
     ),
-    "thermal_clutches": "ThermalBrake ThermalClutch",
-    "torque_converters": "TorqueConverter",
-    "translational_sensors": (
+    "translational.hoists": "HoldingBrake Rope WinchDrum",
+    "translational.linkages": "Cam FourBar SliderCrank",
+    "translational.screw_drives": "BallScrewDrive",
+    "translational.slides": "ElastoGap MassWithStopAndFriction Rod StribeckFriction SupportFriction TranslationalBrake",
+    "translational.spindles": "BallScrew MachineTable",
+    "translational.translational_sensors": (
         "LinearAccelerationSensor LinearMultiSensor LinearPowerSensor RelativeLinearAccelerationSensor "
         "RelativePositionSensor RelativeVelocitySensor VelocitySensor"
     ),
-    "translational_sources": (
+    "translational.translational_sources": (
         "ConstantVelocity Force2 ForceStep InverseSpeedDependentForce LinearSpeedDependentForce "
         "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition TranslationalSpeed"
     ),
-    "transmissions": "Lepelletier Ravigneaux",
-    "tyres": "AxleLoads Tyre",
-    "universal_joints": "UniversalJoint",
-    "variable_drives": "ChainDrive VariableGear",
-    "vehicles": "RoadLoad RollingResistance Vehicle",
-    "waves": "CombiTable Cosine Exponentials ExpSine LogFrequencySweep SawTooth Sinc VariableSine",
-    "wheels": "IdealGearR2T IdealRollingWheel",
-    "worms": "WormGear",
+    "translational.wheels": "IdealGearR2T IdealRollingWheel",
+    "vehicles.drivers": "Driver",
+    "vehicles.engines": "CombustionEngine",
+    "vehicles.tyres": "AxleLoads Tyre",
+    "vehicles.vehicle": "RoadLoad RollingResistance Vehicle",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
+# Modules were in one row before there were folders; netlists and programs may have those names. The three whose
+# names are folders now have their classes there, too.
+_FORMER = {
+    f"{__name__}.{module.partition('.')[2]}": f"{__name__}.{module}"
+    for module in (*_NAMES, "gears.shift_report", "machines.rotors", "mechanics.speed_laws")
+    if "." in module
+}
+_FOLDERS = {module.partition(".")[0] for module in _NAMES}
 
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll] -- the stub says what there is
+
+
+class _Former(MetaPathFinder, Loader):
+    """Finds modules by their former names; asked only for what is not found otherwise."""
+
+    def find_spec(self, name: str, path: object = None, target: ModuleType | None = None) -> ModuleSpec | None:
+        return ModuleSpec(name, self) if name in _FORMER else None
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """Take an ordinary module; the one of today replaces it."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        sys.modules[module.__name__] = import_module(_FORMER[module.__name__])
+
+
+sys.meta_path.append(_Former())
 
 
 def __getattr__(name: str) -> Any:
     if name in _HOME:
         globals()[name] = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
         return globals()[name]
-    if name in _NAMES:
+    if name in _FOLDERS or f"{__name__}.{name}" in _FORMER:
         return import_module(f"{__name__}.{name}")
     raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME, *_NAMES})
+    return sorted({*globals(), *_HOME, *_FOLDERS})

@@ -7,7 +7,7 @@ heat flow); this choice decides the states of the parts. A flow signal is positi
 from __future__ import annotations
 
 from components import icons
-from components.electrical import Pin
+from components.electrical.analog import Pin
 from components.interfaces import Flange, LinearFlange
 from components.thermal import HeatPort
 from modelica_like.language import (

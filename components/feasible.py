@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from components.sources import AT_ONCE
+from components.mechanics.sources import AT_ONCE
 from modelica_like.language import Component, Discrete, Events, Expr, Mode, discrete, negate
 
 

@@ -37,19 +37,19 @@ def library_table(types: Mapping[str, type[Component]], words: Sequence[str] = (
     Args:
         types: by name.
         words: that the name, the group or the text of a type must have, in any case of letters.
-        group: name of a module; all by default.
+        group: name of a module, or of a folder of modules; all by default.
 
     Raises:
         UnknownName: there is no such group, or no such type.
     """
-    groups = {name: kind.__module__.rpartition(".")[2] for name, kind in types.items()}
-    if group is not None and group not in groups.values():
-        known = sorted(set(groups.values()))
+    groups = {name: kind.__module__.partition(".")[2] or kind.__module__ for name, kind in types.items()}
+    known = sorted({one for path in groups.values() for one in path.split(".")})
+    if group is not None and group not in known:
         raise UnknownName(
             f"There is no group '{group}'{did_you_mean(group, known) or '.'}", advice=f"There are {', '.join(known)}."
         )
     texts = {name: f"{name} {groups[name]} {kind.__doc__}".lower() for name, kind in types.items()}
-    chosen = sorted((groups[name], name) for name, text in texts.items() if group in (None, groups[name])
+    chosen = sorted((groups[name], name) for name, text in texts.items() if group in (None, *groups[name].split("."))
                     and all(word.lower() in text for word in words))  # fmt: skip
     if words and not chosen:
         where = f" of the group {group}" if group else ""

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from fmpy.fmi3 import FMU3Slave
 
-from components.friction import BearingFriction
-from components.gearboxes import Gearbox
-from components.inertias import Inertia
-from components.shift_schedule import ShiftSchedule
-from components.signals import Table
+from components.blocks.signals import Table
+from components.clutches.friction import BearingFriction
+from components.gears.gearboxes import Gearbox
+from components.gears.shift_schedule import ShiftSchedule
+from components.mechanics.inertias import Inertia
 from modelica_like import Assembly, build, export_fmu, sensitivities, simulate
 from modelica_like.errors import ExportError, LanguageError, ModelicaLikeError, UnknownName, ValueOutOfRange
 from modelica_like.fmi.run import run_fmu

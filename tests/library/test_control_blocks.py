@@ -34,7 +34,7 @@ from components import (
     VariableLimiter,
     ZeroOrderHold,
 )
-from components.sampled import Noise
+from components.blocks.sampled import Noise
 from modelica_like import Assembly, Component, ModelicaLikeError, Solution, simulate
 from modelica_like.errors import LanguageError, LimitPassed
 

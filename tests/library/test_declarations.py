@@ -98,7 +98,7 @@ def renames() -> Iterator[str]:
 
 def test_the_page_of_changes_has_every_former_name() -> None:
     page = (Path(__file__).parents[2] / "docs" / "changes_of_names.md").read_text(encoding="utf-8")
-    table = page.partition("## Names")[2].partition("## Meanings")[0].strip().splitlines()
+    table = page.partition("## Names")[2].partition("## Modules")[0].strip().splitlines()
     assert table[2:] == [*renames()]
 
 

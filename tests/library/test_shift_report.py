@@ -5,8 +5,8 @@ from typing import cast
 import numpy as np
 import pytest
 
-from components.friction import DryFriction
-from components.shift_report import Run, _slip
+from components.clutches.friction import DryFriction
+from components.gears.shift_report import Run, _slip
 
 TIME = np.arange(10) / 10
 FORWARD, STUCK = (DryFriction.mode.names.index(name) for name in ("forward", "stuck"))

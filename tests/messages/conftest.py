@@ -18,7 +18,7 @@ def expand(request: pytest.FixtureRequest) -> Callable[[str], str]:
 
     def number(match: re.Match[str]) -> str:
         name, _, marker = match.group(1).rpartition(":")
-        lines = (LIBRARY / name if name else request.path).read_text().splitlines()
+        lines = (next(LIBRARY.rglob(name)) if name else request.path).read_text().splitlines()
         end = marker if name else f"# {marker}"
         return str(
             1 + next(k for k, line in enumerate(lines) if line.strip().endswith(end) or (name and line.strip() == end))

@@ -21,7 +21,7 @@ from components import (
     TimeFormula,
     Torque,
 )
-from components.sources import TorqueSource
+from components.mechanics.sources import TorqueSource
 from modelica_like import build, simulate, simulation_function
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.flatten import flatten
@@ -452,7 +452,7 @@ case(
     lambda: library_table({"Wheel": Turning}, group="test_component_message"),
     """\
 There is no group 'test_component_message'; did you mean 'test_component_messages'?
-There are test_component_messages.""",
+There are messages, test_component_messages.""",
 )
 case(
     errors.UnknownName,

@@ -263,9 +263,9 @@ case(
 Geared: 3 equations, 4 unknowns. a.phi, b.phi, a.flange_b.tau, gear.flange_b.tau occur only in the equations below, \
 3 for 4 unknowns.
   in inertias.py:{inertias.py:yield self.J * der(self.w) == a.tau + b.tau} `yield self.J * der(self.w) == a.tau + b.tau`
-  in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
+  in ideal_gears.py:{ideal_gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
 `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
-  in gears.py:{gears.py:yield self.ratio * a.tau + b.tau == 0} `yield self.ratio * a.tau + b.tau == 0`
+  in ideal_gears.py:{ideal_gears.py:yield self.ratio * a.tau + b.tau == 0} `yield self.ratio * a.tau + b.tau == 0`
 1 more equation is needed: connect open ends, or fix them.""",
 )
 case(
@@ -296,7 +296,7 @@ case(
     ),
     """\
 The motion is constrained twice: the constraint of twin follows from others.
-  in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
+  in ideal_gears.py:{ideal_gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
 `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
 Rigid parts form a loop, or two parts fix the same motion.
 Remove one, or put a spring or clutch between.""",
@@ -340,7 +340,7 @@ case(
     lambda: start(Geared(), a__phi=0.0, a__w=1.0, b__w=1.0),
     """\
 a.w = 1 and b.w = 1 contradict each other: b.w would be 0.5.
-  in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
+  in ideal_gears.py:{ideal_gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
 `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
 Remove one of the start values, or make one a guess.""",
 )

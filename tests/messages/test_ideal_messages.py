@@ -14,7 +14,7 @@ from components import (
     Ramp,
     Resistor,
 )
-from components.electrical import SignalVoltage, TwoPins
+from components.electrical.analog import SignalVoltage, TwoPins
 from modelica_like import Assembly, simulate
 from modelica_like.errors import LanguageError, NoValidModes
 from modelica_like.flatten import flatten

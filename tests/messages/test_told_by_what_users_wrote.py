@@ -171,8 +171,8 @@ Connect a part that is = "Ground" to it.""",
         ),
         """\
 u, v, g fix the same voltage or current more than once.
-  in electrical.py:{electrical.py:yield self.v == self.V} `yield self.v == self.V`
-  in electrical.py:{electrical.py:yield self.p.v == 0} `yield self.p.v == 0`
+  in analog.py:{analog.py:yield self.v == self.V} `yield self.v == self.V`
+  in analog.py:{analog.py:yield self.p.v == 0} `yield self.p.v == 0`
 Two parts prescribe it, or rigid parts form a loop.
 Remove one, or put a resistor between.""",
     ),
@@ -191,8 +191,8 @@ Remove one, or put a throttle between.""",
         """\
 The Jacobian is singular at t = 0 s in block 1 (fast.flange_b.tau, gear.flange_b.tau, der(slow.w), der(fast.w)).
   in inertias.py:{inertias.py:yield self.J * der(self.w) == a.tau + b.tau} `yield self.J * der(self.w) == a.tau + b.tau`
-  in gears.py:{gears.py:yield self.ratio * a.tau + b.tau == 0} `yield self.ratio * a.tau + b.tau == 0`
-  in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
+  in ideal_gears.py:{ideal_gears.py:yield self.ratio * a.tau + b.tau == 0} `yield self.ratio * a.tau + b.tau == 0`
+  in ideal_gears.py:{ideal_gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
 gear.ratio is zero, so these unknowns are undetermined.
 Give it another value.""",  # noqa: E501
     ),

@@ -1,6 +1,7 @@
 """Libraries of components: what they offer, and that only what is used is loaded."""
 
 import ast
+import importlib
 import os
 import subprocess
 import sys
@@ -39,7 +40,7 @@ def test_the_contract_of_libraries_forbids_all_but_the_language():
 
 
 def test_a_name_or_module_that_the_library_has_not_is_an_attribute_error():
-    assert components.friction.Clutch is Clutch
+    assert components.clutches.friction.Clutch is Clutch
     with pytest.raises(AttributeError, match="module 'components' has no attribute 'Cluch'"):
         assert components.Cluch  # type: ignore[attr-defined]
 
@@ -51,7 +52,33 @@ def test_a_netlist_loads_only_the_modules_of_its_parts():
         "print(*sorted(name for name in sys.modules if name.startswith('components.')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["components.icons", "components.inertias", "components.interfaces"]
+    assert done.stdout.split() == [
+        "components.icons", "components.interfaces", "components.mechanics", "components.mechanics.inertias",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(components._FORMER))  # type: ignore[attr-defined]
+def test_a_module_is_found_by_the_name_it_had_before_there_were_folders(name: str) -> None:
+    """The names of three modules are folders now, which have their classes."""
+    now = importlib.import_module(components._FORMER[name])  # type: ignore[attr-defined]
+    then = importlib.import_module(name)
+    short = name.partition(".")[2]
+    assert getattr(components, short) is then
+    if hasattr(then, "__path__"):
+        own = {one: kind for one, kind in vars(now).items() if getattr(kind, "__module__", "") == now.__name__}
+        assert own.items() <= vars(then).items()
+    else:
+        assert then is now
+    assert now.__spec__ is not None
+    assert now.__spec__.name == now.__name__ == components._FORMER[name]  # type: ignore[attr-defined]
+
+
+def test_a_netlist_may_name_classes_by_former_modules() -> None:
+    for name in ("components.friction:Clutch", "components.clutches.friction:Clutch"):
+        assert find_type(name) is Clutch
+    assert find_type("components.gears:IdealGear") is components.IdealGear
+    with pytest.raises(NetlistError, match=r"No module named 'components\.frictions'"):
+        find_type("components.frictions:Clutch")
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import components.inertias
+import components.mechanics.inertias
 from modelica_like import compare, linearize, load, sensitivities, simulate, steady, sweep
 from modelica_like.flatten import flatten
 from modelica_like.report.notebook import html

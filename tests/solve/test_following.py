@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from components import Brake, ConstantTorque, IdealGear, Inertia, Step
-from components.linkages import TwoFlanges
+from components.translational.linkages import TwoFlanges
 from modelica_like import Assembly, linearize, load, sensitivities, simulate
 from modelica_like.cosimulation.split import split
 from modelica_like.language import Component, Equations, Parameter, Variable, cos, der, guess, param, sin, var
@@ -369,7 +369,7 @@ def test_the_four_bar_linkage_turns_round(solver):
 
 
 def test_a_cut_drive_starts_like_the_whole(tmp_path):
-    head = "from components.linkages import TwoFlanges\nfrom modelica_like.language import *\n\n"
+    head = "from components.translational.linkages import TwoFlanges\nfrom modelica_like.language import *\n\n"
     (tmp_path / "loop_of_test.py").write_text(head + inspect.getsource(Loop))
     (tmp_path / "drive.toml").write_text("""
 [parts]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from components import ConstantTorque, Inertia, Lepelletier
-from components.shift_report import ShiftReport, shift_report
+from components.gears.shift_report import ShiftReport, shift_report
 from components.sizing import lepelletier_gear
 from modelica_like import Assembly, CompiledDae, Solution, build, simulate
 from modelica_like.netlist import load

@@ -1,0 +1,1 @@
+"""Signals and what computes with them: sources, controllers, linear and nonlinear blocks."""

@@ -1,0 +1,1 @@
+"""Electrical machines and servo drives."""

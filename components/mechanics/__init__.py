@@ -1,0 +1,1 @@
+"""What shafts and slides have alike: inertias and masses, springs, sources, sensors, given motions."""

@@ -1,0 +1,1 @@
+"""Shafts: couplings, absorbers, joints, losses, loads, sources and sensors."""

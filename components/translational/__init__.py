@@ -1,0 +1,1 @@
+"""Slides, and what turns rotation into translation: screws, wheels, linkages, winches."""
