@@ -11,7 +11,7 @@
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
-C := $(wildcard modelica_like/fmi/templates/*.[ch] fmus/*/*.[ch] tests/fmi/*.c tests/fmus/*/*.c)
+C := $(wildcard modelica_like/engine/*.[ch] fmus/*/*.[ch] tests/fmi/*.c tests/fmus/*/*.c)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 # Without a C compiler everything but the export of FMUs works; zig of the extra `dev` compiles for the tests.

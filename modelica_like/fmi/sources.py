@@ -15,7 +15,7 @@ from modelica_like.errors import ExportError
 Version = Literal["2.0", "3.0"]
 Face = Literal["2.0", "3.0", "native"]
 
-_TEMPLATES = Path(__file__).parent / "templates"
+_ENGINE = Path(__file__).parents[1] / "engine"
 
 RUNTIME = (
     "model.c", "tape.c", "linear.c", "start.c", "holds.c", "impacts.c", "events.c", "locate.c", "edges.c",
@@ -63,12 +63,12 @@ def own_sources(faces: Iterable[Face]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
     own = (name for face in faces for name in _FACES[face])
     names = ("core.h", "model.h", "modelica_like.h", "operations.h", "model_data.c", *RUNTIME, *own)
-    return {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
+    return {name: (_ENGINE / name).read_text(encoding="utf-8") for name in names}
 
 
 def licenses(version: Version) -> str:
     """Return the licences of the sources in an FMU: that of the generated code, and that of the standard's headers."""
-    own = (_TEMPLATES / "license.txt").read_text(encoding="utf-8")
+    own = (_ENGINE / "license.txt").read_text(encoding="utf-8")
     text = _header(_HEADERS[version][0])
     comment = text[text.index("Copyright") : text.index("*/")]
     lines = [line.strip().strip("-") for line in comment.splitlines()]

@@ -58,7 +58,7 @@ def at_the_stop():
 
 
 def test_the_structure_of_a_run_is_that_of_c():
-    text = (Path(sources.__file__).parent / "templates" / "native.c").read_text()
+    text = (sources._ENGINE / "native.c").read_text()
     body = re.sub(r"/\*.*?\*/", "", re.search(r"typedef struct \{([^}]*)\} NativeRun;", text)[1], flags=re.S)
     found = []
     for kind, names in re.findall(r"(const uint32_t|double|int64_t) ([^;]*);", body):
