@@ -12,7 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from modelica_like import build, load, simulate
-from modelica_like.solve.conserve import find_astray
+from modelica_like.runs.conserve import find_astray
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 DRIVES = [

@@ -1,11 +1,9 @@
 """Machine elements for drive-trains, written in the language of `modelica_like`."""
 
-import sys
 from importlib import import_module
-from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec
-from types import ModuleType
 from typing import Any
+
+from modelica_like.former import moved
 
 # Modules by folder and their public names, each loaded on first use: a netlist needs few of them. For type checkers
 # and editors, `__init__.pyi` has the same.
@@ -110,8 +108,8 @@ _NAMES = {
     "vehicles.vehicle": "RoadLoad RollingResistance Vehicle",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
-# Modules were in one row before there were folders; netlists and programs may have those names. The three whose
-# names are folders now have their classes there, too.
+# Modules were in one row before there were folders; netlists and programs may have those names. Three of them are names
+# of folders now, which have the classes, too.
 _FORMER = {
     f"{__name__}.{module.partition('.')[2]}": f"{__name__}.{module}"
     for module in (*_NAMES, "gears.shift_report", "machines.rotors", "mechanics.speed_laws")
@@ -121,21 +119,7 @@ _FOLDERS = {module.partition(".")[0] for module in _NAMES}
 
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll] -- the stub says what there is
 
-
-class _Former(MetaPathFinder, Loader):
-    """Finds modules by their former names; asked only for what is not found otherwise."""
-
-    def find_spec(self, name: str, path: object = None, target: ModuleType | None = None) -> ModuleSpec | None:
-        return ModuleSpec(name, self) if name in _FORMER else None
-
-    def create_module(self, spec: ModuleSpec) -> None:
-        """Take an ordinary module; the one of today replaces it."""
-
-    def exec_module(self, module: ModuleType) -> None:
-        sys.modules[module.__name__] = import_module(_FORMER[module.__name__])
-
-
-sys.meta_path.append(_Former())
+moved(_FORMER)
 
 
 def __getattr__(name: str) -> Any:

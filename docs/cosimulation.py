@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from modelica_like import Solution, cosim, simulate, split
-from modelica_like.solve.plot import save_plot
-from modelica_like.solve.style import COLOURS, STYLE
+from modelica_like.show.plot import save_plot
+from modelica_like.style import COLOURS, STYLE
 
 HERE = Path(__file__).parent
 NETLIST = HERE.parent / "examples" / "machine_tool_startup.toml"

@@ -16,11 +16,11 @@ from modelica_like.cli.shared import Page
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NetlistError
 from modelica_like.netlist import load
-from modelica_like.report.run import closure_line, energy_table, events_table, statistics_line
-from modelica_like.report.tables import Shown, table
+from modelica_like.runs.solution import Solution
+from modelica_like.show.plot import plot, save_plot
+from modelica_like.show.report.run import closure_line, energy_table, events_table, statistics_line
+from modelica_like.show.report.tables import Shown, table
 from modelica_like.simulation import build, simulate
-from modelica_like.solve.plot import plot, save_plot
-from modelica_like.solve.solution import Solution
 
 EXAMPLES = Path(__file__).parent
 

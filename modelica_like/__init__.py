@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from modelica_like.upper import provide
+from modelica_like.former import moved
 
 if TYPE_CHECKING:
     from modelica_like.analyse.after.orders import order_map as order_map
@@ -29,53 +29,53 @@ if TYPE_CHECKING:
     from modelica_like.analyse.sweeps.pictures import plot_sweep as plot_sweep
     from modelica_like.analyse.sweeps.sweep import sweep as sweep
     from modelica_like.compile.compiled import CompiledDae as CompiledDae
-    from modelica_like.cosimulation.run import cosim as cosim
-    from modelica_like.cosimulation.split import split as split
-    from modelica_like.draw import save_schematic as save_schematic
-    from modelica_like.draw import schematic as schematic
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
-    from modelica_like.explorer import explore as explore
+    from modelica_like.fmi.cosimulation.run import cosim as cosim
+    from modelica_like.fmi.cosimulation.split import split as split
     from modelica_like.fmi.export import export_fmu as export_fmu
     from modelica_like.fmi.run import run_fmu as run_fmu
     from modelica_like.fmi.validate import validate_fmu as validate_fmu
     from modelica_like.language import Assembly as Assembly
     from modelica_like.language import Component as Component
     from modelica_like.native.handle import Native as Native
-    from modelica_like.native.page import export_html as export_html
     from modelica_like.netlist import load as load
-    from modelica_like.report.compare import compare as compare
-    from modelica_like.report.overlay import overlay as overlay
-    from modelica_like.report.page import save_report as save_report
-    from modelica_like.report.progress import Bar as Bar
+    from modelica_like.options import Options as Options
+    from modelica_like.runs.solution import Solution as Solution
+    from modelica_like.runs.trajectories import Trajectories as Trajectories
+    from modelica_like.show.browser.page import export_html as export_html
+    from modelica_like.show.draw import save_schematic as save_schematic
+    from modelica_like.show.draw import schematic as schematic
+    from modelica_like.show.explorer import explore as explore
+    from modelica_like.show.report.compare import compare as compare
+    from modelica_like.show.report.overlay import overlay as overlay
+    from modelica_like.show.report.page import save_report as save_report
+    from modelica_like.show.report.progress import Bar as Bar
     from modelica_like.simulation import build as build
     from modelica_like.simulation import simulate as simulate
-    from modelica_like.solve.options import Options as Options
-    from modelica_like.solve.solution import Solution as Solution
-    from modelica_like.solve.trajectories import Trajectories as Trajectories
 
 __version__ = "0.1.0"
 
 _HOME = {
     "Assembly": "modelica_like.language",
-    "Bar": "modelica_like.report.progress",
+    "Bar": "modelica_like.show.report.progress",
     "CompiledDae": "modelica_like.compile.compiled",
     "Component": "modelica_like.language",
     "ModelicaLikeError": "modelica_like.errors",
     "Native": "modelica_like.native.handle",
-    "Options": "modelica_like.solve.options",
-    "Solution": "modelica_like.solve.solution",
-    "Trajectories": "modelica_like.solve.trajectories",
+    "Options": "modelica_like.options",
+    "Solution": "modelica_like.runs.solution",
+    "Trajectories": "modelica_like.runs.trajectories",
     "WoehlerLine": "modelica_like.analyse.after.spectra",
     "build": "modelica_like.simulation",
     "calibrate": "modelica_like.analyse.calibration.calibrate",
     "campbell": "modelica_like.analyse.linear.campbell",
     "characteristic": "modelica_like.analyse.operating.curves",
-    "compare": "modelica_like.report.compare",
-    "cosim": "modelica_like.cosimulation.run",
+    "compare": "modelica_like.show.report.compare",
+    "cosim": "modelica_like.fmi.cosimulation.run",
     "duty": "modelica_like.analyse.after.spectra",
-    "explore": "modelica_like.explorer",
+    "explore": "modelica_like.show.explorer",
     "export_fmu": "modelica_like.fmi.export",
-    "export_html": "modelica_like.native.page",
+    "export_html": "modelica_like.show.browser.page",
     "importance": "modelica_like.analyse.sweeps.importance",
     "linearize": "modelica_like.analyse.linear.linearize",
     "load": "modelica_like.netlist",
@@ -83,16 +83,16 @@ _HOME = {
     "open_loop": "modelica_like.analyse.linear.loop",
     "order_map": "modelica_like.analyse.after.orders",
     "order_response": "modelica_like.analyse.after.orders",
-    "overlay": "modelica_like.report.overlay",
+    "overlay": "modelica_like.show.report.overlay",
     "plot_sweep": "modelica_like.analyse.sweeps.pictures",
     "run_fmu": "modelica_like.fmi.run",
-    "save_report": "modelica_like.report.page",
-    "save_schematic": "modelica_like.draw",
-    "schematic": "modelica_like.draw",
+    "save_report": "modelica_like.show.report.page",
+    "save_schematic": "modelica_like.show.draw",
+    "schematic": "modelica_like.show.draw",
     "sensitivities": "modelica_like.analyse.sensitivity.derivatives",
     "simulate": "modelica_like.simulation",
     "simulation_function": "modelica_like.analyse.sensitivity.function",
-    "split": "modelica_like.cosimulation.split",
+    "split": "modelica_like.fmi.cosimulation.split",
     "steady": "modelica_like.analyse.operating.steady",
     "step_metrics": "modelica_like.analyse.after.steps",
     "sweep": "modelica_like.analyse.sweeps.sweep",
@@ -109,16 +109,18 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module 'modelica_like' has no attribute '{name}'")
 
 
-_OFFERED = {name: _HOME[name] for name in ("Native", "schematic", "simulation_function")}
-_OFFERED |= {
-    "NativeLoop": "modelica_like.native.run",
-    "html": "modelica_like.report.notebook",
-    "icon": "modelica_like.draw",
-    "load_modelica": "modelica_like.modelica_text.read",
-    "mathematics": "modelica_like.report.mathematics",
-    "plot": "modelica_like.solve.plot",
-    "read_after": "modelica_like.runs.results",
-    "sankey": "modelica_like.solve.sankey",
-    "size": "modelica_like.sizing.run",
-}
-provide(tuple(_OFFERED), lambda name: getattr(import_module(_OFFERED[name]), name))
+# Documented names of modules from before there were fewer folders.
+moved(
+    {
+        f"{__name__}.{former}": f"{__name__}.{now}"
+        for former, now in {
+            "cosimulation": "fmi.cosimulation",
+            "explorer": "show.explorer",
+            "report": "show.report",
+            "sizing": "analyse.sizing",
+            "solve.plot": "show.plot",
+            "solve.solution": "runs.solution",
+            "units": "language.units",
+        }.items()
+    }
+)

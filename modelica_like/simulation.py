@@ -12,10 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from modelica_like import upper
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.sliding import as_asked
-from modelica_like.driven import driven
 from modelica_like.errors import (
     ExportError,
     InitializationError,
@@ -29,19 +29,19 @@ from modelica_like.errors import (
     did_you_mean,
 )
 from modelica_like.flatten import flatten
-from modelica_like.initialize import StartKind, initialize
-from modelica_like.initialize.ideal import refuse_contradiction
 from modelica_like.language import Component
 from modelica_like.language.tunable import with_tunable_tables
+from modelica_like.language.units import parse_unit, to_si
+from modelica_like.options import OnChattering, Options
 from modelica_like.runs.collect import collector
-from modelica_like.solve.conserve import conserving
+from modelica_like.runs.conserve import conserving
+from modelica_like.runs.driven import driven
+from modelica_like.runs.solution import Solution
+from modelica_like.runs.trajectories import Statistics, Trajectories, needs_equations
 from modelica_like.solve.events import EventLoop, Progress
-from modelica_like.solve.options import OnChattering, Options
-from modelica_like.solve.solution import Solution
-from modelica_like.solve.trajectories import Statistics, Trajectories, needs_equations
+from modelica_like.solve.initialize import StartKind, initialize
+from modelica_like.solve.initialize.ideal import refuse_contradiction
 from modelica_like.structure import reduce
-from modelica_like.units import parse_unit, to_si
-from modelica_like.upper import upper
 
 _SECOND = parse_unit("s")
 _SHORTEST = 1e-12
@@ -245,7 +245,7 @@ def _loop(solver: str) -> Any:
     if solver == "idas":
         return EventLoop
     if solver == "native":
-        return upper("NativeLoop")
+        return upper.NativeLoop
     raise UnknownName(
         f"There is no solver '{solver}'{did_you_mean(solver, get_args(Solver)) or '.'}",
         advice="There are idas (the reference) and native (the compiled run-time of FMUs).",

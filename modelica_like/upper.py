@@ -1,25 +1,49 @@
-"""Functions of upper layers for lower ones, registered here by the top-level package."""
+"""Functions of upper layers for methods of lower ones, such as `run.plot()`: loaded when they are called.
+
+Only this module may name what stands above it (`ignore_imports` in pyproject.toml), and type checkers see all of it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-_makers: dict[str, Callable[[str], Any]] = {}
+if TYPE_CHECKING:
+    from modelica_like.analyse.sensitivity.function import simulation_function as simulation_function
+    from modelica_like.native.handle import Native as Native
+    from modelica_like.native.run import NativeLoop as NativeLoop
+    from modelica_like.show.draw import icon as icon
+    from modelica_like.show.draw import schematic as schematic
+    from modelica_like.show.plot import plot as plot
+    from modelica_like.show.plot import save_plot as save_plot
+    from modelica_like.show.report.mathematics import mathematics as mathematics
+    from modelica_like.show.report.notebook import html as html
+    from modelica_like.show.report.sizing import sizing_report as sizing_report
+    from modelica_like.show.sankey import sankey as sankey
+
+_HOME = {
+    "Native": "native.handle",
+    "NativeLoop": "native.run",
+    "html": "show.report.notebook",
+    "icon": "show.draw",
+    "mathematics": "show.report.mathematics",
+    "plot": "show.plot",
+    "sankey": "show.sankey",
+    "save_plot": "show.plot",
+    "schematic": "show.draw",
+    "simulation_function": "analyse.sensitivity.function",
+    "sizing_report": "show.report.sizing",
+}
 
 
-def provide(names: tuple[str, ...], load: Callable[[str], Any]) -> None:
-    """Register loaders of upper layers' functions by name, for first use."""
-    _makers.update(dict.fromkeys(names, load))
-
-
-def upper(name: str) -> Any:
-    """Return a function of an upper layer."""
-    return _makers[name](name)
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(import_module(f"modelica_like.{_HOME[name]}"), name)
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
 
 
 class Shown:
     """A result that a notebook shows as its tables."""
 
     def _repr_html_(self) -> str:
-        return upper("html")(self)
+        return __getattr__("html")(self)

@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from modelica_like import load, save_report, sensitivities, simulate
-from modelica_like.explorer import Explorer
-from modelica_like.solve.plot import save_plot
+from modelica_like.show.explorer import Explorer
+from modelica_like.show.plot import save_plot
 
 HERE = Path(__file__).parent
 

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from components.sizing import DcMotor, commutated, dc_motor_point
 from modelica_like import load, simulate
-from modelica_like.sizing import size
-from modelica_like.solve.style import COLOURS, picture
+from modelica_like.analyse.sizing import size
+from modelica_like.style import COLOURS, picture
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TURNING = {"speed": "rpm"}

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 from modelica_like import schematic
 from modelica_like.language import Component
-from modelica_like.solve.plot import picture_bytes
+from modelica_like.show.plot import picture_bytes
 from modelica_like.writing import write_text
 
 HERE = Path(__file__).resolve().parent

@@ -18,7 +18,7 @@ from links import broken
 
 from modelica_like import load, schematic
 from modelica_like.errors import NetlistError
-from modelica_like.report.component_pages.library import write_component_pages
+from modelica_like.show.report.component_pages.library import write_component_pages
 
 HERE = Path(__file__).resolve().parent
 DOCS = HERE.parent

@@ -34,9 +34,9 @@ def modes(
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.linear.linearize import linearize, when
         from modelica_like.analyse.linear.loop import open_loop
-        from modelica_like.draw import check_format, save_schematic
-        from modelica_like.report.analysis import modes_report
-        from modelica_like.solve.plot import save_plot
+        from modelica_like.show.draw import check_format, save_schematic
+        from modelica_like.show.plot import save_plot
+        from modelica_like.show.report.analysis import modes_report
 
         if draw:
             check_format(draw)
@@ -81,9 +81,9 @@ def steady(
         from modelica_like.analyse.operating.curves import characteristic
         from modelica_like.analyse.operating.steady import steady as find
         from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
-        from modelica_like.report.analysis import curves_report, point_report
+        from modelica_like.show.plot import save_plot
+        from modelica_like.show.report.analysis import curves_report, point_report
         from modelica_like.simulation import simulate
-        from modelica_like.solve.plot import save_plot
 
         near = simulate(assembly, after) if after else None
         if over is None:
@@ -116,9 +116,9 @@ def sweep(
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.sweeps.ranges import read_range
         from modelica_like.analyse.sweeps.sweep import sweep as run
-        from modelica_like.report.analysis import sweep_report
-        from modelica_like.report.files import write_dataset
-        from modelica_like.report.progress import Bar
+        from modelica_like.show.report.analysis import sweep_report
+        from modelica_like.show.report.files import write_dataset
+        from modelica_like.show.report.progress import Bar
 
         with Bar(title="runs") as bar:
             found = run(
@@ -130,7 +130,7 @@ def sweep(
             write_dataset(found, output)
         if plot:
             from modelica_like.analyse.sweeps.pictures import plot_sweep
-            from modelica_like.solve.plot import save_plot
+            from modelica_like.show.plot import save_plot
 
             save_plot(plot_sweep(found), plot)
 
@@ -148,8 +148,8 @@ def sensitivity(
     with told(debug, json=json, pictures=[tornado]) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.sensitivity.derivatives import sensitivities
-        from modelica_like.report.analysis import sensitivity_report
-        from modelica_like.solve.plot import save_plot
+        from modelica_like.show.plot import save_plot
+        from modelica_like.show.report.analysis import sensitivity_report
 
         result = sensitivities(assembly, of, to or (), until=until, start=start)
         page.print(sensitivity_report(result))

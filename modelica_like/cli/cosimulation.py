@@ -50,8 +50,8 @@ def split(
         assembly = load_netlist(netlist, assignments)
         from rich.console import Console
 
-        from modelica_like.cosimulation.split import split as run
-        from modelica_like.cosimulation.split import split_to_ssp
+        from modelica_like.fmi.cosimulation.split import split as run
+        from modelica_like.fmi.cosimulation.split import split_to_ssp
 
         with Console(stderr=True).status("loading") as status:
             if output.suffix.lower() == ".ssp":
@@ -85,14 +85,14 @@ def cosim(
     """Run a system of FMUs together: mode changes, energies at the couplings, results as table and picture."""
     with told(debug, json=json, tables=[csv], pictures=[plot]) as page:
         from modelica_like.cli.outcome import Outcome
-        from modelica_like.cosimulation.files import opened
-        from modelica_like.cosimulation.run import cosim as run
-        from modelica_like.cosimulation.solution import described_model
-        from modelica_like.report.progress import Bar
-        from modelica_like.report.run import cosimulation_report
+        from modelica_like.fmi.cosimulation.files import opened
+        from modelica_like.fmi.cosimulation.run import cosim as run
+        from modelica_like.fmi.cosimulation.solution import described_model
+        from modelica_like.runs.signals import read_signals
+        from modelica_like.show.plot import plot as draw
+        from modelica_like.show.report.progress import Bar
+        from modelica_like.show.report.run import cosimulation_report
         from modelica_like.simulation import seconds
-        from modelica_like.solve.plot import plot as draw
-        from modelica_like.solve.signals import read_signals
 
         values = _numbers(assignments or ())
         with opened(system) as known, Bar(until or known.settings.until) as bar:

@@ -71,7 +71,7 @@ def export(
 
 
 def _page(assembly: Any, file: Path, show: Sequence[str], report: Callable[[str], None]) -> None:
-    from modelica_like.native.page import export_html
+    from modelica_like.show.browser.page import export_html
 
     say(str(export_html(assembly, file, show=show, report=report)))
 
@@ -88,7 +88,7 @@ def runtimes(
 
         from modelica_like.fmi.build import RUNTIMES, chosen_platforms
         from modelica_like.fmi.runtime import found_runtime, runtime_library
-        from modelica_like.report.tables import table
+        from modelica_like.show.report.tables import table
 
         with Console(stderr=True).status("loading") as status:
             for name in chosen_platforms(platforms or (), RUNTIMES):

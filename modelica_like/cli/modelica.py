@@ -24,8 +24,8 @@ def from_modelica(
     """Write a model of Modelica text as a netlist."""
     made = output or text.parent / f"{text.stem or 'model'}.toml"
     with told(debug, files=[made]):
-        from modelica_like.modelica_text.netlist_form import netlist_text
-        from modelica_like.modelica_text.read import read_modelica
+        from modelica_like.netlist.modelica.netlist_form import netlist_text
+        from modelica_like.netlist.modelica.read import read_modelica
 
         model, notes = read_modelica(text, name)
         write_text(made, netlist_text(model, made.parent, notes))
@@ -43,7 +43,7 @@ def to_modelica(
     """Write a netlist as Modelica text on classes of the Modelica Standard Library."""
     made = output or netlist.parent / f"{netlist.stem or 'model'}.mo"
     with told(debug, files=[made]):
-        from modelica_like.modelica_text.write import modelica_text
+        from modelica_like.netlist.modelica.write import modelica_text
 
         write_text(made, modelica_text(load_netlist(netlist, assignments)))
         say(str(made))

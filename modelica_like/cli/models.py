@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from modelica_like.solve.trajectories import Trajectories
+    from modelica_like.runs.trajectories import Trajectories
 
 Start = Annotated[
     Literal["given", "rest", "steady"] | None,
@@ -59,9 +59,9 @@ def check(
     """
     with told(debug, json=json) as page:
         assembly = load_netlist(netlist, assignments)
-        from modelica_like.report.plausible import drive_notes
-        from modelica_like.report.start import start_notes, start_report
-        from modelica_like.report.structure import structure_report
+        from modelica_like.show.report.plausible import drive_notes
+        from modelica_like.show.report.start import start_notes, start_report
+        from modelica_like.show.report.structure import structure_report
         from modelica_like.simulation import build
 
         structure, model = structure_report(assembly), build(assembly)
@@ -98,14 +98,14 @@ def simulate(
         # Errors in the file are reported before the solver is loaded.
         assembly = load_netlist(netlist, assignments)
         from modelica_like.cli.outcome import Outcome
-        from modelica_like.driven import driven
-        from modelica_like.report.plausible import notes
-        from modelica_like.report.progress import Bar
-        from modelica_like.report.run import run_report
+        from modelica_like.runs.display import Display
+        from modelica_like.runs.driven import driven
+        from modelica_like.runs.signals import read_signals
+        from modelica_like.show.report.plausible import notes
+        from modelica_like.show.report.progress import Bar
+        from modelica_like.show.report.run import run_report
         from modelica_like.simulation import build
         from modelica_like.simulation import simulate as run
-        from modelica_like.solve.display import Display
-        from modelica_like.solve.signals import read_signals
 
         variants, files = _beside(compare or (), plot)
         if inputs is not None:
@@ -147,10 +147,10 @@ def _drawn(
 ) -> Figure:  # fmt: skip
     """Draw a run alone, or with runs for other parameter values and files beside it."""
     if not (variants or files):
-        from modelica_like.solve.plot import plot
+        from modelica_like.show.plot import plot
 
         return plot(run, show, display=display)
-    from modelica_like.report.overlay import overlay
+    from modelica_like.show.report.overlay import overlay
 
     pairs = ((path, value) for path, values in variants for value in values)
     family = {f"{path} = {value}": again(parameters={path: value}) for path, value in pairs}

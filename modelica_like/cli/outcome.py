@@ -12,7 +12,7 @@ from modelica_like.errors import ModelicaLikeError, SolveError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from modelica_like.solve.trajectories import Trajectories
+    from modelica_like.runs.trajectories import Trajectories
 
 Picture = tuple[Path | None, "Callable[[Trajectories], Figure]"]
 
@@ -63,7 +63,7 @@ class Outcome:
             OSError: a file could not be written; the others were.
         """
         if table:
-            from modelica_like.report.files import write_solution
+            from modelica_like.show.report.files import write_solution
 
             options: Any = {"units": units, "display": display, "show": show}
             self.attempt("The table", lambda: write_solution(self.solution, table, **options), table)
@@ -79,7 +79,7 @@ class Outcome:
             raise self._unwritten
 
     def _draw(self, file: Path, draw: Callable[[Trajectories], Figure]) -> None:
-        from modelica_like.solve.plot import save_plot
+        from modelica_like.show.plot import save_plot
 
         save_plot(draw(self.solution), file)
 

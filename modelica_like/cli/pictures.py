@@ -21,7 +21,7 @@ def draw(
 ) -> None:  # fmt: skip
     """Draw the schematic of a netlist: power from left to right."""
     with told(debug):
-        from modelica_like.draw import check_format, save_schematic
+        from modelica_like.show.draw import check_format, save_schematic
         from modelica_like.simulation import seconds, simulate
 
         path = output or Path(f"{netlist.stem}.svg")
@@ -42,13 +42,13 @@ def report(
     """Simulate a netlist and write a page about it: schematic, events, curves, energies, numbers."""
     path = output or Path(f"{source.stem}.html")
     with told(debug, files=[path]):
-        from modelica_like.cosimulation.files import describes_system
+        from modelica_like.fmi.cosimulation.files import describes_system
         from modelica_like.netlist.read import is_modelica
-        from modelica_like.report.page import save_report
-        from modelica_like.report.progress import Bar
-        from modelica_like.report.sources import trajectories
+        from modelica_like.runs.signals import read_signals
+        from modelica_like.show.report.page import save_report
+        from modelica_like.show.report.progress import Bar
+        from modelica_like.show.report.sources import trajectories
         from modelica_like.simulation import build, seconds, simulate
-        from modelica_like.solve.signals import read_signals
 
         if not is_modelica(source) and (source.suffix.lower() != ".toml" or describes_system(source)):
             if assignments:
@@ -75,7 +75,7 @@ def explore(
     """Open a page with sliders and curves that runs the drive on this machine."""
     with told(debug):
         drive = load_netlist(netlist, assignments)
-        from modelica_like.explorer import Explorer
+        from modelica_like.show.explorer import Explorer
 
         with Explorer(drive, until, show=show or (), folder=output) as explorer:
             say(f"{explorer.address}\nCtrl-C ends it.")

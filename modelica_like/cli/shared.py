@@ -66,7 +66,7 @@ class Page:
         if self._parts:
             from json import dumps
 
-            from modelica_like.report.tables import as_data
+            from modelica_like.show.report.tables import as_data
 
             text = dumps(as_data(*self._parts), indent=1, ensure_ascii=False, allow_nan=False)
             (sys.stderr if self._stderr else sys.stdout).write(f"{text}\n")
@@ -123,11 +123,11 @@ def _check(tables: Iterable[Path], pictures: Iterable[Path], files: Iterable[Pat
     for file in files:
         check_writable(file)
     for file in tables:
-        from modelica_like.report.files import check_table
+        from modelica_like.show.report.files import check_table
 
         check_table(file)
     for file in pictures:
-        from modelica_like.solve.plot import check_picture
+        from modelica_like.show.plot import check_picture
 
         check_picture(file)
 

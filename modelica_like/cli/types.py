@@ -29,8 +29,8 @@ def describe(
     with told(debug, json=json) as page:
         from modelica_like.netlist import find_type, load
         from modelica_like.netlist.read import is_modelica
-        from modelica_like.report.types import describe as described
-        from modelica_like.report.types import describe_netlist
+        from modelica_like.show.report.types import describe as described
+        from modelica_like.show.report.types import describe_netlist
 
         is_netlist = kind.endswith(".toml") or is_modelica(kind)
         page.print(describe_netlist(load(kind)) if is_netlist else described(find_type(kind)))
@@ -46,7 +46,7 @@ def library(
     """List the component types of the installed libraries: all, those of a group, or those with some words."""
     with told(debug, json=json) as page:
         from modelica_like.netlist import library_types
-        from modelica_like.report.types import library_table
+        from modelica_like.show.report.types import library_table
 
         page.print(library_table(library_types(), words or (), group))
 
@@ -85,7 +85,7 @@ def docs(
 ) -> None:  # fmt: skip
     """Write pages about component types in Markdown: all types and an index, or the named ones."""
     with told(debug, files=[output / "README.md"]):
-        from modelica_like.report.component_pages.library import write_component_pages
+        from modelica_like.show.report.component_pages.library import write_component_pages
 
         pages = write_component_pages(output, examples, types)
         say(f"{len(pages)} page{'s' if len(pages) > 1 else ''} in {output}")

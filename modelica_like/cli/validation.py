@@ -34,8 +34,8 @@ def size(
 ) -> None:  # fmt: skip
     """Run the design checks of a sizing file; exit code 1 if a limit is exceeded."""
     with told(debug, json=json) as page:
-        from modelica_like.sizing.report import checks_report, sizing_report
-        from modelica_like.sizing.run import size as run
+        from modelica_like.analyse.sizing.run import size as run
+        from modelica_like.show.report.sizing import checks_report, sizing_report
 
         if not file or not Path(file).suffix:
             page.print(checks_report(file))
@@ -71,7 +71,7 @@ def validate(
     """
     with told(debug, json=json) as page:
         from modelica_like.fmi.validate import validate_fmu
-        from modelica_like.report.validation import validation_table
+        from modelica_like.show.report.validation import validation_table
         from modelica_like.simulation import seconds
 
         validation = validate_fmu(fmu, timeout=seconds(timeout, "timeout"))
@@ -99,7 +99,7 @@ def compare(
     or those chosen.
     """
     with told(debug, json=json, pictures=[plot]) as page:
-        from modelica_like.report.compare import compare as run
+        from modelica_like.show.report.compare import compare as run
         from modelica_like.simulation import seconds
 
         end = None if until is None else seconds(until)
@@ -108,6 +108,6 @@ def compare(
         )
         page.print(comparison)
         if plot:
-            from modelica_like.solve.plot import save_plot
+            from modelica_like.show.plot import save_plot
 
             save_plot(comparison.plot(*(signals or ())), plot)

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import casadi as ca
 
+from modelica_like import upper
 from modelica_like.compile.buffers import Along, BufferedFunction
 from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.compile.edges import Edges, find_edges
@@ -17,12 +18,11 @@ from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.errors import LanguageError, ModelicaLikeError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.flatten.template import TransitionForm
+from modelica_like.language.units import Unit, to_si
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.structure.holds import HeldMotion as HeldMotion
 from modelica_like.structure.ideal import IdealNetwork as IdealNetwork
 from modelica_like.structure.motion import Motion
-from modelica_like.units import Unit, to_si
-from modelica_like.upper import upper
 
 Made = TypeVar("Made")
 TERMINAL, HOMOTOPY = "terminal()", "homotopy()"
@@ -367,7 +367,7 @@ class CompiledDae:
             outputs: numbers read off the run.
             run: further arguments of `modelica_like.simulation_function`.
         """
-        return upper("simulation_function")(self, inputs, outputs, **run)
+        return upper.simulation_function(self, inputs, outputs, **run)
 
     def native(self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), **how: Any) -> Any:
         """Return a handle for control loops: an instance that steps at the speed of C.
@@ -377,7 +377,7 @@ class CompiledDae:
             outputs: variables and modes that its steps read.
             how: further arguments of `modelica_like.Native`.
         """
-        return upper("Native")(self, inputs, outputs, **how)
+        return upper.Native(self, inputs, outputs, **how)
 
     def __getstate__(self) -> dict[str, Any]:
         if self._make_energy is not None:

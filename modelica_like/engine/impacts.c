@@ -1,5 +1,6 @@
-/* Impacts, as in initialize/holds.py: motions that modes begin to hold are stopped by an impulse. Behind them ideal
- * elements, as in initialize/ideal.py: equations that replace dependent ones, impulses, conditions on states. */
+/* Impacts, as in solve/initialize/holds.py: motions that modes begin to hold are stopped by an impulse. Behind them
+ * ideal elements, as in solve/initialize/ideal.py: equations that replace dependent ones, impulses, conditions on
+ * states. */
 #include "core.h"
 
 #define INSTANT 1e-9 /* duration of an impact; finite forces cancel whatever it is */

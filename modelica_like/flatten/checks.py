@@ -16,7 +16,7 @@ from modelica_like.language.discrete import Pre
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, symbols_in
 from modelica_like.language.fields import Field, Input, Parameter, Variable
-from modelica_like.units import ANY, ONE, Unit, parse_unit
+from modelica_like.language.units import ANY, ONE, Unit, parse_unit
 
 _SECOND = parse_unit("s")
 _PAIR = 2

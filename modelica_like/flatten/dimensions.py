@@ -12,7 +12,7 @@ import casadi as ca
 
 from modelica_like.errors import LanguageError, Source, UnitMismatch
 from modelica_like.language.expr import Expr, operands
-from modelica_like.units import ANY, ONE, Unit, same_dimension
+from modelica_like.language.units import ANY, ONE, Unit, same_dimension
 
 UnitOf = Callable[[Any], Unit]
 """Gives the unit of a leaf (a symbolic `casadi.SX`)."""

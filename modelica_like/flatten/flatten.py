@@ -37,7 +37,7 @@ from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.discrete import HOMOTOPY, INITIAL, TERMINAL
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
-from modelica_like.units import ONE, coherent
+from modelica_like.language.units import ONE, coherent
 
 _WIRE = Source("")
 

@@ -7,12 +7,12 @@ from typing import Any, Literal
 
 import casadi as ca
 
+from modelica_like import upper
 from modelica_like.errors import Source
 from modelica_like.flatten.template import Template
 from modelica_like.language.component import Component
 from modelica_like.language.fields import StatePreference, in_range
-from modelica_like.units import Unit
-from modelica_like.upper import upper
+from modelica_like.language.units import Unit
 
 INITIAL_EQUATION = "the initial equation"
 """Begins the description of what is left of an initial equation, which is zero at the start."""
@@ -212,7 +212,7 @@ class FlatModel:
         return f"<{self}>"
 
     def _repr_markdown_(self) -> str:
-        return upper("mathematics")(self)
+        return upper.mathematics(self)
 
     def __str__(self) -> str:
         unknowns = len(self.variables) - len(self.inputs)

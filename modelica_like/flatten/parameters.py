@@ -17,7 +17,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id
 from modelica_like.language.fields import Input, Parameter, Value
-from modelica_like.units import Unit, coherent, read_quantity
+from modelica_like.language.units import Unit, coherent, read_quantity
 
 
 class Parameters:

@@ -28,7 +28,7 @@ from modelica_like.language.mode import StartMode, Transition
 from modelica_like.language.places import NOWHERE, located
 from modelica_like.language.transition import as_event
 from modelica_like.language.tunable import symbols_in_tables
-from modelica_like.units import ANY, Unit
+from modelica_like.language.units import ANY, Unit
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.equation import Connection, FreeEnd
 from modelica_like.language.expr import Symbol
 from modelica_like.language.fields import Input, Output
-from modelica_like.units import Unit, same_dimension
+from modelica_like.language.units import Unit, same_dimension
 
 End = tuple[int, bool]
 """A connector (its id) seen from inside or from outside (True) its component."""

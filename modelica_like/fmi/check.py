@@ -15,10 +15,10 @@ from fmpy.model_description import ValidationError
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import FmuFailed, SolveError
 from modelica_like.fmi.run import run_fmu
+from modelica_like.options import Options
+from modelica_like.runs.curves import Curves, compare_solutions
+from modelica_like.runs.solution import Solution
 from modelica_like.simulation import seconds, simulate
-from modelica_like.solve.curves import Curves, compare_solutions
-from modelica_like.solve.options import Options
-from modelica_like.solve.solution import Solution
 
 _PART = 0.1
 _POINTS = 50

@@ -11,7 +11,7 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.fmi.dependencies import Dependencies
 from modelica_like.fmi.interface import FmuVariable, Interface
 from modelica_like.fmi.xml import Element, document, element, unit_name
-from modelica_like.units import parse_unit
+from modelica_like.language.units import parse_unit
 
 Version = Literal["2.0", "3.0"]
 Kind = Literal["me", "cs"]

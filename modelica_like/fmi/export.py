@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import get_args
 
+from modelica_like import upper
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.sliding import as_asked
@@ -30,11 +31,9 @@ from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, icon_name, terminals_and_icons, with_open_ends
 from modelica_like.language import Component
 from modelica_like.language.tunable import with_tunable_tables
+from modelica_like.options import Options
 from modelica_like.simulation import Model, positive_step, seconds, without_garbage_search
-from modelica_like.solve.options import Options
-from modelica_like.solve.plot import save_plot
 from modelica_like.structure import reduce
-from modelica_like.upper import upper
 from modelica_like.writing import replacing
 
 _PICTURES = Path(__file__).parent / "pictures"
@@ -196,7 +195,7 @@ def _pictures(drive: CompiledDae | Component) -> tuple[bytes, bytes]:
     general = [(_PICTURES / f"icon.{suffix}").read_bytes() for suffix in ("svg", "png")]
     if isinstance(drive, CompiledDae) or len(drive.parts) > _LEGIBLE:
         return general[0], general[1]
-    svg, png = upper("icon")(drive if drive.parts else with_open_ends(drive))
+    svg, png = upper.icon(drive if drive.parts else with_open_ends(drive))
     return svg.encode(), png or general[1]
 
 
@@ -301,5 +300,5 @@ def _written(
     if not check.differs or check.curves is None:
         return check
     picture = target.with_name(f"{target.stem}_check.png")
-    save_plot(check.curves.plot(), picture)
+    upper.save_plot(check.curves.plot(), picture)
     return replace(check, picture=picture)

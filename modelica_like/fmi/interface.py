@@ -16,7 +16,7 @@ from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
 from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
-from modelica_like.units import ONE, Unit, parse_unit
+from modelica_like.language.units import ONE, Unit, parse_unit
 
 Causality = Literal["independent", "parameter", "calculatedParameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]

@@ -13,8 +13,8 @@ import numpy as np
 from modelica_like.errors import FmuFailed, ValueOutOfRange
 from modelica_like.fmi.failures import tell_error
 from modelica_like.fmi.process import run_child, workplace
+from modelica_like.runs.recorded import RecordedModel, RecordedSolution, RecordedVariable
 from modelica_like.runs.results import settled
-from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
 from modelica_like.solve.recorder import TERMINATED, Ended
 
 Kind = Literal["me", "cs"]

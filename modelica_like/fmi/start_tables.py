@@ -11,10 +11,10 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.initialize import HOMOTOPY, Point, call, initialize, settled_guess, share, start_plan
-from modelica_like.initialize.plan import is_near, start_name
-from modelica_like.initialize.start import StartProblem
-from modelica_like.initialize.steady import moving_states
+from modelica_like.solve.initialize import HOMOTOPY, Point, call, initialize, settled_guess, share, start_plan
+from modelica_like.solve.initialize.plan import is_near, start_name
+from modelica_like.solve.initialize.start import StartProblem
+from modelica_like.solve.initialize.steady import moving_states
 
 AT_REST = -1
 

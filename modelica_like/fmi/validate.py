@@ -21,9 +21,9 @@ from modelica_like.fmi.failures import tell_error
 from modelica_like.fmi.process import run_child, workplace
 from modelica_like.fmi.run import TIMEOUT, Kind, Solver, run_fmu
 from modelica_like.fmi.unpack import unpack
-from modelica_like.solve.ranges import ranges
-from modelica_like.solve.recorded import RecordedSolution
-from modelica_like.solve.trajectories import Values
+from modelica_like.runs.ranges import ranges
+from modelica_like.runs.recorded import RecordedSolution
+from modelica_like.runs.trajectories import Values
 
 PASSED, FAILED, ABSENT = "passed", "failed", "–"
 _STEPS = 500

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from functools import cache
 
-from modelica_like.units import ANY, ONE, Unit
+from modelica_like.language.units import ANY, ONE, Unit
 
 INLINE = ("ScalarVariable", "Float64", "Unit")
 """Elements that are written on one line with their content."""

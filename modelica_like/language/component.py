@@ -8,6 +8,7 @@ from itertools import chain
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
+from modelica_like import upper
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
 from modelica_like.language.declared import Connector, Declared, annotated, refuse_collection, unknown
 from modelica_like.language.equation import Equations
@@ -19,7 +20,6 @@ from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
 from modelica_like.language.terminal import Terminal
 from modelica_like.language.transition import Events
-from modelica_like.upper import upper
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(param, rows))
@@ -317,7 +317,7 @@ class Component(Declared):
 
     def _repr_html_(self) -> str:
         """Return the schematic and the given parameters, for notebooks."""
-        return upper("html")(self)
+        return upper.html(self)
 
     def _end(self, which: str) -> Connector:
         names = getattr(type(self), which).split()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, overload
 from modelica_like.errors import LanguageError, UnitError, ValueOutOfRange
 from modelica_like.language.expr import Expr, symbol_of
 from modelica_like.language.formula import Arithmetic, Formula, as_formula, parse_formula
-from modelica_like.units import ANY, Unit, coherent, parse_unit, read_quantity, to_si
+from modelica_like.language.units import ANY, Unit, coherent, parse_unit, read_quantity, to_si
 
 _CALCULATES = re.compile(r"\s[-+*/]\s")
 """A number continues as a formula instead of a unit."""

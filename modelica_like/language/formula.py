@@ -14,7 +14,7 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import NetlistError, UnitError, did_you_mean
-from modelica_like.units import ONE, Unit, coherent, parse_unit, plain_digits, read_quantity, same_dimension
+from modelica_like.language.units import ONE, Unit, coherent, parse_unit, plain_digits, read_quantity, same_dimension
 
 _MAX_LENGTH = 2000
 _MAX_DEPTH = 150

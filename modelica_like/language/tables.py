@@ -12,7 +12,7 @@ from modelica_like.errors import ModelicaLikeError, NetlistError, ValueOutOfRang
 from modelica_like.language.expr import Expr
 from modelica_like.language.fields import Field
 from modelica_like.language.places import caller
-from modelica_like.units import ANY, Unit, parse_unit, to_si
+from modelica_like.language.units import ANY, Unit, parse_unit, to_si
 
 REQUIRED = object()
 """Default of a required structural field."""

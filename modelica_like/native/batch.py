@@ -10,10 +10,10 @@ from typing import Any, Literal
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.initialize import StartKind
 from modelica_like.native.library import BatchArguments
 from modelica_like.native.model import NativeModel
-from modelica_like.solve.options import Options
+from modelica_like.options import Options
+from modelica_like.solve.initialize import StartKind
 
 Kind = Literal["end", "at", "max", "integral", "first", "change", "impact"]
 _KINDS: tuple[Kind, ...] = ("end", "at", "max", "integral", "first", "change", "impact")

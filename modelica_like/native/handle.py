@@ -12,11 +12,11 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ValueOutOfRange
-from modelica_like.initialize import StartKind
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.model import Instance
+from modelica_like.options import Options
 from modelica_like.simulation import positive_step
-from modelica_like.solve.options import Options
+from modelica_like.solve.initialize import StartKind
 
 
 class Native:

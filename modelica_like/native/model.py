@@ -29,9 +29,9 @@ from modelica_like.errors import (
 from modelica_like.fmi.interface import FmuVariable, interface
 from modelica_like.fmi.model_file import model_file
 from modelica_like.fmi.tables import make_tables
-from modelica_like.initialize import Point, StartKind
 from modelica_like.native.library import MESSAGE_LENGTH, OK, library
-from modelica_like.solve.options import Options
+from modelica_like.options import Options
+from modelica_like.solve.initialize import Point, StartKind
 
 _ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
     ("The integrator gave up|The step from", StepFailed),

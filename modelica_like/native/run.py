@@ -10,14 +10,14 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import Chattering
-from modelica_like.initialize import Impact, Point
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.model import Instance
+from modelica_like.options import Options
 from modelica_like.solve.dense import Dense
 from modelica_like.solve.events import Progress
 from modelica_like.solve.idas import Integrator
+from modelica_like.solve.initialize import Impact, Point
 from modelica_like.solve.instants import chattering, note_rest, note_sharing
-from modelica_like.solve.options import Options
 from modelica_like.solve.penetration import LET_IT_REST
 from modelica_like.solve.recorder import Recorder, Segment
 

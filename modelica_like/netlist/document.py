@@ -19,8 +19,8 @@ from modelica_like.errors import (
     did_you_mean,
     raise_together_or_one,
 )
+from modelica_like.language.units import parse_unit, to_si
 from modelica_like.netlist.locate import Lines, locate
-from modelica_like.units import parse_unit, to_si
 
 _ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000

@@ -10,11 +10,11 @@ from modelica_like.language import Component, Input, Parameter, Variable
 from modelica_like.language.fields import Discrete, Field
 from modelica_like.language.places import texts_of_fields
 from modelica_like.language.tables import REQUIRED, Column, Rows
+from modelica_like.language.units import ANY, parse_unit
 from modelica_like.netlist.document import OnChattering, StartKind
 from modelica_like.netlist.json_units import Quantities
 from modelica_like.netlist.read import FMU_PART
 from modelica_like.netlist.registry import library_types
-from modelica_like.units import ANY, parse_unit
 
 _QUANTITY = {"type": ["number", "string"]}
 _TIME = {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"$ref": "#/definitions/quantity_in_s"}]}

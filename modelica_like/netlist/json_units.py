@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any
 
-from modelica_like.units import ANY, Unit, coherent, parse_unit, same_dimension
-from modelica_like.units.atoms import ATOMS, Exponent
-from modelica_like.units.quantity import counts_turns
+from modelica_like.language.units import ANY, Unit, coherent, parse_unit, same_dimension
+from modelica_like.language.units.atoms import ATOMS, Exponent
+from modelica_like.language.units.quantity import counts_turns
 
 _NUMBER = r"^\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*"
 _UNKNOWN = "not_a_quantity_in_a_known_unit"

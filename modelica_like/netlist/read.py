@@ -22,7 +22,6 @@ from modelica_like.language.fields import Discrete
 from modelica_like.netlist.document import Document, check_part, parse, read_text
 from modelica_like.netlist.registry import find_type
 from modelica_like.trust import trusting
-from modelica_like.upper import upper
 
 _MAX_PARTS, _MAX_PARAMETERS, _MAX_DEPTH = 200_000, 10_000, 50
 """Of a netlist with all that it uses; of one file; of netlists in netlists."""
@@ -45,9 +44,15 @@ def load(path: str | Path, *, trust: bool = False) -> Assembly:
         ModelicaLikeError: types, values or paths in it are wrong; several errors come as `WiringErrors`.
     """
     if is_modelica(path):
-        return upper("load_modelica")(path)
+        return _modelica(path)
     with trusting() if trust else nullcontext():
         return _Loader().load(Path(path), ())
+
+
+def _modelica(path: str | Path) -> Assembly:
+    from modelica_like.netlist.modelica.read import load_modelica  # it makes components, and most netlists have no text
+
+    return load_modelica(path)
 
 
 def loads(text: str, file: str = "netlist.toml", *, trust: bool = False) -> Assembly:
@@ -189,7 +194,7 @@ class _Task:
         if kind == FMU_PART:
             raise _among_equations(name)
         if is_modelica(kind):
-            part = self._copied(upper("load_modelica")(folder / kind), number)
+            part = self._copied(_modelica(folder / kind), number)
         elif kind.endswith(".toml"):
             part = self._copied(self.loader.load(folder / kind, self.chain), number)
         else:

@@ -11,11 +11,11 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import MissingValue, ValueOutOfRange
 from modelica_like.runs.polynomials import SAME, Curves
 from modelica_like.runs.readings import Output, Part, is_series, read_output
+from modelica_like.runs.recorded import RecordedSolution
+from modelica_like.runs.solution import Solution
+from modelica_like.runs.trajectories import Trajectories
 from modelica_like.solve.dense import Dense
-from modelica_like.solve.recorded import RecordedSolution
 from modelica_like.solve.recorder import Recorder, Segment
-from modelica_like.solve.solution import Solution
-from modelica_like.solve.trajectories import Trajectories
 
 _SAME_END = 1e-6
 """Of a run: events are located within its tolerances, so a moment so near to its end is its end."""

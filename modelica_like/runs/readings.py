@@ -13,9 +13,9 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.language.units import ONE, Unit, parse_unit, to_si
+from modelica_like.runs.signals import formula_of, si_value, unit_of
 from modelica_like.solve.recorder import Event
-from modelica_like.solve.signals import formula_of, si_value, unit_of
-from modelica_like.units import ONE, Unit, parse_unit, to_si
 
 _CALL = re.compile(r"\s*(max|min|peak|integral|mean|rms|at|first|duration|series|time)\s*\((.*)\)\s*$")
 _CONDITION = re.compile(r"(.+?)(<=?|>=?)(.+)")

@@ -13,15 +13,15 @@ import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import MissingValue, UnitError
+from modelica_like.language.units import ONE, Unit, parse_unit
 from modelica_like.runs.collect import Collector, Number, collector, dense_of
 from modelica_like.runs.polynomials import Curves, Fitted
 from modelica_like.runs.readings import expression_of, read_output
+from modelica_like.runs.recorded import RecordedModel, RecordedSolution
+from modelica_like.runs.solution import Solution
+from modelica_like.runs.trajectories import ENERGY_TERMS, Trajectories
 from modelica_like.solve.dense import Dense
-from modelica_like.solve.recorded import RecordedModel, RecordedSolution
 from modelica_like.solve.recorder import Segment
-from modelica_like.solve.solution import Solution
-from modelica_like.solve.trajectories import ENERGY_TERMS, Trajectories
-from modelica_like.units import ONE, Unit, parse_unit
 
 _WIDE, _NARROW, _STRAIGHT = 6, 4, 2
 """Results that a polynomial goes through: the best, the one that it is compared with, and a straight line."""

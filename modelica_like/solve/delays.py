@@ -8,12 +8,12 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ValueOutOfRange
-from modelica_like.initialize import Point, call, solve_implicit
 from modelica_like.language.delay import TERMS
+from modelica_like.options import Options
 from modelica_like.solve.between import Between
+from modelica_like.solve.initialize import Point, call, solve_implicit
 from modelica_like.solve.instants import just_after
 from modelica_like.solve.looks import Looks
-from modelica_like.solve.options import Options
 
 _NODES = -np.cos(np.pi * (np.arange(TERMS) + 0.5) / TERMS)
 _SERIES = np.cos(np.outer(np.arange(TERMS), np.arccos(_NODES))) * 2 / TERMS

@@ -11,15 +11,15 @@ import numpy as np
 from modelica_like.compile.compiled import TERMINAL, CompiledDae, CompiledTransition, Vector
 from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import StepFailed
-from modelica_like.initialize import Point
+from modelica_like.options import Options
 from modelica_like.solve.between import Between, Piece
 from modelica_like.solve.delays import Delays
 from modelica_like.solve.dense import Dense, OfLooks, Stretch
 from modelica_like.solve.guards import Candidate, Ends, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
+from modelica_like.solve.initialize import Point
 from modelica_like.solve.instants import Instants, just_after, note_rest, note_sharing
 from modelica_like.solve.looks import Cell, Looks
-from modelica_like.solve.options import Options
 from modelica_like.solve.pace import Pace, foreseen
 from modelica_like.solve.passing import Passing
 from modelica_like.solve.recorder import Recorder

@@ -13,7 +13,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.flatten.conditions import JUST_TRUE
-from modelica_like.initialize import Point, is_linear, newton_at
+from modelica_like.solve.initialize import Point, is_linear, newton_at
 
 _LOCATED = 1e-13
 _NOISE = 1e-30

@@ -14,9 +14,9 @@ import numpy as np
 from modelica_like.compile.buffers import BufferedFunction
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
-from modelica_like.initialize import Point, call, is_linear, newton_at
+from modelica_like.options import Options
+from modelica_like.solve.initialize import Point, call, is_linear, newton_at
 from modelica_like.solve.interrupts import Interrupts
-from modelica_like.solve.options import Options
 
 _FLAGS = {
     "IDA_TOO_MUCH_WORK": "it took too many steps",
@@ -291,7 +291,7 @@ class Integrator:
 
     def _algebraic(self, start: Point, span: float, outputs: int) -> tuple[Vector, Vector]:
         """Without states: solve the implicit equations at each output."""
-        from modelica_like.initialize import solve_implicit
+        from modelica_like.solve.initialize import solve_implicit
 
         columns: list[Vector] = []
         point = start.copy()

@@ -10,7 +10,10 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.errors import Chattering, LimitPassed
-from modelica_like.initialize import (
+from modelica_like.language.transition import NAME_IN_NOTICE
+from modelica_like.options import OnChattering, Options
+from modelica_like.solve.guards import Guards
+from modelica_like.solve.initialize import (
     Point,
     Strike,
     call,
@@ -24,9 +27,6 @@ from modelica_like.initialize import (
     solve_implicit,
     variable_slopes,
 )
-from modelica_like.language.transition import NAME_IN_NOTICE
-from modelica_like.solve.guards import Guards
-from modelica_like.solve.options import OnChattering, Options
 from modelica_like.solve.penetration import check_turned_back
 from modelica_like.solve.recorder import IMPACT, Event, Recorder
 

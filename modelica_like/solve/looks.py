@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.initialize import Point
 from modelica_like.solve.guards import Ends, Guards
 from modelica_like.solve.idas import POLISHED, Integrator
+from modelica_like.solve.initialize import Point
 
 PRECISE = 1.0
 """Difference of two degrees, in tolerances, below which a polynomial counts as the solution."""

@@ -8,8 +8,8 @@ from bisect import bisect_left
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
+from modelica_like.options import Options
 from modelica_like.solve.instants import SAME_TIME, just_after
-from modelica_like.solve.options import Options
 
 _SIZES = tuple(2**k for k in range(3, 12))
 """Looks of one call: few different numbers, because each needs an instance of IDAS."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import Chattering
-from modelica_like.initialize import Point, call
+from modelica_like.solve.initialize import Point, call
 
 _LATER = 1e3
 """Time for the difference of a rate, in time resolutions; what turns round in less time is at rest."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import Source
-from modelica_like.initialize import Impact, Point
 from modelica_like.solve.dense import Keeper
+from modelica_like.solve.initialize import Impact, Point
 
 TERMINATED = "has terminated it"
 """The reason where an FMU ends a run: it cannot say more."""

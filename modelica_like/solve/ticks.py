@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
-from modelica_like.initialize import Point
+from modelica_like.solve.initialize import Point
 from modelica_like.solve.instants import Instants
 from modelica_like.solve.looks import Looks
 

@@ -24,9 +24,9 @@ import numpy as np
 
 from modelica_like.flatten.generic import spread
 from modelica_like.flatten.model import FlatDiscrete, Origin
+from modelica_like.language.units import ONE
 from modelica_like.structure.alias import PREFERENCES
 from modelica_like.structure.system import Level, System
-from modelica_like.units import ONE
 
 _LEAST = 0.25
 _SAMPLES = 200

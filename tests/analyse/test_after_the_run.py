@@ -35,7 +35,7 @@ from modelica_like import (
     simulate,
     step_metrics,
 )
-from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+from modelica_like.runs.recorded import RecordedModel, RecordedSolution, RecordedVariable
 
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-11}
 

@@ -21,8 +21,8 @@ from components import (
 from modelica_like import build, simulate
 from modelica_like.analyse.linear.campbell import campbell
 from modelica_like.analyse.linear.linearize import linearize
-from modelica_like.initialize import variable_slopes
 from modelica_like.language import Component, Equations, connect, series
+from modelica_like.solve.initialize import variable_slopes
 
 STARTUP = Path(__file__).parents[2] / "examples" / "machine_tool_startup.toml"
 

@@ -178,7 +178,7 @@ def test_a_constant_torque_on_threads_with_inputs_and_limits_of_formulas():
 def test_the_report_tells_what_idas_had_to_do(capsys):
     from rich.console import Console
 
-    from modelica_like.report.analysis import sweep_report
+    from modelica_like.show.report.analysis import sweep_report
 
     found = sweep(build(braked()), {"mass.J": [2.0, 0.0]}, ["mass.w"], until=1.0)
     Console(width=200).print(sweep_report(found))

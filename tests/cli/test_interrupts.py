@@ -12,8 +12,8 @@ import pytest
 
 from modelica_like.analyse.calibration.calibrate import Numbers, calibrate
 from modelica_like.analyse.sweeps.sweep import sweep
-from modelica_like.cosimulation.run import cosim
-from modelica_like.cosimulation.split import split
+from modelica_like.fmi.cosimulation.run import cosim
+from modelica_like.fmi.cosimulation.split import split
 from modelica_like.fmi.export import export_fmu
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals to oneself")
@@ -22,7 +22,7 @@ DRIVE = Path(__file__).parents[2] / "examples" / "two_mass.toml"
 # A command in whose progress Ctrl-C is pressed once.
 PRESSED = """
 import os, signal, sys
-from modelica_like.report import progress
+from modelica_like.show.report import progress
 pressed, moment = [], float(sys.argv.pop(1))
 def press(self, reached, *of):
     if reached >= moment and not pressed:
@@ -142,7 +142,7 @@ def test_a_failed_simulation_keeps_what_there_is(tmp_path: Path) -> None:
 
 BROKEN = """
 import sys
-from modelica_like.solve.solution import Solution
+from modelica_like.runs.solution import Solution
 from modelica_like.errors import SolveError
 def energy(self):
     raise {error}
@@ -247,7 +247,7 @@ def test_an_interrupted_calibration_is_no_failed_start() -> None:
 # Kills its own process when workers have done something, and says so before.
 KILLED = """
 import os, sys
-from modelica_like.report import progress
+from modelica_like.show.report import progress
 def kill(self, reached, *of):
     print("at work", flush=True)
     os.kill(os.getpid(), number)

@@ -9,7 +9,7 @@ from rich.console import Group
 from typer.testing import CliRunner
 
 from modelica_like import cli, simulate
-from modelica_like.report.tables import Shown, as_data, table
+from modelica_like.show.report.tables import Shown, as_data, table
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRIVE = str(EXAMPLES / "machine_tool_startup.toml")

@@ -10,6 +10,7 @@ import jsonschema
 import pytest
 from typer.testing import CliRunner
 
+from modelica_like.analyse.sizing.json_schema import schema as sizing_schema
 from modelica_like.cli import app
 from modelica_like.errors import UnitError
 from modelica_like.language import (
@@ -26,12 +27,11 @@ from modelica_like.language import (
     var,
     when,
 )
+from modelica_like.language.units import parse_unit, to_si
 from modelica_like.netlist import library_types, load, schema
 from modelica_like.netlist.json_units import Quantities
-from modelica_like.report.component_pages.source import Source
-from modelica_like.report.statements import statements
-from modelica_like.sizing.json_schema import schema as sizing_schema
-from modelica_like.units import parse_unit, to_si
+from modelica_like.show.report.component_pages.source import Source
+from modelica_like.show.report.statements import statements
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like.cosimulation.split import Split, split
+from modelica_like.fmi.cosimulation.split import Split, split
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

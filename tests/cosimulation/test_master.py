@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from modelica_like.cosimulation.master import Balance, Master, Signal
-from modelica_like.cosimulation.slaves import Refused
+from modelica_like.fmi.cosimulation.master import Balance, Master, Signal
+from modelica_like.fmi.cosimulation.slaves import Refused
 
 
 @dataclass

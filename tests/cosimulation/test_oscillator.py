@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from modelica_like import Trajectories
-from modelica_like.cosimulation.run import cosim
-from modelica_like.cosimulation.split import Split, split
-from modelica_like.cosimulation.system import System
 from modelica_like.errors import FmuCrashed, FmuFailed, FmuTimeout, StepFailed
+from modelica_like.fmi.cosimulation.run import cosim
+from modelica_like.fmi.cosimulation.split import Split, split
+from modelica_like.fmi.cosimulation.system import System
 
 M, J1, J2, C, D = 5.0, 0.02, 0.08, 400.0, 0.2
 MASTERS = pytest.mark.parametrize("master", ["jacobi", "gauss-seidel"])

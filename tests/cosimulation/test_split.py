@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modelica_like import load, simulate
-from modelica_like.cosimulation.cut import cut_netlist, part_of
-from modelica_like.cosimulation.files import load_system, write_system
-from modelica_like.cosimulation.run import cosim
-from modelica_like.cosimulation.split import Split, split
-from modelica_like.cosimulation.system import Bond, Link, Port, find_bonds
+from modelica_like.fmi.cosimulation.cut import cut_netlist, part_of
+from modelica_like.fmi.cosimulation.files import load_system, write_system
+from modelica_like.fmi.cosimulation.run import cosim
+from modelica_like.fmi.cosimulation.split import Split, split
+from modelica_like.fmi.cosimulation.system import Bond, Link, Port, find_bonds
 from modelica_like.language import Component, Terminal
 from modelica_like.netlist import loads, registry
-from modelica_like.report.compare import compare
+from modelica_like.show.report.compare import compare
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

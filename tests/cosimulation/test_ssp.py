@@ -16,12 +16,12 @@ from fmpy.ssp.ssd import read_ssd
 from typer.testing import CliRunner
 
 from modelica_like.cli import app
-from modelica_like.cosimulation.described import DescribedFmu, FmuVariable, UnitDefinition
-from modelica_like.cosimulation.run import cosim
-from modelica_like.cosimulation.split import Split
-from modelica_like.cosimulation.ssp import load_ssp, write_ssp
-from modelica_like.cosimulation.ssp_document import NAMES, ssd
-from modelica_like.cosimulation.system import Link, Port, Settings, System, Unit
+from modelica_like.fmi.cosimulation.described import DescribedFmu, FmuVariable, UnitDefinition
+from modelica_like.fmi.cosimulation.run import cosim
+from modelica_like.fmi.cosimulation.split import Split
+from modelica_like.fmi.cosimulation.ssp import load_ssp, write_ssp
+from modelica_like.fmi.cosimulation.ssp_document import NAMES, ssd
+from modelica_like.fmi.cosimulation.system import Link, Port, Settings, System, Unit
 
 M, J1, J2, C, D = 5.0, 0.02, 0.08, 400.0, 0.2
 NETLIST = Path(__file__).parents[2] / "examples" / "two_mass.toml"

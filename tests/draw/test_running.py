@@ -8,11 +8,11 @@ from typer.testing import CliRunner
 
 from modelica_like import load, schematic, simulate
 from modelica_like.cli import app
-from modelica_like.draw import layout
-from modelica_like.draw.labels import meet
-from modelica_like.draw.running import energy_notes, running, spelled
-from modelica_like.draw.sheet import Line, Placed, texts
 from modelica_like.errors import ValueOutOfRange
+from modelica_like.show.draw import layout
+from modelica_like.show.draw.labels import meet
+from modelica_like.show.draw.running import energy_notes, running, spelled
+from modelica_like.show.draw.sheet import Line, Placed, texts
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

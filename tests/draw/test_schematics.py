@@ -7,11 +7,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from modelica_like.draw import layout, save_schematic, schematic
-from modelica_like.draw.sheet import Line, Placed, Sheet, texts
 from modelica_like.errors import MissingExtra, NetlistError
 from modelica_like.language import Component
 from modelica_like.netlist import load, loads
+from modelica_like.show.draw import layout, save_schematic, schematic
+from modelica_like.show.draw.sheet import Line, Placed, Sheet, texts
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLISTS = sorted(
@@ -208,7 +208,7 @@ def test_a_drive_is_its_schematic_in_a_notebook() -> None:
 def test_what_cannot_be_written_is_told_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(NetlistError, match=r"a schematic can be pdf, png, svg"):
         save_schematic(drive("fan.toml"), tmp_path / "fan.bmp")
-    monkeypatch.setattr("modelica_like.draw.find_spec", lambda name: None)
+    monkeypatch.setattr("modelica_like.show.draw.find_spec", lambda name: None)
     with pytest.raises(MissingExtra, match="resvg_py is not installed"):
         save_schematic(drive("fan.toml"), tmp_path / "fan.png")
     assert not list(tmp_path.iterdir())

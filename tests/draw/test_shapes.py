@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 from components import BallScrew, IdealGear, Inertia, Mass, Spring
 from modelica_like import linearize, schematic
 from modelica_like.cli import app
-from modelica_like.draw import layout
-from modelica_like.draw.shapes import Shape, shapes
 from modelica_like.language import Assembly
+from modelica_like.show.draw import layout
+from modelica_like.show.draw.shapes import Shape, shapes
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

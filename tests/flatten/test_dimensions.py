@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from modelica_like.errors import LanguageError, Source, UnitMismatch
 from modelica_like.flatten.dimensions import Dimensions, check_equation, check_expression
-from modelica_like.units import ANY, ONE, Unit, parse_unit
+from modelica_like.language.units import ANY, ONE, Unit, parse_unit
 
 Exponents = tuple[Fraction, ...]
 UNITS = {"1": (0, 0, 0), "m": (1, 0, 0), "s": (0, 0, 1), "m/s": (1, 0, -1), "kg.m2": (2, 1, 0), "rad": (0, 0, 0)}

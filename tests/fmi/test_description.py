@@ -18,8 +18,8 @@ from modelica_like.fmi.dependencies import Dependencies, solved_rows
 from modelica_like.fmi.description import About, identifier, model_description
 from modelica_like.fmi.interface import Interface, fmi_name, interface
 from modelica_like.fmi.sources import LOG_CATEGORIES
-from modelica_like.initialize import call, initialize
 from modelica_like.language import Assembly
+from modelica_like.solve.initialize import call, initialize
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLISTS = sorted(

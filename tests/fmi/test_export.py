@@ -279,7 +279,7 @@ def test_what_cannot_be_drawn_has_the_general_icon(tmp_path: Path, monkeypatch: 
     general = (Path(export.__file__).parent / "pictures/icon.png").read_bytes()
     export_fmu(build(drive), tmp_path / "compiled.fmu", platforms=())
     assert member(tmp_path / "compiled.fmu", "model.png") == general
-    monkeypatch.setattr("modelica_like.draw.find_spec", lambda _: None)
+    monkeypatch.setattr("modelica_like.show.draw.find_spec", lambda _: None)
     export_fmu(drive, tmp_path / "no_extra.fmu", platforms=())
     assert member(tmp_path / "no_extra.fmu", "model.png") == general
 

@@ -8,7 +8,7 @@ import pytest
 from fmpy import simulate_fmu
 
 from modelica_like import export_fmu, simulate
-from modelica_like.initialize import initialize
+from modelica_like.solve.initialize import initialize
 
 DRIVES = [
     "msl/rotational/CoupledClutches.toml",
@@ -158,7 +158,7 @@ def exact_jacobian(case, fmu, known, unknown):
 
 
 def values_at(case, fmu):
-    from modelica_like.initialize import Point, share, solve_implicit
+    from modelica_like.solve.initialize import Point, share, solve_implicit
 
     model = case.model
     x = vector(fmu.fmi2GetContinuousStates, fmu, len(model.states))

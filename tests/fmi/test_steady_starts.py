@@ -23,9 +23,9 @@ from components import (
     Torque,
 )
 from modelica_like import simulate
-from modelica_like.initialize import initialize
 from modelica_like.language import Assembly, guess
 from modelica_like.netlist import load
+from modelica_like.solve.initialize import initialize
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

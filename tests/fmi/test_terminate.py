@@ -11,9 +11,9 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2Discard, fmi2LastSuccessfulTime, fmi2Terminated
 
 from modelica_like import Assembly, cosim, export_fmu, run_fmu
-from modelica_like.cosimulation.system import System, Unit
+from modelica_like.fmi.cosimulation.system import System, Unit
 from modelica_like.language import Component, Equations, Events, Parameter, Variable, der, param, terminate, var, when
-from modelica_like.solve.recorded import RecordedSolution
+from modelica_like.runs.recorded import RecordedSolution
 
 END = sqrt(2 / 3)
 SECOND_VERSION = "2.0"

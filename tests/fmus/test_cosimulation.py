@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from modelica_like.cosimulation.run import cosim
-from modelica_like.cosimulation.system import Link, Port, System, Unit
 from modelica_like.errors import FmuCrashed, FmuFailed, FmuTimeout, ModelicaLikeError
+from modelica_like.fmi.cosimulation.run import cosim
+from modelica_like.fmi.cosimulation.system import Link, Port, System, Unit
 from modelica_like.fmi.export import export_fmu
 from modelica_like.netlist import loads
 

@@ -10,8 +10,8 @@ import pytest
 from components import Clutch, Fixed, Inertia, SpringDamper
 from modelica_like import Assembly, cosim, export_fmu, run_fmu
 from modelica_like.errors import MissingValue
-from modelica_like.report.sources import trajectories
 from modelica_like.runs.results import SETTLED
+from modelica_like.show.report.sources import trajectories
 
 AMPLITUDE, OMEGA, END = 0.3, 20.0, 1.7
 LARGEST = 2e3 * AMPLITUDE

@@ -15,7 +15,7 @@ import pytest
 
 from modelica_like import Solution, simulate
 from modelica_like.fmi.run import run_fmu
-from modelica_like.report.compare import compare
+from modelica_like.show.report.compare import compare
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 WITHIN = 1e-6

@@ -11,7 +11,7 @@ from modelica_like.errors import MissingValue, UnknownName, ValueOutOfRange
 from modelica_like.fmi.export import export_fmu
 from modelica_like.fmi.run import run_fmu
 from modelica_like.netlist import loads
-from modelica_like.solve.trajectories import Trajectories
+from modelica_like.runs.trajectories import Trajectories
 
 Built = Mapping[tuple[str, str], Path]
 VERSIONS = pytest.mark.parametrize("version", ["2.0", "3.0"])

@@ -22,16 +22,16 @@ import lxml.etree as etree
 from inputs import PIECES, STRANGE, document, mutated_text, mutated_tree
 from rich.console import Console
 
-from modelica_like.cosimulation.described import described
-from modelica_like.cosimulation.files import load_system
-from modelica_like.cosimulation.run import cosim
-from modelica_like.cosimulation.split import split
-from modelica_like.cosimulation.ssp import write_ssp
+from modelica_like.analyse.sizing import size
 from modelica_like.errors import ModelicaLikeError
+from modelica_like.fmi.cosimulation.described import described
+from modelica_like.fmi.cosimulation.files import load_system
+from modelica_like.fmi.cosimulation.run import cosim
+from modelica_like.fmi.cosimulation.split import split
+from modelica_like.fmi.cosimulation.ssp import write_ssp
 from modelica_like.fmi.run import run_fmu
-from modelica_like.sizing import size
-from modelica_like.sizing.report import sizing_report
-from modelica_like.solve.measured import read_csv
+from modelica_like.runs.measured import read_csv
+from modelica_like.show.report.sizing import sizing_report
 
 Case = tuple[str, Callable[[], object]]
 EXAMPLES = Path(__file__).parents[2] / "examples"

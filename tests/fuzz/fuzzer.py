@@ -34,9 +34,9 @@ from modelica_like.cli import TASKS, __getattr__, _ran, command
 from modelica_like.cli.declare import WrongUse
 from modelica_like.cli.quick import _Parameter
 from modelica_like.errors import ModelicaLikeError
+from modelica_like.language.units import parse_unit, read_quantity, to_si
 from modelica_like.netlist import library_types, loads
 from modelica_like.netlist.write import dumps
-from modelica_like.units import parse_unit, read_quantity, to_si
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SECONDS = 5

@@ -12,10 +12,10 @@ from files import folder
 
 from modelica_like import build, simulate
 from modelica_like.errors import ModelicaLikeError
-from modelica_like.modelica_text.netlist_form import netlist_text
-from modelica_like.modelica_text.read import read_modelica
-from modelica_like.modelica_text.write import modelica_text
 from modelica_like.netlist import load
+from modelica_like.netlist.modelica.netlist_form import netlist_text
+from modelica_like.netlist.modelica.read import read_modelica
+from modelica_like.netlist.modelica.write import modelica_text
 
 HERE = Path(__file__).parent
 SHARED = Path(__file__).parents[4] / "shared"

@@ -11,15 +11,15 @@ from fuzzer import attempt
 
 from components import Inertia
 from modelica_like import simulate
+from modelica_like.analyse.sizing import size
 from modelica_like.analyse.sweeps.ranges import read_range
-from modelica_like.cosimulation.described import described
-from modelica_like.cosimulation.files import load_system
-from modelica_like.cosimulation.ssp import write_ssp
-from modelica_like.cosimulation.system import System, Unit
 from modelica_like.errors import FmuRefused, ModelicaLikeError
+from modelica_like.fmi.cosimulation.described import described
+from modelica_like.fmi.cosimulation.files import load_system
+from modelica_like.fmi.cosimulation.ssp import write_ssp
+from modelica_like.fmi.cosimulation.system import System, Unit
 from modelica_like.netlist import loads
 from modelica_like.netlist.write import dumps
-from modelica_like.sizing import size
 
 BATCHES = 6
 INPUTS = 3000

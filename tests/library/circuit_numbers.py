@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from modelica_like.solve.solution import Solution
+from modelica_like.runs.solution import Solution
 
 numbers = closed_forms.numbers("elements")
 Matrix = np.ndarray[tuple[int, int], np.dtype[np.float64]]

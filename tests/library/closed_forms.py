@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from modelica_like import simulate
-from modelica_like.solve.solution import Solution
+from modelica_like.runs.solution import Solution
 
 ROOT = Path(__file__).parents[2]
 Check = Callable[[Solution], None]

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.special import sici
 
-from modelica_like.solve.solution import Solution
+from modelica_like.runs.solution import Solution
 
 numbers = closed_forms.numbers("components")
 

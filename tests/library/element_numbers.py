@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from modelica_like.solve.solution import Solution
+from modelica_like.runs.solution import Solution
 
 numbers = closed_forms.numbers("elements")
 

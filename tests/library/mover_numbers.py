@@ -8,7 +8,7 @@ import pytest
 from closed_forms import close
 from scipy.integrate import quad
 
-from modelica_like.solve.solution import Solution
+from modelica_like.runs.solution import Solution
 
 numbers = closed_forms.numbers("components")
 

@@ -10,10 +10,10 @@ from rich.console import Console
 
 from components import Damper, Fixed, Inertia
 from modelica_like import Assembly, Solution, simulate
-from modelica_like.initialize import Impact
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var
 from modelica_like.netlist import loads
-from modelica_like.report.run import run_report
+from modelica_like.show.report.run import run_report
+from modelica_like.solve.initialize import Impact
 
 TWO_SETS = """
 name = "two_sets"

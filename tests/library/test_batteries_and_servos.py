@@ -26,7 +26,7 @@ from components import (
     ThermalMass,
 )
 from modelica_like import Assembly, Component, Solution, simulate
-from modelica_like.report.run import notices
+from modelica_like.show.report.run import notices
 
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-11}
 CELL: dict[str, Any] = {"ocv": ((0.0, 3.0), (0.5, 3.5), (1.0, 4.2)), "Q": "2 A.h", "R_i": 0.02}

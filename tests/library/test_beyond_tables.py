@@ -30,7 +30,7 @@ from components import (
 )
 from modelica_like import Assembly, Component, ModelicaLikeError, Solution, simulate
 from modelica_like.errors import LimitPassed
-from modelica_like.report.run import notices
+from modelica_like.show.report.run import notices
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 

@@ -28,7 +28,7 @@ from components import (
     ViscousClutch,
 )
 from modelica_like import Assembly, Component, simulate
-from modelica_like.report.run import notices
+from modelica_like.show.report.run import notices
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 

@@ -28,7 +28,7 @@ from components import (
     VelocitySensor,
 )
 from modelica_like import Assembly, Component, ModelicaLikeError, Solution, simulate
-from modelica_like.report.run import notices
+from modelica_like.show.report.run import notices
 
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-11}
 G = 9.80665

@@ -7,7 +7,7 @@ from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 from components import Ramp, Sine, Table1D, Table2D
 from modelica_like import Assembly, Component, ModelicaLikeError, Solution, simulate
 from modelica_like.errors import LimitPassed
-from modelica_like.report.run import notices
+from modelica_like.show.report.run import notices
 
 CURVE = ((-1.0, 2.0), (0.0, 3.0), (2.0, 3.0), (3.0, -1.0))
 FIRST, SECOND = (0.0, 1.0, 3.0), (-2.0, 0.0, 1.0, 4.0)

@@ -36,7 +36,7 @@ from modelica_like.errors import (
     WorkersLost,
 )
 from modelica_like.language import Component, Equations, series
-from modelica_like.report.files import write_dataset
+from modelica_like.show.report.files import write_dataset
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 MOTOR, GEARED = EXAMPLES / "dc_bench_motor.toml", EXAMPLES / "machine_table_geared.toml"

@@ -25,7 +25,6 @@ from components.mechanics.sources import TorqueSource
 from modelica_like import build, simulate, simulation_function
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.flatten import flatten
-from modelica_like.initialize import initialize
 from modelica_like.language import (
     Assembly,
     Component,
@@ -40,8 +39,9 @@ from modelica_like.language import (
     var,
 )
 from modelica_like.language.formula import parse_formula
-from modelica_like.report.run import notices
-from modelica_like.report.types import library_table
+from modelica_like.show.report.run import notices
+from modelica_like.show.report.types import library_table
+from modelica_like.solve.initialize import initialize
 
 
 class Twist(Component, partial=True):

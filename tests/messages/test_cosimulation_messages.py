@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from modelica_like.cosimulation.cut import cut_netlist
-from modelica_like.cosimulation.files import load_system
-from modelica_like.cosimulation.run import cosim, tell_error
-from modelica_like.cosimulation.split import split
-from modelica_like.cosimulation.system import Link, Port, Settings, System, Unit, check_system
 from modelica_like.errors import ModelicaLikeError
+from modelica_like.fmi.cosimulation.cut import cut_netlist
+from modelica_like.fmi.cosimulation.files import load_system
+from modelica_like.fmi.cosimulation.run import cosim, tell_error
+from modelica_like.fmi.cosimulation.split import split
+from modelica_like.fmi.cosimulation.system import Link, Port, Settings, System, Unit, check_system
 from modelica_like.language import Assembly
 from modelica_like.netlist import loads
 

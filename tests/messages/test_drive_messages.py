@@ -26,7 +26,6 @@ from components import (
 from modelica_like import build
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.flatten import flatten
-from modelica_like.initialize import initialize
 from modelica_like.language import (
     Assembly,
     Component,
@@ -42,6 +41,7 @@ from modelica_like.language import (
     signal_in,
     var,
 )
+from modelica_like.solve.initialize import initialize
 from modelica_like.structure import reduce
 
 

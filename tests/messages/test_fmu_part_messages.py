@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like.cosimulation.fmu_parts import system_of_netlist
 from modelica_like.errors import ModelicaLikeError
+from modelica_like.fmi.cosimulation.fmu_parts import system_of_netlist
 from modelica_like.netlist import loads
 
 DESCRIPTION = """<fmiModelDescription fmiVersion="2.0" modelName="motor" guid="0">

@@ -266,7 +266,7 @@ def test_errors_of_the_drive_point_into_the_text(tmp_path: Path) -> None:
 
 
 def test_what_python_cannot_go_down_into(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check_message) -> None:
-    from modelica_like.modelica_text import read
+    from modelica_like.netlist.modelica import read
 
     def deep(*_: object) -> None:
         raise RecursionError  # as Python does

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from modelica_like import ModelicaLikeError, build, calibrate, load_spectrum, sensitivities, simulate
+from modelica_like.analyse.sizing import load_of
 from modelica_like.errors import MissingValue, NetlistError, UnknownName, ValueOutOfRange
 from modelica_like.runs.readings import read_output
+from modelica_like.runs.recorded import RecordedModel, RecordedSolution, RecordedVariable
 from modelica_like.runs.results import settled
-from modelica_like.sizing import load_of
-from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
 
 DRIVE = Path(__file__).parents[2] / "examples" / "machine_table_direct.toml"
 

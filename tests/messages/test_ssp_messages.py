@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like.cosimulation.files import load_system
-from modelica_like.cosimulation.ssp import write_ssp
-from modelica_like.cosimulation.ssp_document import NAMES
-from modelica_like.cosimulation.system import Link, Port, System, Unit
 from modelica_like.errors import ModelicaLikeError
+from modelica_like.fmi.cosimulation.files import load_system
+from modelica_like.fmi.cosimulation.ssp import write_ssp
+from modelica_like.fmi.cosimulation.ssp_document import NAMES
+from modelica_like.fmi.cosimulation.system import Link, Port, System, Unit
 
 FMU = """<fmiModelDescription fmiVersion="2.0" modelName="m" guid="1"><CoSimulation modelIdentifier="m"/>
 <UnitDefinitions><Unit name="rad/s"><BaseUnit s="-1" rad="1"/></Unit>

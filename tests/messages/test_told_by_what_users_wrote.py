@@ -39,9 +39,9 @@ from modelica_like.language import (
     var,
     where,
 )
+from modelica_like.language.units import parse_unit
 from modelica_like.netlist import loads
-from modelica_like.report.changes import reasons
-from modelica_like.units import parse_unit
+from modelica_like.show.report.changes import reasons
 
 CIRCUIT = """
 [parts]

@@ -7,9 +7,9 @@ import rumoca
 
 from modelica_like import load
 from modelica_like.errors import ModelicaTextError, NetlistError
-from modelica_like.modelica_text.read import read_modelica
-from modelica_like.modelica_text.write import modelica_text
 from modelica_like.netlist import loads
+from modelica_like.netlist.modelica.read import read_modelica
+from modelica_like.netlist.modelica.write import modelica_text
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLISTS = [path for path in sorted(EXAMPLES.rglob("*.toml")) if "[parts" in path.read_text(encoding="utf-8")]

@@ -9,11 +9,11 @@ from typer.testing import CliRunner
 from modelica_like import load, simulate
 from modelica_like.cli import app
 from modelica_like.errors import ModelicaTextError
-from modelica_like.modelica_text.library import known_classes
-from modelica_like.modelica_text.netlist_form import netlist_text
-from modelica_like.modelica_text.read import read_modelica
-from modelica_like.modelica_text.write import modelica_text
 from modelica_like.netlist import library_types, loads
+from modelica_like.netlist.modelica.library import known_classes
+from modelica_like.netlist.modelica.netlist_form import netlist_text
+from modelica_like.netlist.modelica.read import read_modelica
+from modelica_like.netlist.modelica.write import modelica_text
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRIVES = Path(__file__).with_name("drives.mo")

@@ -14,7 +14,7 @@ from components import Fixed, IdealGear, Inertia, QuadraticSpeedDependentTorque,
 from components.interfaces import Compliant
 from modelica_like import load, simulate
 from modelica_like.language import Assembly, Component, Equations, Expr, Parameter, connect, cos, param, sin
-from modelica_like.modelica_text.write import modelica_text
+from modelica_like.netlist.modelica.write import modelica_text
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CLASSES = Path(__file__).parent / "classes" / "Modelica.mo"

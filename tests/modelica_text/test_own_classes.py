@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 from modelica_like import Assembly, build, export_fmu, load, run_fmu, simulate
 from modelica_like.errors import LimitPassed, ModelicaTextError
 from modelica_like.language import Component, Equations, Events, Parameter, Variable, der, param, terminate, var, when
-from modelica_like.modelica_text.netlist_form import netlist_text
-from modelica_like.modelica_text.write import modelica_text
 from modelica_like.netlist import loads
+from modelica_like.netlist.modelica.netlist_form import netlist_text
+from modelica_like.netlist.modelica.write import modelica_text
 
 DRIVES = Path(__file__).with_name("drives.mo")
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from modelica_like import export_fmu, load, simulate
-from modelica_like.modelica_text.netlist_form import netlist_text
-from modelica_like.modelica_text.read import read_modelica
 from modelica_like.netlist import loads
+from modelica_like.netlist.modelica.netlist_form import netlist_text
+from modelica_like.netlist.modelica.read import read_modelica
 
 ROTATIONAL = "Modelica.Mechanics.Rotational.Components"
 TRANSLATIONAL = "Modelica.Mechanics.Translational"

@@ -36,9 +36,9 @@ from judge import LONGEST, PASSED, Judge, Order, Verdict, at_import
 from lines import CACHE, FILES, ROOT, Lines
 
 FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
-    "structure", "initialize", "solve", "flatten", "compile",
+    "structure", "solve", "runs", "flatten", "compile",
 )))  # fmt: skip
-PICTURES = ("icons.py", "panels.py", "plot.py", "sankey.py", "style.py")
+PICTURES = ("icons.py",)
 """They draw; what they draw is looked at."""
 DECLARED = dict.fromkeys((f"tests/library/test_{name}" for name in (
     "declarations.py::test_declarations_are_what_netlists_rely_on",

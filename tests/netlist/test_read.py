@@ -8,10 +8,10 @@ import pytest
 
 from components import Clutch, IdealGear, Inertia, Mass
 from modelica_like import simulate
-from modelica_like.draw.diagram import diagram
 from modelica_like.errors import CyclicAssembly, NetlistError, UnknownName, WiringErrors
 from modelica_like.language import Assembly
 from modelica_like.netlist import dumps, load, loads
+from modelica_like.show.draw.diagram import diagram
 
 DRIVE = """
 name = "drive"

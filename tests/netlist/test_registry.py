@@ -36,7 +36,9 @@ def test_the_contract_of_libraries_forbids_all_but_the_language():
     contracts = tomllib.loads((root.parent / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
     forbidden = next(one for one in contracts if one["name"] == "libraries use the language only")["forbidden_modules"]
     every = {file.stem for file in root.iterdir() if file.suffix == ".py" or (file / "__init__.py").is_file()}
-    assert {f"modelica_like.{name}" for name in every - {"__init__", "__main__", "language"}} == set(forbidden)
+    assert {f"modelica_like.{name}" for name in every - {"__init__", "__main__", "former", "language"}} == set(
+        forbidden
+    )
 
 
 def test_a_name_or_module_that_the_library_has_not_is_an_attribute_error():
@@ -71,6 +73,27 @@ def test_a_module_is_found_by_the_name_it_had_before_there_were_folders(name: st
         assert then is now
     assert now.__spec__ is not None
     assert now.__spec__.name == now.__name__ == components._FORMER[name]  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("former", "now"),
+    [
+        ("cosimulation.ssp", "fmi.cosimulation.ssp"),
+        ("explorer", "show.explorer"),
+        ("report.run", "show.report.run"),
+        ("report.tables", "show.report.tables"),
+        ("sizing", "analyse.sizing"),
+        ("solve.plot", "show.plot"),
+        ("solve.solution", "runs.solution"),
+        ("units", "language.units"),
+        ("units.unit", "language.units.unit"),
+    ],
+)
+def test_documented_modules_of_the_framework_are_found_by_former_names(former: str, now: str) -> None:
+    """Once, not twice: a class of two modules would be two classes."""
+    module = importlib.import_module(f"modelica_like.{former}")
+    assert module is importlib.import_module(f"modelica_like.{now}")
+    assert module.__name__ == f"modelica_like.{now}"
 
 
 def test_a_netlist_may_name_classes_by_former_modules() -> None:

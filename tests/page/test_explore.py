@@ -20,7 +20,7 @@ import pytest
 
 from modelica_like import load, run_fmu, sensitivities, simulate
 from modelica_like.errors import NoGradient
-from modelica_like.explorer import Explorer, server
+from modelica_like.show.explorer import Explorer, server
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRIVES = {"machine_table_direct": "table_mass", "machine_tool_startup": "J2.J"}
@@ -307,7 +307,7 @@ def test_what_has_no_gradient_is_told_in_the_page(
     def refuse(*_: Any, **__: Any) -> None:
         raise NoGradient("No gradient at t = 1 s: it grazes.", advice="Move the parameters.")
 
-    monkeypatch.setattr("modelica_like.explorer.runs.sensitivities", refuse)
+    monkeypatch.setattr("modelica_like.show.explorer.runs.sensitivities", refuse)
     with served("components/h_bridge", tmp_path) as explorer:
         browser.open(explorer.address)
         browser.run("shown.add(PAGE.variables[0]); ask(); document.querySelector('#bars summary').click()")

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from modelica_like import ModelicaLikeError, export_html, load, save_report, simulate
-from modelica_like.explorer import Explorer
 from modelica_like.netlist import loads
+from modelica_like.show.explorer import Explorer
 
 PAYLOADS = (
     "<script>window.hacked=1</script>", "<img src=x onerror=window.hacked=1>", "\"><svg onload=window.hacked=1>",

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 from modelica_like import build, export_html, simulate
 from modelica_like.cli import app
 from modelica_like.errors import ExportError, UnitError, UnknownName, ValueOutOfRange
-from modelica_like.native.page import _span, _spelled
-from modelica_like.units import parse_unit
+from modelica_like.language.units import parse_unit
+from modelica_like.show.browser.page import _span, _spelled
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRIVES = ("machine_table_direct", "machine_table_geared", "machine_tool_startup")

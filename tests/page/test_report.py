@@ -26,9 +26,9 @@ from modelica_like.language import (
     sin,
     var,
 )
-from modelica_like.report.files import write_solution
-from modelica_like.report.page import report, save_report
-from modelica_like.report.page.curves import curves
+from modelica_like.show.report.files import write_solution
+from modelica_like.show.report.page import report, save_report
+from modelica_like.show.report.page.curves import curves
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SPEED, INERTIA = 200 * np.pi, 0.02 + 500 * (0.0075 / np.pi) ** 2

@@ -16,7 +16,7 @@ from modelica_like import Assembly, Component, simulate
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.fmi.export import export_fmu
 from modelica_like.fmi.run import run_fmu
-from modelica_like.solve.trajectories import Trajectories
+from modelica_like.runs.trajectories import Trajectories
 
 RTOL = 1e-8
 SAME = 1e-5

@@ -11,7 +11,7 @@ from laws import END, clear
 from modelica_like import Assembly, export_fmu, load, simulate
 from modelica_like.errors import Chattering, FmuFailed
 from modelica_like.fmi.run import run_fmu
-from modelica_like.modelica_text.write import modelica_text
+from modelica_like.netlist.modelica.write import modelica_text
 
 NEAR = 2e-4
 """The reference has 3e-5 s for a jump of at most 2, a few times in a run."""

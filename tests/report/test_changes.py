@@ -30,9 +30,9 @@ from modelica_like.language import (
     when,
     where,
 )
-from modelica_like.report.changes import changes
-from modelica_like.report.page import report
-from modelica_like.report.structure import structure_report
+from modelica_like.show.report.changes import changes
+from modelica_like.show.report.page import report
+from modelica_like.show.report.structure import structure_report
 
 
 class Relay(Component):

@@ -8,12 +8,12 @@ from rich.console import Console
 
 from modelica_like import linearize, sensitivities, simulate, steady
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnitError
-from modelica_like.report.changes import reasons
-from modelica_like.report.compare import Comparison, compare
-from modelica_like.report.files import write_solution
-from modelica_like.report.sources import trajectories
-from modelica_like.solve.measured import read_csv
-from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+from modelica_like.runs.measured import read_csv
+from modelica_like.runs.recorded import RecordedModel, RecordedSolution, RecordedVariable
+from modelica_like.show.report.changes import reasons
+from modelica_like.show.report.compare import Comparison, compare
+from modelica_like.show.report.files import write_solution
+from modelica_like.show.report.sources import trajectories
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DIRECT = EXAMPLES / "machine_table_direct.toml"

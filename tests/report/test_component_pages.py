@@ -27,11 +27,11 @@ from modelica_like.language import (
 )
 from modelica_like.language import rows as table_rows
 from modelica_like.netlist import library_types
-from modelica_like.report.component_pages import latex_names
-from modelica_like.report.component_pages.latex import Path, Unwritable
-from modelica_like.report.component_pages.library import component_pages, examples_by_type
-from modelica_like.report.component_pages.page import page
-from modelica_like.report.component_pages.source import Event, Source, Term, _reader
+from modelica_like.show.report.component_pages import latex_names
+from modelica_like.show.report.component_pages.latex import Path, Unwritable
+from modelica_like.show.report.component_pages.library import component_pages, examples_by_type
+from modelica_like.show.report.component_pages.page import page
+from modelica_like.show.report.component_pages.source import Event, Source, Term, _reader
 
 ROOT = File(__file__).parents[2]
 FOLDER = ROOT / "docs" / "components"

@@ -8,10 +8,10 @@ import pytest
 
 import components.mechanics.inertias
 from modelica_like import compare, linearize, load, sensitivities, simulate, steady, sweep
+from modelica_like.analyse.sizing import size
 from modelica_like.flatten import flatten
-from modelica_like.report.notebook import html
-from modelica_like.sizing import size
-from modelica_like.solve.solution import Solution
+from modelica_like.runs.solution import Solution
+from modelica_like.show.report.notebook import html
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -7,7 +7,7 @@ import pytest
 
 from modelica_like import Solution, overlay, simulate
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnitError, UnknownName
-from modelica_like.solve.measured import read_columns
+from modelica_like.runs.measured import read_columns
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRIVE = EXAMPLES / "machine_table_direct.toml"

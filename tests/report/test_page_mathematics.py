@@ -16,8 +16,8 @@ import pytest
 
 from modelica_like.language import Component
 from modelica_like.netlist import library_types
-from modelica_like.report.component_pages import latex_names
-from modelica_like.report.component_pages.latex import Path, Unwritable, Writer
+from modelica_like.show.report.component_pages import latex_names
+from modelica_like.show.report.component_pages.latex import Path, Unwritable, Writer
 
 # -- a reader of LaTeX -------------------------------------------------------------------------------------------------
 

@@ -25,7 +25,7 @@ from components import (
 from modelica_like import load, simulate
 from modelica_like.cli import app
 from modelica_like.language import Assembly, Equations, Variable, var
-from modelica_like.report.plausible import drive_notes, run_notes
+from modelica_like.show.report.plausible import drive_notes, run_notes
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

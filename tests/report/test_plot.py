@@ -30,8 +30,8 @@ from modelica_like.language import (
     var,
     when,
 )
-from modelica_like.solve.plot import for_page, plot, save_plot
-from modelica_like.solve.signals import read_signals
+from modelica_like.runs.signals import read_signals
+from modelica_like.show.plot import for_page, plot, save_plot
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from modelica_like.report import progress
-from modelica_like.report.progress import Bar
+from modelica_like.show.report import progress
+from modelica_like.show.report.progress import Bar
 
 
 def test_a_short_run_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:

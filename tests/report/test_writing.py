@@ -17,17 +17,17 @@ import xarray
 
 from modelica_like import Solution, build, load, simulate
 from modelica_like.analyse.sweeps.sweep import sweep
-from modelica_like.cosimulation.files import write_system
-from modelica_like.cosimulation.ssp import write_ssp
-from modelica_like.cosimulation.ssp_document import ssd
-from modelica_like.cosimulation.system import System, Unit
 from modelica_like.fmi.build import build as compile_library
 from modelica_like.fmi.build import native_platform
+from modelica_like.fmi.cosimulation.files import write_system
+from modelica_like.fmi.cosimulation.ssp import write_ssp
+from modelica_like.fmi.cosimulation.ssp_document import ssd
+from modelica_like.fmi.cosimulation.system import System, Unit
 from modelica_like.fmi.export import export_fmu
 from modelica_like.netlist import save
-from modelica_like.report.component_pages.library import write_component_pages
-from modelica_like.report.files import write_dataset, write_solution
-from modelica_like.solve.plot import save_plot
+from modelica_like.show.plot import save_plot
+from modelica_like.show.report.component_pages.library import write_component_pages
+from modelica_like.show.report.files import write_dataset, write_solution
 from modelica_like.writing import check_writable, replacing
 
 resource = pytest.importorskip("resource", reason="there are limits on POSIX only")
@@ -90,7 +90,7 @@ def write_systems(path: Path, fmu: Path) -> None:
             resource.setrlimit(resource.RLIMIT_FSIZE, limits)
             return ssd(*arguments)
 
-        patch.setattr("modelica_like.cosimulation.ssp.ssd", described)
+        patch.setattr("modelica_like.fmi.cosimulation.ssp.ssd", described)
         write_ssp(system(fmu), path)
 
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from modelica_like import simulate
 from modelica_like.cli import app
 from modelica_like.netlist import loads
-from modelica_like.report.run import notices
+from modelica_like.show.report.run import notices
 from modelica_like.simulation import Solver
 
 PUSHED = """name = "pushed"

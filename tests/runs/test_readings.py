@@ -16,11 +16,11 @@ import pytest
 
 from components import Clutch, Fixed, Inertia, Sine, SpringDamper, Table
 from modelica_like import Assembly, build, load_spectrum, sensitivities, simulate, simulation_function, sweep
+from modelica_like.analyse.sizing import load_of, size
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient
-from modelica_like.report.run import values_table
-from modelica_like.sizing import load_of, size
-from modelica_like.solve.display import Display
+from modelica_like.runs.display import Display
+from modelica_like.show.report.run import values_table
 
 ROOT = Path(__file__).parents[2]
 STARTUP = ROOT / "examples" / "machine_tool_startup.toml"

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from components import sizing
+from modelica_like.analyse.sizing import checks, size
+from modelica_like.analyse.sizing.checks import GROUP, design_checks, find_check
 from modelica_like.errors import NetlistError, UnknownName
-from modelica_like.sizing import checks, size
-from modelica_like.sizing.checks import GROUP, design_checks, find_check
 
 LEVER = '''
 from modelica_like.language.quantities import Force, Length, Torque

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like.sizing import size
+from modelica_like.analyse.sizing import size
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "sizing.md").read_text(encoding="utf-8")

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from modelica_like.analyse.sizing.formulas import Value, read_value
 from modelica_like.errors import ModelicaLikeError
-from modelica_like.sizing.formulas import Value, read_value
-from modelica_like.units import ONE, parse_unit, same_dimension
+from modelica_like.language.units import ONE, parse_unit, same_dimension
 
 VALUES = {
     "force": Value(100.0, parse_unit("N")),

@@ -16,7 +16,7 @@ from components.sizing import (
     shaft_statics,
 )
 from modelica_like.language import quantities
-from modelica_like.units import parse_unit
+from modelica_like.language.units import parse_unit
 
 COUNTS = ("", "teeth", "1e6 rev")
 

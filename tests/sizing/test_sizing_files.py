@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from components.sizing import shaft_stress
+from modelica_like.analyse.sizing import Sizing, load_of, size
 from modelica_like.errors import UnknownName
 from modelica_like.simulation import simulate
-from modelica_like.sizing import Sizing, load_of, size
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((ROOT / "examples" / "sizing").glob("*.toml"))

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from modelica_like.analyse.sizing import size
 from modelica_like.errors import ModelicaLikeError
-from modelica_like.sizing import size
 
 GOOD = """[parameters]
 force = "150 N"

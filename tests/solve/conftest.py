@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from modelica_like import build
-from modelica_like.initialize import Point, initialize
 from modelica_like.language import Component
+from modelica_like.solve.initialize import Point, initialize
 
 sys.path.insert(0, str(Path(__file__).parent))
 

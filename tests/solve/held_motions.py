@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modelica_like.initialize import holds as module
-from modelica_like.initialize.point import Point
+from modelica_like.solve.initialize import holds as module
+from modelica_like.solve.initialize.point import Point
 
 
 class Fake:

@@ -5,7 +5,7 @@ import pytest
 from components import BearingFriction, Inertia
 from modelica_like import Assembly, simulate
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var
-from modelica_like.solve.bands import bands_of
+from modelica_like.show.bands import bands_of
 
 
 class Blink(Component):

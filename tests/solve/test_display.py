@@ -12,10 +12,10 @@ from components import Constant, Ramp
 from modelica_like import Assembly, Solution, build, load, simulate
 from modelica_like.errors import ModelicaLikeError, UnitError, UnknownName
 from modelica_like.netlist.write import save
-from modelica_like.report.files import write_solution
-from modelica_like.report.run import run_report
-from modelica_like.solve.display import Display
-from modelica_like.solve.recorded import RecordedModel, RecordedVariable
+from modelica_like.runs.display import Display
+from modelica_like.runs.recorded import RecordedModel, RecordedVariable
+from modelica_like.show.report.files import write_solution
+from modelica_like.show.report.run import run_report
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLIST = """

@@ -11,7 +11,6 @@ import pytest
 from components import BearingFriction, Inertia
 from modelica_like import Assembly, Options, Solution, simulate
 from modelica_like.errors import Chattering, Source, StepFailed
-from modelica_like.initialize import Impact
 from modelica_like.language import (
     Component,
     Discrete,
@@ -28,6 +27,7 @@ from modelica_like.language import (
     var,
 )
 from modelica_like.solve.events import EventLoop
+from modelica_like.solve.initialize import Impact
 from modelica_like.solve.instants import chattering, note_rest
 from modelica_like.solve.looks import Looks
 from modelica_like.solve.recorder import Event, Recorder

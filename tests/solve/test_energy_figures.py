@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from modelica_like.solve.energy import EnergyBalance, EnergyRow
+from modelica_like.runs.energy import EnergyBalance, EnergyRow
 
 NONE = EnergyRow("", *[0.0] * 7)
 MOTOR = replace(NONE, component="motor", inflow=-100.0, source=100.0)

@@ -10,11 +10,11 @@ from scipy.integrate import quad, solve_ivp
 from components import Brake, ConstantTorque, IdealGear, Inertia, Step
 from components.translational.linkages import TwoFlanges
 from modelica_like import Assembly, linearize, load, sensitivities, simulate
-from modelica_like.cosimulation.split import split
+from modelica_like.fmi.cosimulation.split import split
 from modelica_like.language import Component, Equations, Parameter, Variable, cos, der, guess, param, sin, var
 from modelica_like.language.expr import TIME
 from modelica_like.netlist.registry import find_type
-from modelica_like.report.run import statistics_line
+from modelica_like.show.report.run import statistics_line
 
 PARTS = Path(__file__).parents[2] / "examples" / "elements"
 L, G = 1.5, 9.81

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from modelica_like import build, simulate
-from modelica_like.initialize import Point
 from modelica_like.language import (
     Component,
     Equations,
@@ -31,6 +30,7 @@ from modelica_like.solve.guards import (
     candidates,
     locate,
 )
+from modelica_like.solve.initialize import Point
 
 
 class Steps(Component):

@@ -10,8 +10,9 @@ from held_motions import Fake, at, held
 from scipy.linalg import null_space
 
 from modelica_like.compile.compiled import Circuit
-from modelica_like.initialize import holds as module
-from modelica_like.initialize.holds import (
+from modelica_like.language.holding import UNLIMITED
+from modelica_like.solve.initialize import holds as module
+from modelica_like.solve.initialize.holds import (
     _may_contradict,
     _share_circuits,
     _use,
@@ -22,8 +23,7 @@ from modelica_like.initialize.holds import (
     sharing,
     terms,
 )
-from modelica_like.initialize.point import Point
-from modelica_like.language.holding import UNLIMITED
+from modelica_like.solve.initialize.point import Point
 
 
 def test_held_is_what_its_mode_holds_with_a_gain(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,9 +17,9 @@ from components import (
 )
 from modelica_like import build
 from modelica_like.errors import NoValidModes
-from modelica_like.initialize import Point, call, initialize, solve_implicit
-from modelica_like.initialize import ideal as module
-from modelica_like.initialize.ideal import _dependences, meet, replace_dependent
+from modelica_like.solve.initialize import Point, call, initialize, solve_implicit
+from modelica_like.solve.initialize import ideal as module
+from modelica_like.solve.initialize.ideal import _dependences, meet, replace_dependent
 from modelica_like.structure.ideal import HEAD, IdealElement, IdealNetwork
 
 

@@ -8,14 +8,14 @@ import pytest
 from held_motions import Fake, at, held
 
 from modelica_like.compile.functions import ROUNDING
-from modelica_like.initialize import holds as module
-from modelica_like.initialize.holds import (
+from modelica_like.language.holding import UNLIMITED
+from modelica_like.solve.initialize import holds as module
+from modelica_like.solve.initialize.holds import (
     INSTANT,
     Impact,
     Strike,
 )
-from modelica_like.initialize.point import Point
-from modelica_like.language.holding import UNLIMITED
+from modelica_like.solve.initialize.point import Point
 
 
 def strike(model: Any, point: Any, entering: Any = (), loose: Any = (), kind: type[Strike] = Strike) -> Any:

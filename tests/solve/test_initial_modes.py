@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-import modelica_like.initialize.modes as module
+import modelica_like.solve.initialize.modes as module
 from components import Clutch, ConstantTorque, Inertia
 from modelica_like import simulate
 from modelica_like.errors import InitializationError, SingularAtStart
-from modelica_like.initialize import Point
-from modelica_like.initialize.modes import chosen_modes, started
 from modelica_like.language import (
     Component,
     Discrete,
@@ -28,6 +26,8 @@ from modelica_like.language import (
     series,
     var,
 )
+from modelica_like.solve.initialize import Point
+from modelica_like.solve.initialize.modes import chosen_modes, started
 
 # -- nonlinear -------------------------------------------------------------------------------------------------------
 

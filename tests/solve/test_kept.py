@@ -8,8 +8,8 @@ import pytest
 from numpy.linalg import matrix_rank
 from scipy.linalg import null_space
 
-from modelica_like.initialize import kept
-from modelica_like.initialize.kept import Kept, find_kept, solve_kept
+from modelica_like.solve.initialize import kept
+from modelica_like.solve.initialize.kept import Kept, find_kept, solve_kept
 
 MOTIONS = (5, 2, 7, 0, 3, 6, 1, 4)
 """The variable of every held motion."""

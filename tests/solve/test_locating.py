@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modelica_like.initialize import Point
 from modelica_like.solve.guards import (
     Candidate,
     Ends,
@@ -19,6 +18,7 @@ from modelica_like.solve.guards import (
     candidates,
     locate,
 )
+from modelica_like.solve.initialize import Point
 
 NOTHING = np.zeros(0)
 Guard = Callable[[float], tuple[float, float]]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from modelica_like.errors import ModelicaLikeError, NetlistError
-from modelica_like.solve.measured import read_columns
+from modelica_like.runs.measured import read_columns
 
 NUMBERS = {"time": (0.0, 0.5, 1.0), "Öl [°C]": (20.25, -3.5e-4, 1e3), "τ": (1.0, 2.0, 3.0)}
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "cp1252")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from modelica_like.solve.options import Options
+from modelica_like.options import Options
 from modelica_like.solve.pace import Pace
 
 STEP = 0.1

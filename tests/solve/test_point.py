@@ -10,8 +10,8 @@ import pytest
 
 from modelica_like.compile.buffers import BufferedFunction
 from modelica_like.errors import InitializationError, SingularAtStart
-from modelica_like.initialize import point as module
-from modelica_like.initialize.point import (
+from modelica_like.solve.initialize import point as module
+from modelica_like.solve.initialize.point import (
     Point,
     call,
     check_singular,

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from modelica_like.errors import StepFailed
-from modelica_like.initialize import Point
+from modelica_like.options import Options
+from modelica_like.runs.powers import _BESIDE, Powers, Results, _mixing, _together
 from modelica_like.solve import powers
-from modelica_like.solve.options import Options
-from modelica_like.solve.powers import _BESIDE, Powers, Results, _mixing, _together
+from modelica_like.solve.initialize import Point
 from modelica_like.solve.recorder import Segment
 
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modelica_like.solve.powers import Results, _apart, _mixed, _ratio, _stretches, results
-from modelica_like.solve.quadrature import rules
+from modelica_like.runs.powers import Results, _apart, _mixed, _ratio, _stretches, results
+from modelica_like.runs.quadrature import rules
 from modelica_like.solve.recorder import Segment
 
 RANDOM = np.random.default_rng(3)
@@ -121,7 +121,7 @@ def test_pieces_have_a_bounded_size(
     monkeypatch: pytest.MonkeyPatch, components: int, sizes: list[int], told: list[list[int]]
 ) -> None:
     """20000 results, or 10 million numbers in the six energies of all components; a cut segment shares a result."""
-    monkeypatch.setattr("modelica_like.solve.powers._together", lambda _, held: [one.times for one in held])
+    monkeypatch.setattr("modelica_like.runs.powers._together", lambda _, held: [one.times for one in held])
     model: Any = SimpleNamespace(components=range(components))
     segments = [
         Segment(10 * k + np.linspace(0, 1, size), np.zeros((1, size)), np.zeros((0, size)), np.zeros(0))

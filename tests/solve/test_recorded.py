@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from modelica_like.errors import MissingValue, UnknownName, ValueOutOfRange
-from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+from modelica_like.runs.recorded import RecordedModel, RecordedSolution, RecordedVariable
 
 TIME = np.array([0.0, 1.0, 2.0, 2.0, 4.0])
 COLUMNS = {

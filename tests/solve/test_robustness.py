@@ -12,7 +12,6 @@ import pytest
 from components import ConstantTorque, Damper, Fixed, Inertia, Spring, SpringDamper
 from modelica_like import Assembly, build, simulate
 from modelica_like.errors import StepFailed
-from modelica_like.initialize import Point
 from modelica_like.language import (
     Component,
     Equations,
@@ -27,9 +26,10 @@ from modelica_like.language import (
     series,
     var,
 )
-from modelica_like.report.run import notices
+from modelica_like.options import Options
+from modelica_like.show.report.run import notices
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.options import Options
+from modelica_like.solve.initialize import Point
 from modelica_like.solve.pace import Pace
 
 TOLERANCES = [1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10]
@@ -193,7 +193,7 @@ import numpy as np
 from components import Fixed, Inertia, Spring
 from modelica_like import Assembly, build, simulate
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.options import Options
+from modelica_like.options import Options
 
 parts = {"wall": Fixed(), "spring": Spring(c=1e6), "rotor": Inertia(J=1.0, phi=1.0, w=0.0)}
 model = build(Assembly("swing", parts=parts, series={"s": tuple(parts)}))

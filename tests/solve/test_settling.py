@@ -7,10 +7,6 @@ import pytest
 
 from components import Brake, ConstantTorque, Damper, Fixed, Inertia
 from modelica_like import Assembly, build
-from modelica_like.initialize import Point, settling, solve_implicit
-from modelica_like.initialize.modes import started
-from modelica_like.initialize.settling import settle
-from modelica_like.initialize.start import StartProblem
 from modelica_like.language import (
     Component,
     Equations,
@@ -24,6 +20,10 @@ from modelica_like.language import (
     sqrt,
     var,
 )
+from modelica_like.solve.initialize import Point, settling, solve_implicit
+from modelica_like.solve.initialize.modes import started
+from modelica_like.solve.initialize.settling import settle
+from modelica_like.solve.initialize.start import StartProblem
 
 
 def run_down(drive: Component) -> tuple[bool, dict[str, float]]:

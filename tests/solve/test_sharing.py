@@ -8,9 +8,9 @@ import pytest
 
 from components import Clutch, ConstantTorque, Fixed, Inertia
 from modelica_like import Assembly, build
-from modelica_like.initialize import initialize
-from modelica_like.initialize.holds import Strike, _capacities, rest
 from modelica_like.language.holding import UNLIMITED
+from modelica_like.solve.initialize import initialize
+from modelica_like.solve.initialize.holds import Strike, _capacities, rest
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-3, 7.0])

@@ -10,11 +10,11 @@ import pytest
 from modelica_like import build
 from modelica_like.errors import SingularAtStart, Source
 from modelica_like.flatten.model import Origin
-from modelica_like.initialize import initialize
-from modelica_like.initialize.plan import _generic_matrix
-from modelica_like.initialize.singular import _ANOTHER, _singular, implicit_singular, is_regular, singular_block
-from modelica_like.initialize.slopes import Sizes, implicit_slopes, variable_slopes
 from modelica_like.language import Component, Equations, Parameter, Variable, der, param, sin, sqrt, var
+from modelica_like.solve.initialize import initialize
+from modelica_like.solve.initialize.plan import _generic_matrix
+from modelica_like.solve.initialize.singular import _ANOTHER, _singular, implicit_singular, is_regular, singular_block
+from modelica_like.solve.initialize.slopes import Sizes, implicit_slopes, variable_slopes
 
 SQUARE = np.array([[2.0, 1.0], [1.0, 2.0]])
 POINT: Any = SimpleNamespace(t=0.0, x=np.zeros(1), z=np.zeros(1), d=np.array([1.0, 1.0, 0.0]))

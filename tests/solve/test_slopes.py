@@ -10,9 +10,9 @@ import pytest
 from modelica_like import build
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import SingularAtStart, UnknownName
-from modelica_like.initialize.point import Point, solve_implicit
-from modelica_like.initialize.slopes import columns_of, implicit_slopes, nodes_of, slopes, variable_slopes
 from modelica_like.language import TIME, Component, Equations, Input, Parameter, Variable, der, param, signal_in, var
+from modelica_like.solve.initialize.point import Point, solve_implicit
+from modelica_like.solve.initialize.slopes import columns_of, implicit_slopes, nodes_of, slopes, variable_slopes
 
 NAMES = "t", "x", "z", "p", "u", "d"
 

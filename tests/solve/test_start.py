@@ -12,10 +12,10 @@ from modelica_like.compile.compiled import StartEntry
 from modelica_like.compile.start_system import StartSystem
 from modelica_like.errors import ContradictingStart, InitializationError
 from modelica_like.flatten.model import INITIAL_EQUATION
-from modelica_like.initialize import start as module
-from modelica_like.initialize.plan import StartPlan
-from modelica_like.initialize.point import Point
-from modelica_like.initialize.start import StartProblem, _Evaluation, _is_free_of_modes, _sizes, _solve, _Sorted
+from modelica_like.solve.initialize import start as module
+from modelica_like.solve.initialize.plan import StartPlan
+from modelica_like.solve.initialize.point import Point
+from modelica_like.solve.initialize.start import StartProblem, _Evaluation, _is_free_of_modes, _sizes, _solve, _Sorted
 
 FUNCTION = ["t", "x", "y", "z", "p", "u", "d"]
 

@@ -12,9 +12,17 @@ from scipy.linalg import null_space
 from modelica_like.compile.compiled import StartEntry
 from modelica_like.compile.start_system import StartSystem
 from modelica_like.errors import MissingStart
-from modelica_like.initialize import plan as module
-from modelica_like.initialize.plan import StartPlan, _Choice, _is_regular, _to_give, direct_starts, is_near, start_plan
-from modelica_like.initialize.point import Point
+from modelica_like.solve.initialize import plan as module
+from modelica_like.solve.initialize.plan import (
+    StartPlan,
+    _Choice,
+    _is_regular,
+    _to_give,
+    direct_starts,
+    is_near,
+    start_plan,
+)
+from modelica_like.solve.initialize.point import Point
 
 FUNCTION = ["t", "x", "y", "z", "p", "u", "d"]
 

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from modelica_like.initialize.plan import _DENSE, _regular
+from modelica_like.solve.initialize.plan import _DENSE, _regular
 
 
 def regular(matrix: np.ndarray) -> bool:

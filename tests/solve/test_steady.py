@@ -8,17 +8,17 @@ import pytest
 
 from modelica_like import build
 from modelica_like.errors import InitializationError, Source
-from modelica_like.initialize import initialize, steady
-from modelica_like.initialize.kept import Kept
-from modelica_like.initialize.point import Point
-from modelica_like.initialize.steady import (
+from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, sqrt, var
+from modelica_like.solve.initialize import initialize, steady
+from modelica_like.solve.initialize.kept import Kept
+from modelica_like.solve.initialize.point import Point
+from modelica_like.solve.initialize.steady import (
     check_modes_hold,
     modes_between,
     moving_states,
     solve_steady,
     steady_change,
 )
-from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, sqrt, var
 
 
 class Levels(Component):

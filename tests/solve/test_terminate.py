@@ -30,7 +30,7 @@ from modelica_like.language import (
     var,
     when,
 )
-from modelica_like.solve.solution import Solution
+from modelica_like.runs.solution import Solution
 
 Solver = Literal["idas", "native"]
 both = pytest.mark.parametrize("solver", ["idas", "native"])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from modelica_like.errors import Source
 from modelica_like.flatten.model import FlatModel, FlatVariable, LinearEquation, Origin
-from modelica_like.units import ONE
+from modelica_like.language.units import ONE
 
 ORIGIN = Origin("", "test", Source(""))
 

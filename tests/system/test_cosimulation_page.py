@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from modelica_like import cosim, simulate
-from modelica_like.cosimulation.files import load_system
+from modelica_like.fmi.cosimulation.files import load_system
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "cosimulation.md"

@@ -18,8 +18,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from modelica_like import CompiledDae, Solution, build, load, simulate
-from modelica_like.report.run import notices
-from modelica_like.solve.trajectories import Values
+from modelica_like.runs.trajectories import Values
+from modelica_like.show.report.run import notices
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLIST, MOTOR = EXAMPLES / "dc_bench.toml", EXAMPLES / "dc_bench_motor.toml"

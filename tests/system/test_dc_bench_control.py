@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from modelica_like import simulate
-from modelica_like.solve.solution import Solution
+from modelica_like.runs.solution import Solution
 
 NETLIST = Path(__file__).parents[2] / "examples" / "dc_bench_speed_control.toml"
 RPM = pi / 30

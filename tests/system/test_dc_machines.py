@@ -14,7 +14,7 @@ import pytest
 
 from components import ConstantCurrent, ConstantSpeed, Ground, Resistor, SeriesDCMachine, ShuntDCMachine
 from modelica_like import Assembly, CompiledDae, Component, Solution, build, simulate
-from modelica_like.report.run import notices
+from modelica_like.show.report.run import notices
 
 MACHINES = Path(__file__).parents[2] / "examples" / "dc_machines"
 TYPES = ("permanent_magnet", "separately_excited", "shunt", "series")

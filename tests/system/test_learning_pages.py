@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from modelica_like.cli import app
-from modelica_like.explorer import Explorer
 from modelica_like.netlist import library_types
+from modelica_like.show.explorer import Explorer
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [

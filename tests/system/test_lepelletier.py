@@ -17,7 +17,7 @@ from components.gears.shift_report import ShiftReport, shift_report
 from components.sizing import lepelletier_gear
 from modelica_like import Assembly, CompiledDae, Solution, build, simulate
 from modelica_like.netlist import load
-from modelica_like.solve.trajectories import Values
+from modelica_like.runs.trajectories import Values
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLIST, GEARS = EXAMPLES / "lepelletier.toml", EXAMPLES / "lepelletier_gears.toml"

@@ -14,8 +14,18 @@ from hypothesis import strategies as st
 
 from modelica_like.errors import UnitError, ValueOutOfRange
 from modelica_like.language.formula import parse_formula
-from modelica_like.units import ANY, ONE, Unit, coherent, in_unit, parse_unit, read_quantity, same_dimension, to_si
-from modelica_like.units.atoms import ATOMS, BASE, PINT_NAMES, find_atom, pint_registry
+from modelica_like.language.units import (
+    ANY,
+    ONE,
+    Unit,
+    coherent,
+    in_unit,
+    parse_unit,
+    read_quantity,
+    same_dimension,
+    to_si,
+)
+from modelica_like.language.units.atoms import ATOMS, BASE, PINT_NAMES, find_atom, pint_registry
 
 NAMES = st.sampled_from(["kg", "m", "s", "A", "K", "rad", "N", "J", "W", "V", "Ohm", "mm", "min", "rpm", "deg", "%"])
 EXPONENTS = st.one_of(
@@ -62,7 +72,7 @@ def test_the_table_agrees_with_pint(name: str, atom: object) -> None:
 
 
 def test_reading_units_of_the_table_does_not_start_pint() -> None:
-    code = "import sys; from modelica_like.units import parse_unit as p; p('kN.mm/rad'); p('rpm')\n"
+    code = "import sys; from modelica_like.language.units import parse_unit as p; p('kN.mm/rad'); p('rpm')\n"
     code += "assert 'pint' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
 

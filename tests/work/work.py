@@ -24,7 +24,7 @@ import tomlkit
 
 from modelica_like import build, load, simulate
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.report.start import start_values
+from modelica_like.show.report.start import start_values
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"

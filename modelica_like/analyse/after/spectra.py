@@ -11,8 +11,8 @@ from modelica_like.compile.compiled import Vector
 from modelica_like.errors import ValueOutOfRange, extra_module
 from modelica_like.runs.polynomials import WEIGHTS
 from modelica_like.runs.results import along
-from modelica_like.solve.style import COLOURS, picture, with_unit
-from modelica_like.solve.trajectories import Trajectories
+from modelica_like.runs.trajectories import Trajectories
+from modelica_like.style import COLOURS, picture, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,7 +8,7 @@ import numpy as np
 
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.runs.results import along
-from modelica_like.solve.trajectories import Trajectories
+from modelica_like.runs.trajectories import Trajectories
 
 _ROUNDING = 1e-9
 

@@ -20,8 +20,8 @@ from modelica_like.errors import (
     ValueOutOfRange,
     extra_module,
 )
+from modelica_like.language.units import to_si
 from modelica_like.simulation import Model, build
-from modelica_like.units import to_si
 
 __all__ = ["Calibration", "Numbers", "OperatingPoints", "Trajectories", "calibrate"]
 

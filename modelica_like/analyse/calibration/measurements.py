@@ -14,10 +14,10 @@ from modelica_like.analyse.operating.steady import OperatingPoint, steady, stead
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.language.units import Unit, parse_unit, to_si
+from modelica_like.runs.measured import read_columns, title_and_unit
 from modelica_like.runs.readings import read_output
 from modelica_like.simulation import quick_run
-from modelica_like.solve.measured import read_columns, title_and_unit
-from modelica_like.units import Unit, parse_unit, to_si
 
 _SECOND = parse_unit("s")
 Matrix = np.ndarray[Any, np.dtype[np.float64]]

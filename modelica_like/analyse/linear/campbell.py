@@ -11,9 +11,9 @@ import numpy as np
 from modelica_like.analyse.linear.linearize import At, linearize
 from modelica_like.analyse.linear.pictures import mode_name
 from modelica_like.errors import ValueOutOfRange
-from modelica_like.initialize import call
 from modelica_like.simulation import Model, build
-from modelica_like.solve.style import COLOURS, numbered, picture, text_width
+from modelica_like.solve.initialize import call
+from modelica_like.style import COLOURS, numbered, picture, text_width
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.initialize import Point, holding, share, variable_slopes
-from modelica_like.initialize.slopes import slopes
+from modelica_like.solve.initialize import Point, holding, share, variable_slopes
+from modelica_like.solve.initialize.slopes import slopes
 
 Matrix = np.ndarray[Any, np.dtype[np.float64]]
 _ZERO = 1e-9

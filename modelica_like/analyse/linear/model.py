@@ -12,9 +12,9 @@ import numpy as np
 from modelica_like.analyse.linear.pictures import bode, mode_name, nyquist
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import extra_module
-from modelica_like.initialize import Point, variable_slopes
-from modelica_like.initialize.slopes import implicit_slopes, nodes_of
-from modelica_like.solve.style import COLOURS, picture, text_width
+from modelica_like.solve.initialize import Point, variable_slopes
+from modelica_like.solve.initialize.slopes import implicit_slopes, nodes_of
+from modelica_like.style import COLOURS, picture, text_width
 from modelica_like.upper import Shown
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.solve.style import COLOURS, numbered, picture, text_width
+from modelica_like.style import COLOURS, numbered, picture, text_width
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,10 +10,10 @@ import numpy as np
 
 from modelica_like.analyse.operating.steady import OperatingPoint, steady
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.runs.display import Display
+from modelica_like.runs.solution import Solution
 from modelica_like.simulation import Model, build
-from modelica_like.solve.display import Display
-from modelica_like.solve.solution import Solution
-from modelica_like.solve.style import COLOURS, picture, text_width, with_unit
+from modelica_like.style import COLOURS, picture, text_width, with_unit
 from modelica_like.upper import Shown
 
 if TYPE_CHECKING:

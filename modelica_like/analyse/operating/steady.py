@@ -10,12 +10,12 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.initialize import Point, call, holding, initialize
-from modelica_like.initialize.slopes import Sizes, columns_of, nodes_of, slopes
-from modelica_like.initialize.steady import check_modes_hold, solve_steady, steady_change
+from modelica_like.language.units import to_si
+from modelica_like.runs.trajectories import Trajectories
 from modelica_like.simulation import Model, build
-from modelica_like.solve.trajectories import Trajectories
-from modelica_like.units import to_si
+from modelica_like.solve.initialize import Point, call, holding, initialize
+from modelica_like.solve.initialize.slopes import Sizes, columns_of, nodes_of, slopes
+from modelica_like.solve.initialize.steady import check_modes_hold, solve_steady, steady_change
 from modelica_like.upper import Shown
 
 _MAX_NEWTON = 40

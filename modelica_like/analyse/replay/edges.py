@@ -17,9 +17,9 @@ from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
-from modelica_like.initialize import Point, call, holding, share, solve_implicit, variable_slopes
-from modelica_like.initialize.slopes import Sizes, slopes
 from modelica_like.solve.guards import Guards
+from modelica_like.solve.initialize import Point, call, holding, share, solve_implicit, variable_slopes
+from modelica_like.solve.initialize.slopes import Sizes, slopes
 
 _STILL = 1e-7
 """A guard is possibly zero below this share of its largest value, and zero below this share of a parameter's effect."""

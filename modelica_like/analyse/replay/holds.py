@@ -11,9 +11,9 @@ import numpy as np
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import Circuit, CompiledDae
 from modelica_like.flatten.holds import TERMS
-from modelica_like.initialize import Point, variable_slopes
-from modelica_like.initialize.holds import capacities
 from modelica_like.language.holding import UNLIMITED
+from modelica_like.solve.initialize import Point, variable_slopes
+from modelica_like.solve.initialize.holds import capacities
 
 Total = Callable[..., tuple[Vector, Vector]]
 """Value of a function at a point, and its derivatives by (x, theta) before an event; arguments as for `slopes`."""

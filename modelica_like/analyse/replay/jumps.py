@@ -12,8 +12,8 @@ from modelica_like.analyse.replay.holds import impact, projection, share_slopes
 from modelica_like.analyse.replay.when import Coincidence, Trigger, When, at_rest, either_first, event_time
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.initialize import Point, Strike, holding, share, solve_implicit
-from modelica_like.initialize.slopes import Sizes, slopes
+from modelica_like.solve.initialize import Point, Strike, holding, share, solve_implicit
+from modelica_like.solve.initialize.slopes import Sizes, slopes
 from modelica_like.solve.recorder import Event
 
 _SMOOTH = 1e-9

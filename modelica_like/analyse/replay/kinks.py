@@ -13,7 +13,7 @@ import numpy as np
 
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.initialize import Point
+from modelica_like.solve.initialize import Point
 from modelica_like.solve.recorder import Segment
 
 _DIFFERENCES = (ca.OP_LT, ca.OP_LE, ca.OP_FMIN, ca.OP_FMAX)

@@ -10,9 +10,9 @@ import numpy as np
 
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.initialize import Point, StartKind, StartPlan, call, start_plan
-from modelica_like.initialize.slopes import Sizes, slopes
-from modelica_like.initialize.steady import steady_change
+from modelica_like.solve.initialize import Point, StartKind, StartPlan, call, start_plan
+from modelica_like.solve.initialize.slopes import Sizes, slopes
+from modelica_like.solve.initialize.steady import steady_change
 
 _MAX_NEWTON = 50
 

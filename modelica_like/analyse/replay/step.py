@@ -10,7 +10,7 @@ import numpy as np
 from modelica_like.analyse.replay.steps import ABSOLUTE, StepFunctions
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import StepFailed
-from modelica_like.initialize import Point
+from modelica_like.solve.initialize import Point
 
 _ITERATIONS = 12
 _CONVERGED = 1e-2

@@ -17,7 +17,7 @@ from modelica_like.analyse.replay.tableau import radau
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ValueOutOfRange
-from modelica_like.initialize import Point
+from modelica_like.solve.initialize import Point
 
 STAGES = 7
 ABSOLUTE = 1e-2

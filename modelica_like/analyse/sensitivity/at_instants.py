@@ -15,9 +15,9 @@ from modelica_like.analyse.sensitivity.replayed import along
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledTransition
 from modelica_like.errors import NoGradient
-from modelica_like.initialize import Point, share, solve_implicit
-from modelica_like.initialize.slopes import slopes
 from modelica_like.runs.readings import Output
+from modelica_like.solve.initialize import Point, share, solve_implicit
+from modelica_like.solve.initialize.slopes import slopes
 
 _NEAR = 1e-9
 """Time between an event and an instant, relative to the run, up to which it may be rounding of parameters."""

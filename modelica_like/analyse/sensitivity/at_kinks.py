@@ -19,12 +19,12 @@ from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ModelicaLikeError, NoGradient
-from modelica_like.initialize import Point
-from modelica_like.initialize.slopes import slopes
+from modelica_like.options import Options
 from modelica_like.runs.readings import Output, expression_of
+from modelica_like.runs.solution import Solution
 from modelica_like.simulation import quick_run
-from modelica_like.solve.options import Options
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.initialize import Point
+from modelica_like.solve.initialize.slopes import slopes
 
 _STILL = 1e-9
 """Size of an argument, relative to the largest one in the run, below which it is at its kink."""

@@ -20,11 +20,11 @@ from modelica_like.analyse.sensitivity.result import Sensitivities as Sensitivit
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, NoGradient, UnknownName, did_you_mean
-from modelica_like.initialize import StartKind
+from modelica_like.options import Options
 from modelica_like.runs.readings import Output, is_series, listed, quadratures, read_output
+from modelica_like.runs.solution import Solution
 from modelica_like.simulation import Model, quick_run
-from modelica_like.solve.options import Options
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.initialize import StartKind
 
 Method = Literal["auto", "forward", "adjoint"]
 _NOTHING = 1e-9

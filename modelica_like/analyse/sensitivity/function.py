@@ -13,12 +13,12 @@ from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensiti
 from modelica_like.analyse.sensitivity.formulas import free_formulas
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient
-from modelica_like.initialize import StartKind
+from modelica_like.options import Options
 from modelica_like.runs.readings import does_not_happen, is_series, listed, read_output
+from modelica_like.runs.solution import Solution
 from modelica_like.simulation import Model, plan, quick_run
-from modelica_like.solve.options import Options
+from modelica_like.solve.initialize import StartKind
 from modelica_like.solve.recorder import Event
-from modelica_like.solve.solution import Solution
 
 Found = TypeVar("Found")
 

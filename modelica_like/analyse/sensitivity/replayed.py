@@ -14,10 +14,10 @@ from modelica_like.analyse.replay.step import Step, shortened
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange
-from modelica_like.initialize import Point
-from modelica_like.initialize.slopes import Slopes, slopes
 from modelica_like.runs.readings import INTEGRATED, Output, expression_of
-from modelica_like.solve.solution import Solution
+from modelica_like.runs.solution import Solution
+from modelica_like.solve.initialize import Point
+from modelica_like.solve.initialize.slopes import Slopes, slopes
 
 _NEAR = 0.05
 _FLAT = 1e-12

@@ -10,8 +10,8 @@ import numpy as np
 
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import UnknownName, did_you_mean, extra_module
-from modelica_like.solve.style import COLOURS, picture
-from modelica_like.units import Unit
+from modelica_like.language.units import Unit
+from modelica_like.style import COLOURS, picture
 from modelica_like.upper import Shown
 
 if TYPE_CHECKING:

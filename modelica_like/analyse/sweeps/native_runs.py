@@ -12,10 +12,10 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ModelicaLikeError, ValueOutOfRange
+from modelica_like.language.units import ONE
 from modelica_like.native.batch import Batch, Reading
 from modelica_like.runs.readings import Output, Part
 from modelica_like.simulation import plan
-from modelica_like.units import ONE
 
 
 class NativeRuns:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.solve.style import COLOURS, picture, text_width, with_unit
+from modelica_like.style import COLOURS, picture, text_width, with_unit
 
 if TYPE_CHECKING:
     import xarray

@@ -12,8 +12,8 @@ import numpy as np
 from modelica_like.analyse.sweeps.ranges import MOST_RUNS, too_many
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, ValueOutOfRange, extra_module
-from modelica_like.initialize.slopes import columns_of
-from modelica_like.units import Unit, to_si
+from modelica_like.language.units import Unit, to_si
+from modelica_like.solve.initialize.slopes import columns_of
 
 
 @dataclass(frozen=True, eq=False)

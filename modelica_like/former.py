@@ -1,0 +1,40 @@
+"""Modules under names that they had before they were moved."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+
+
+def moved(homes: Mapping[str, str]) -> None:
+    """Let modules be imported by former names, too.
+
+    Args:
+        homes: full name of today by former full name. Modules of a package move along with it.
+    """
+    # First, since the folder of a package would otherwise give its modules again, under the former name.
+    sys.meta_path.insert(0, _Former(homes))
+
+
+class _Former(MetaPathFinder, Loader):
+    def __init__(self, homes: Mapping[str, str]) -> None:
+        self.homes = homes
+        self.tops = {name.partition(".")[0] for name in homes}
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        return ModuleSpec(fullname, self) if self._home(fullname) else None
+
+    def exec_module(self, module: ModuleType) -> None:
+        sys.modules[module.__name__] = import_module(self._home(module.__name__))
+
+    def _home(self, name: str) -> str:
+        if name.partition(".")[0] not in self.tops:
+            return ""
+        package = next((one for one in self.homes if name == one or name.startswith(f"{one}.")), None)
+        return f"{self.homes[package]}{name[len(package) :]}" if package else ""

@@ -1,0 +1,349 @@
+"""From an instance of a Modelica class to a component with its parts."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from modelica_like.errors import ModelicaLikeError, ModelicaTextError, Source, UnitError, raise_together_or_one
+from modelica_like.language import (
+    Assembly,
+    Component,
+    Connector,
+    boolean,
+    discrete,
+    flow,
+    guess,
+    integer,
+    param,
+    signal_in,
+    signal_out,
+    var,
+)
+from modelica_like.language.fields import Discrete, Field, Input
+from modelica_like.language.units import parse_unit, same_dimension
+from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
+from modelica_like.netlist.modelica.known import library_part
+from modelica_like.netlist.modelica.library import Known, connector_type
+from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
+from modelica_like.netlist.modelica.resolve import Resolver
+from modelica_like.netlist.modelica.statements import Statements
+from modelica_like.netlist.modelica.types import Basic, basic_type
+from modelica_like.netlist.modelica.wiring import groups
+from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConnector, as_formula, written_class
+
+
+@dataclass
+class Notes:
+    """What a reader should know: values that were taken, units that were left out."""
+
+    told: list[str] = field(default_factory=list)
+    display: dict[str, str] = field(default_factory=dict)
+
+    def tell(self, sentence: str) -> None:
+        """Keep a sentence, once."""
+        if sentence not in self.told:
+            self.told.append(sentence)
+
+
+def build_component(instance: Instance, notes: Notes) -> Written:
+    """Return the component of an instance, with its parts.
+
+    Args:
+        instance: of a class with its modifications.
+        notes: collects remarks.
+
+    Raises:
+        ModelicaTextError: something is not supported; several errors come as `WiringErrors`.
+    """
+    return _Builder(instance, notes).run()
+
+
+class _Builder:
+    def __init__(self, instance: Instance, notes: Notes) -> None:
+        self.instance, self.notes = instance, notes
+        self.statements = Statements(instance)
+        self.errors: list[ModelicaLikeError] = []
+        self.absent: set[str] = set()
+
+    def run(self) -> Written:
+        self._attempt(Source(""), self.statements.read)
+        if self.errors:
+            raise raise_together_or_one(self.errors)
+        text = self.instance.text
+        kind: Any = written_class(text.name)
+        component: Written = kind(text.name, description=text.description)
+        self.component = component
+        self.wires = groups(self.statements.connections, self.instance)
+        for name, member in self.instance.members.items():
+            place = member.text.place(member.declaration.line)
+            Assembly.place(component, f"parts.{name}", place)
+            Assembly.place(component, f"parameters.{name}", place)
+            self._attempt(place, self._member, name, member)
+        if self.errors:
+            raise raise_together_or_one(self.errors)
+        self._equations()
+        component.__dict__.update(_simulate={}, _display={}, _class=text.path)
+        self._connect()
+        if self.errors:
+            raise raise_together_or_one(self.errors)
+        return component
+
+    def _attempt(self, place: Source, action: Any, *arguments: Any) -> None:
+        """Collect an error, with the place of its declaration."""
+        try:
+            action(*arguments)
+        except ModelicaLikeError as error:
+            if not any(one.file.endswith(".mo") for one in error.where):
+                error.where = (place,) if place.file else error.where
+            self.errors.append(error)
+            if self.instance.classes.spent:
+                raise
+
+    # -- members -----------------------------------------------------------------------------------------------------
+
+    def _member(self, name: str, member: Member) -> None:
+        if not exists(self.instance, member):
+            self.absent.add(name)
+            return
+        basic = basic_type(self.instance, member)
+        if basic is not None:
+            self._basic(name, member, basic)
+            return
+        shape = sizes(self.instance, member)
+        if len(shape) > 1:
+            raise refused(f"{name}, an array with several dimensions,", member.text, member.declaration.line)
+        if not shape:
+            part = part_of(self.instance, member)
+            setattr(self.component, name, self._part(name, member, part, member.given))
+            return
+        made = [
+            self._part(f"{name}[{k}]", member, part_of(self.instance, member, k), element(member.given, k))
+            for k in range(1, shape[0] + 1)
+        ]
+        if made and isinstance(made[0], Connector):
+            for k, one in enumerate(made, 1):
+                setattr(self.component, f"{name}[{k}]", one)
+        else:
+            setattr(self.component, name, made)
+
+    def _part(self, name: str, member: Member, part: Instance | Known | str, given: Given) -> Component | Connector:
+        self.instance.classes.spend(50, member.text, member.declaration.line)
+        if isinstance(part, Known):
+            driven = {
+                end.rpartition(".")[2] for wire in self.wires for end in wire.ends if end.rpartition(".")[0] == name
+            }
+            return library_part(self.instance, name, member, part, given, driven, self.notes, self.statements.initial)
+        if isinstance(part, str):
+            kind = connector_type(part)
+            if kind is None:
+                raise refused(f"{part} as a component", member.text, member.declaration.line)
+            return kind(member.declaration.description, free=True)
+        if part.text.kind == "connector":
+            return _connector(part)
+        return _Builder(part, self.notes).run()
+
+    def _basic(self, name: str, member: Member, basic: Basic) -> None:
+        declared = member.declaration
+        if "constant" in declared.prefixes or basic.kind in ("String", "enumeration", "StateSelect"):
+            return
+        if "parameter" in declared.prefixes:
+            if basic.kind == "Real" and not declared.dimensions:
+                self._parameter(name, member, basic)
+            return
+        for path, index in _elements(name, sizes(self.instance, member)):
+            given = element(basic.given, index) if index else basic.given
+            self._variable(path, name, member, Basic(basic.kind, given, basic.prefixes))
+
+    def _parameter(self, name: str, member: Member, basic: Basic) -> None:
+        given = member.given
+        if given.value is None and "start" in given.inner and given.inner["start"].value is not None:
+            given = given.inner["start"]
+            self.notes.tell(f"{self._label(name)} has no value; its start value is taken.")
+        low, high = (self._number(basic.given.inner.get(one)) for one in ("min", "max"))
+        fixed = self._known(basic.given.inner.get("fixed")) is not False
+        made = param(self._unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
+        outside = given.scope is not None and given.scope[0] is not self.instance
+        if given.value is not None and not outside:
+            made.default = self._value(given, self.instance, "")
+        self.component._declare(name, made)
+        if given.value is not None and outside:
+            self.component.give(name, self._value(given, self.instance.owner, ""))
+
+    def _value(self, given: Given, reader: Instance | None, prefix: str) -> Any:
+        """Return a value as a number or a formula, read among the names of `reader`."""
+        assert given.value is not None
+        assert given.scope is not None
+        node = Resolver(*given.scope)(given.value)
+        known = as_formula(node, prefix) if given.scope[0] is reader else None
+        if known is None:
+            numbers = Resolver(*given.scope, numeric=True)(given.value)
+            if numbers.kind != "number":
+                raise refused("this value", given.scope[1], given.value.line)
+            if node.kind != "number":
+                self.notes.tell(
+                    f"Line {given.value.line}: the formula is a number now, because a formula cannot have all of it."
+                )
+            return numbers.args[0]
+        return known
+
+    def _variable(self, path: str, name: str, member: Member, basic: Basic) -> None:
+        description = member.declaration.description
+        field_made: Field
+        signal = bool(basic.prefixes & {"input", "output"}) and (
+            not {"input", "output"} & member.declaration.prefixes or member.text.kind == "block"
+        )
+        if basic.kind == "Boolean" and not signal:
+            field_made = boolean(description)
+        elif basic.kind == "Integer" and not signal:
+            field_made = integer(description)
+        elif path in self.statements.assigned or "discrete" in basic.prefixes:
+            field_made = discrete(self._unit(basic), description, start=0.0)
+        elif "input" in basic.prefixes and signal:
+            field_made = signal_in(self._unit(basic), description)
+        elif "output" in basic.prefixes and signal:
+            field_made = signal_out(self._unit(basic), description)
+        else:
+            nominal = self._number(basic.given.inner.get("nominal"))
+            field_made = var(self._unit(basic), description, state=self._preference(basic), nominal=nominal or 1.0)
+        if path in self.statements.outputs:
+            memory = boolean(description)
+            self.component._declare(f"{path}{MEMORY}", memory)
+            self._start(path, basic, memory)
+        self.component._declare(path, field_made)
+        self._display(path, basic)
+        self._start(path, basic, field_made)
+
+    def _start(self, path: str, basic: Basic, made: Field) -> None:
+        """Give the start value; it is fixed, or a first guess."""
+        prefix = f"{self.instance.name}." if self.instance.owner is not None else ""
+        given = basic.given.inner.get("start")
+        fixed = self._known(basic.given.inner.get("fixed")) is True
+        if isinstance(made, Discrete):
+            before = self.statements.memory.get(path)
+            known = (
+                self._known(given)
+                if before is None
+                else Resolver(self.instance, self.instance.text).known()(before).args[0]
+            )
+            made.default = float(known) if isinstance(known, bool | int | float) else 0.0
+            return
+        if isinstance(made, Input) or basic.kind == "Boolean" or (given is None and not fixed):
+            return
+        outside = given is not None and given.scope is not None and given.scope[0] is not self.instance
+        value = (
+            0.0
+            if given is None or given.value is None
+            else self._value(given, self.instance.owner if outside else self.instance, "" if outside else prefix)
+        )
+        if fixed:
+            self.component.give(path, value)
+        elif not outside and path in self.statements.states:
+            made.default = (
+                self._value(given, self.instance, "") if given is not None and given.value is not None else value
+            )
+        elif value != 0.0:
+            self.component.give(path, guess(value))
+
+    def _known(self, given: Given | None) -> Any:
+        if given is None or given.value is None or given.scope is None:
+            return None
+        value = Resolver(*given.scope, numeric=True)(given.value)
+        return value.args[0] if value.args else None
+
+    def _number(self, given: Given | None) -> float | None:
+        value = self._known(given)
+        return value if isinstance(value, float) and abs(value) < 1e50 else None
+
+    def _unit(self, basic: Basic) -> str:
+        """Return the unit; one that is not coherent is left out, because Modelica converts nothing."""
+        unit = self._known(basic.given.inner.get("unit"))
+        try:
+            read = parse_unit(str(unit or "1"))
+        except UnitError:
+            self.notes.tell(f"The unit '{unit}' is not known here and is left out.")
+            return "1"
+        if (read.factor, read.offset) == (1.0, 0.0):
+            return str(read)
+        self.notes.tell(f"The unit '{unit}' is left out: numbers of the text stay as they are.")
+        return "1"
+
+    def _preference(self, basic: Basic) -> Any:
+        wanted = self._known(basic.given.inner.get("stateSelect"))
+        return {"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}.get(wanted, "default")
+
+    def _display(self, path: str, basic: Basic) -> None:
+        unit = str(self._known(basic.given.inner.get("displayUnit")) or "")
+        with suppress(UnitError):  # it is only shown
+            if unit and same_dimension(parse_unit(unit), parse_unit(self._unit(basic))):
+                self.notes.display[f"{self.instance.path}.{path}".lstrip(".")] = unit
+
+    def _label(self, name: str) -> str:
+        return f"{self.instance.path}.{name}".lstrip(".")
+
+    # -- equations and connections -----------------------------------------------------------------------------------
+
+    def _equations(self) -> None:
+        self.component.__dict__.update(
+            _statements=tuple(self.statements.equations), _initial=tuple(self.statements.initial),
+            _happenings=tuple(self.statements.happenings),
+            _instants=frozenset(name for name, instant in self.statements.outputs.items() if instant),
+        )  # fmt: skip
+
+    def _connect(self) -> None:
+        component = self.component
+        joined: set[str] = set()
+        wires: dict[str, tuple[str, ...]] = {}
+        for one in self.wires:
+            ends = tuple(end for end in one.ends if end.partition(".")[0].partition("[")[0] not in self.absent)
+            if len(ends) < 2:
+                continue
+            key = f"wire_{len(wires) + 1}"
+            wires[key] = ends
+            joined.update(ends)
+            Assembly.place(component, f"connect.{key}", one.source)
+            self._attempt(one.source, self._check_ends, ends)
+        component.__dict__["_wires"] = wires
+        component.__dict__["_free"] = tuple(
+            f"{name}.{end}"
+            for name, part in component.parts.items()
+            for end, connector in part.connectors.items()
+            if not connector.may_be_free and f"{name}.{end}" not in joined
+        )
+
+    def _check_ends(self, ends: tuple[str, ...]) -> None:
+        found = [self.component._resolve(end) for end in ends]
+        kinds = {tuple(one.fields) for one in found if isinstance(one, WrittenConnector)}
+        if len(kinds) > 1:
+            raise ModelicaTextError(f"The connectors {', '.join(ends)} differ.")
+        for end, one in zip(ends, found, strict=True):
+            if not isinstance(one, Connector) and one.name in getattr(one.owner, "_instants", ()):
+                raise ModelicaTextError(
+                    f"{end} is true for instants only, which a connection does not carry here.",
+                    advice="Write the 'when' in the class of the sample, or name the variable: when block.y then.",
+                )
+
+
+def _elements(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:
+    """Return the names of an array's elements with their index, or the name itself with zero."""
+    if not shape:
+        return [(name, 0)]
+    if len(shape) == 1:
+        return [(f"{name}[{k}]", k) for k in range(1, shape[0] + 1)]
+    return [(f"{name}[{k},{m}]", 0) for k in range(1, shape[0] + 1) for m in range(1, shape[1] + 1)]
+
+
+def _connector(instance: Instance) -> WrittenConnector:
+    made = WrittenConnector(instance.text.description, free=True)
+    for name, member in instance.members.items():
+        basic = basic_type(instance, member)
+        if basic is None or basic.kind != "Real" or member.declaration.dimensions:
+            raise refused(f"{name} in a connector", member.text, member.declaration.line)
+        builder = _Builder(instance, Notes())
+        unit = builder._unit(basic)
+        one = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
+        one.owner, one.name = instance.text.name, name
+        made.__dict__["_own_fields"] = {**made._own_fields, name: one}
+    made.__dict__["kind"] = instance.text.path
+    return made

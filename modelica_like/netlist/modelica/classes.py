@@ -1,0 +1,197 @@
+"""Finding classes by name: in the file, in the package around it, in the standard library's table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from modelica_like.errors import ModelicaTextError
+from modelica_like.netlist.document import read_text
+from modelica_like.netlist.modelica.library import Known, built_in, known_classes, table
+from modelica_like.netlist.modelica.parse import parse_modelica
+from modelica_like.netlist.modelica.tree import ClassText, Extends, Import
+
+BASIC = ("Real", "Integer", "Boolean", "String", "StateSelect")
+_SI = ("SI", "SIunits")
+_RENAMED = (
+    ("Modelica.SIunits.Conversions.NonSIunits", "Modelica.Units.NonSI"),
+    ("Modelica.SIunits.Conversions", "Modelica.Units.Conversions"),
+    ("Modelica.SIunits", "Modelica.Units.SI"),
+)
+_MOST_STEPS = 1_000_000
+"""Of about 10 microseconds; 10,000 parts of own classes, or 100,000 equations."""
+Found = ClassText | Known | str
+"""A class with its text, one with a component, or the name of a basic type or a connector of the standard library."""
+
+
+class Classes:
+    """The classes that a file can name.
+
+    Args:
+        file: a `.mo` file; its package's other files are found beside it, by its `within`.
+
+    Raises:
+        NetlistError: the file cannot be read.
+        ModelicaTextError: it is not Modelica.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self.own = parse_modelica(read_text(file), str(file))
+        within = self.own[0].within.split(".") if self.own[0].within else []
+        # package.mo is the class of its folder.
+        above = len(within) + (file.name == "package.mo")
+        self.folder = file.resolve().parents[above] if above < len(file.resolve().parents) and within else None
+        self.read: dict[Path, list[ClassText]] = {}
+        self.open: set[tuple[int, str]] = set()
+        self.found: dict[tuple[int, str], Found | None] = {}
+        self.steps = 0
+
+    def chosen(self, name: str = "") -> ClassText:
+        """Return the class to read: the one of this name, or the last model of the file.
+
+        Raises:
+            ModelicaTextError: there is none.
+        """
+        every = [inner for one in self.own for inner in one.walk()]
+        models = [one for one in every if one.kind in ("model", "block", "class") and not one.partial]
+        outermost = [one for one in models if one.owner is None] or models
+        found = [one for one in every if one.path == name or one.name == name] if name else outermost[-1:]
+        elsewhere = self.full(name) if name and not found else None
+        if isinstance(elsewhere, ClassText):
+            return elsewhere
+        if not found:
+            names = ", ".join(one.name for one in models) or "none"
+            what = f"no class '{name}'" if name else "no model"
+            raise ModelicaTextError(f"'{self.file.name}' has {what}. Its models: {names}.", where=self.own[0].place(1))
+        return found[0]
+
+    @property
+    def spent(self) -> bool:
+        """Whether reading has taken all the steps it may."""
+        return self.steps > _MOST_STEPS
+
+    def spend(self, steps: int, text: ClassText, line: int) -> None:
+        """Count what reading takes: 10 for a statement, 50 for a part, 5 for a step of an algorithm.
+
+        Raises:
+            ModelicaTextError: loops, arrays or classes within classes make too many of them.
+        """
+        self.steps += steps
+        if self.spent:
+            raise ModelicaTextError(
+                f"The text has too many parts and equations: reading it takes more than {_MOST_STEPS} steps.",
+                where=text.place(line),
+                advice="Look for loops and arrays that are longer than meant, and for classes that contain each other.",
+            )
+
+    def find(self, name: str, scope: ClassText) -> Found | None:
+        """Return the class that a name means inside a class."""
+        if name in BASIC:
+            return name
+        key = id(scope), name
+        if key not in self.found:
+            self.found[key] = self._found(name, scope)
+        return self.found[key]
+
+    def _found(self, name: str, scope: ClassText) -> Found | None:
+        head, _, rest = name.partition(".")
+        if not head:
+            return self.full(rest)
+        level: ClassText | None = scope
+        outermost = scope
+        while level is not None:
+            found = self._inside(level, name) or self._imported(level, head, rest) or _tabled(f"{level.path}.{name}")
+            if found is not None:
+                return found
+            outermost, level = level, level.owner
+        package = outermost.within
+        while package:
+            found = self.full(f"{package}.{name}")
+            if found is not None:
+                return found
+            package = package.rpartition(".")[0]
+        return self.full(f"Modelica.Units.SI.{rest}" if head in _SI else name)
+
+    def _imported(self, level: ClassText, head: str, rest: str) -> Found | None:
+        after = f".{rest}" if rest else ""
+        for one in level.elements:
+            if not isinstance(one, Import):
+                continue
+            if not one.names and one.alias == head:
+                return self.full(one.path + after)
+            if head in one.names or "*" in one.names:
+                found = self.full(f"{one.path}.{head}{after}")
+                if found is not None:
+                    return found
+        return None
+
+    def _inside(self, level: ClassText, name: str) -> Found | None:
+        """Return a class declared or inherited in a class."""
+        head, _, rest = name.partition(".")
+        if head in level.classes:
+            inner = level.classes[head]
+            return self._inside(inner, rest) if rest else inner
+        key = id(level), head
+        if key in self.open:  # a base is looked up among what its own class inherits
+            return None
+        self.open.add(key)
+        try:
+            return self._inherited(level, name)
+        finally:
+            self.open.remove(key)
+
+    def _inherited(self, level: ClassText, name: str) -> Found | None:
+        bases = [one for one in level.elements if isinstance(one, Extends)] + ([level.short] if level.short else [])
+        for one in bases:
+            base = self.find(one.base, level)
+            if isinstance(base, ClassText) and base is not level:
+                found = self._inside(base, name)
+                if found is not None:
+                    return found
+        return None
+
+    def full(self, path: str) -> Found | None:
+        """Return a class by its full name; units of version 3 of the standard library have the names of version 4."""
+        for old, new in _RENAMED:
+            if path == old or path.startswith(f"{old}."):
+                path = f"{new}{path[len(old) :]}"
+        for one in self.own:
+            if path == one.path:
+                return one
+            if path.startswith(f"{one.path}."):
+                return self._inside(one, path[len(one.path) + 1 :])
+        if path in BASIC or _tabled(path):
+            return _tabled(path) or path
+        head, _, rest = path.partition(".")
+        built = built_in().get(head)
+        found = self._inside(built, rest) if built is not None and rest else None
+        return found if found is not None else self._on_disk(path)
+
+    def _on_disk(self, path: str) -> ClassText | Known | str | None:
+        """Return a class of the package that the file belongs to."""
+        if self.folder is None:
+            return None
+        names, place = path.split("."), self.folder
+        for k, name in enumerate(names):
+            for file in (place / f"{name}.mo", place / name / "package.mo"):
+                if file.is_file():
+                    found = self._of_file(file, name)
+                    if found is not None and k + 1 == len(names):
+                        return found
+                    inner = self._inside(found, ".".join(names[k + 1 :])) if found is not None else None
+                    if inner is not None:
+                        return inner
+            place = place / name
+        return None
+
+    def _of_file(self, file: Path, name: str) -> ClassText | None:
+        if file.resolve() == self.file.resolve():
+            return next((one for one in self.own if one.name == name), None)
+        if file not in self.read:
+            self.read[file] = parse_modelica(read_text(file), str(file))
+        return next((one for one in self.read[file] if one.name == name), None)
+
+
+def _tabled(path: str) -> Known | str | None:
+    """Return a class of the standard library that a component or a connector stands for."""
+    return known_classes().get(path) or (path if path in table()["connectors"] else None)

@@ -1,0 +1,163 @@
+"""Arithmetic of resolved expressions: numbers are computed, arrays taken apart."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from modelica_like.netlist.modelica.tree import Expr, joined
+
+_BINARY: dict[str, Callable[[float, float], float]] = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "^": operator.pow,
+}  # fmt: skip
+_RELATIONS: dict[str, Callable[[Any, Any], bool]] = {
+    "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq, "<>": operator.ne,
+}  # fmt: skip
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **{name: getattr(math, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")},
+    **{name: getattr(math, name) for name in ("tanh", "exp", "log", "log10", "sqrt", "floor", "ceil")},
+    "abs": abs, "sign": lambda x: float((x > 0) - (x < 0)), "integer": math.floor, "min": min, "max": max,
+    "mod": lambda x, y: x - math.floor(x / y) * y, "div": lambda x, y: float(math.trunc(x / y)), "rem": math.fmod,
+}  # fmt: skip
+KNOWN = ("number", "boolean", "literal", "string")
+
+
+LONGEST = 100_000
+"""Elements of an array, and steps of an algorithm."""
+
+
+class Unfit(ValueError):
+    """Operands do not fit, in words."""
+
+
+def known(expression: Expr) -> Expr:
+    """Return the value of an expression without names."""
+    args = tuple(known(one) if isinstance(one, Expr) else one for one in expression.args)
+    if expression.kind == "if":
+        taken = (value for condition, value in zip(args[:-1:2], args[1::2], strict=True) if condition.args[0])
+        return next(taken, args[-1])
+    return expression if expression.kind in KNOWN else operation(expression.kind, args, expression.line)
+
+
+def number(value: float, line: int = 0) -> Expr:
+    """Return a number as an expression."""
+    return Expr("number", (float(value),), line)
+
+
+def count(number: float) -> int:
+    """Return the size of an array.
+
+    Raises:
+        Unfit: it is no whole number, negative, or too large.
+    """
+    if not (0 <= number <= LONGEST and number == int(number)):
+        raise Unfit(f"An array cannot have {number:g} elements: it has 0 to {LONGEST}")
+    return int(number)
+
+
+def row(start: float, step: float, stop: float, line: int) -> Expr:
+    """Return the numbers of a range.
+
+    Raises:
+        Unfit: the step is zero, or there are too many.
+    """
+    if step == 0:
+        raise Unfit(f"The range {start:g}:0:{stop:g} has a step of 0")
+    length = count(max(0.0, math.floor((stop - start) / step + 1e-9) + 1.0))  # rounding of a stop that is met
+    return Expr("array", tuple(number(start + k * step, line) for k in range(length)), line)
+
+
+def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
+    """Return an operation; known values are computed, arrays element by element.
+
+    Raises:
+        Unfit: sizes of arrays differ, or numbers have no result.
+    """
+    if kind == "array":
+        return Expr("array", args, line)
+    if any(one.kind == "array" for one in args):
+        return _of_arrays(kind, args, line)
+    if kind == "neg":
+        return number(-args[0].args[0], line) if args[0].kind == "number" else Expr("neg", args, line)
+    if kind == "not":
+        return Expr("boolean", (not args[0].args[0],), line) if args[0].kind == "boolean" else Expr("not", args, line)
+    if kind in ("and", "or"):
+        return _joined(kind, args, line)
+    if kind in _RELATIONS and all(one.kind in KNOWN for one in args):
+        return Expr("boolean", (_RELATIONS[kind](args[0].args[0], args[1].args[0]),), line)
+    if kind in _BINARY and all(one.kind == "number" for one in args):
+        return _computed(_BINARY[kind], args, line)
+    if kind == "+" and all(one.kind == "string" for one in args):
+        return Expr("string", (args[0].args[0] + args[1].args[0],), line)
+    return Expr(kind, args, line)
+
+
+def _computed(function: Callable[..., float], args: tuple[Expr, ...], line: int) -> Expr:
+    values = [one.args[0] for one in args]
+    try:
+        result = function(*values)
+    except (ArithmeticError, ValueError):
+        result = math.nan
+    if isinstance(result, complex) or not math.isfinite(result):
+        raise Unfit(f"A formula of {', '.join(f'{value:g}' for value in values)} has no value")
+    return number(result, line)
+
+
+def _joined(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
+    decides = kind == "or"
+    if any(one.kind == "boolean" and one.args[0] is decides for one in args):
+        return Expr("boolean", (decides,), line)
+    left = [one for one in args if one.kind != "boolean"]
+    if not left:
+        return Expr("boolean", (not decides,), line)
+    return left[0] if len(left) == 1 else Expr(kind, args, line)
+
+
+def _of_arrays(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
+    if kind == "*" and all(one.kind == "array" for one in args):
+        return _product(args[0], args[1], line)
+    length = next(len(one.args) for one in args if one.kind == "array")
+    if any(one.kind == "array" and len(one.args) != length for one in args):
+        raise Unfit("The sizes of two arrays differ")
+    rows = (tuple(one.args[k] if one.kind == "array" else one for one in args) for k in range(length))
+    return Expr("array", tuple(operation(kind, row, line) for row in rows), line)
+
+
+def _product(left: Expr, right: Expr, line: int) -> Expr:
+    if left.args and left.args[0].kind == "array":
+        return Expr("array", tuple(_product(row, right, line) for row in left.args), line)
+    if right.args and right.args[0].kind == "array":
+        columns = (Expr("array", column, line) for column in zip(*(row.args for row in right.args), strict=True))
+        return Expr("array", tuple(_product(left, column, line) for column in columns), line)
+    if len(left.args) != len(right.args):
+        raise Unfit("The sizes of two arrays differ")
+    return total([operation("*", pair, line) for pair in zip(left.args, right.args, strict=True)], line)
+
+
+def total(items: list[Expr], line: int) -> Expr:
+    """Return the sum of expressions."""
+    return joined(lambda one, other: operation("+", (one, other), line), items) if items else number(0, line)
+
+
+def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
+    """Return an elementary function; of an array element by element, but `min` and `max` of all.
+
+    Raises:
+        Unfit: it has no value, or the number of arguments is wrong.
+    """
+    if name in ("min", "max") and len(args) == 1 and args[0].kind == "array":
+        if not args[0].args:
+            raise Unfit(f"{name} of an array without elements has no value")
+        return joined(lambda one, other: function(name, (one, other), line), list(args[0].args))
+    wanted = 2 if name in ("atan2", "mod", "rem", "div", "min", "max") else 1
+    if len(args) != wanted:
+        raise Unfit(f"{name} has {wanted} argument{'s' if wanted > 1 else ''}, not {len(args)}")
+    if any(one.kind == "array" for one in args):
+        length = next(len(one.args) for one in args if one.kind == "array")
+        rows = (tuple(one.args[k] if one.kind == "array" else one for one in args) for k in range(length))
+        return Expr("array", tuple(function(name, row, line) for row in rows), line)
+    if all(one.kind == "number" for one in args):
+        return _computed(_FUNCTIONS[name], args, line)
+    return Expr("call", (name, args, ()), line)

@@ -1,0 +1,209 @@
+"""Functions of Modelica text: the user's are inlined, those of arrays computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.instance import Given, Instance, refused
+from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Statement
+
+if TYPE_CHECKING:
+    from modelica_like.netlist.modelica.resolve import Resolver
+
+_DEEPEST = 30
+
+
+def _filled(value: Expr, shape: tuple[Expr, ...], line: int) -> Expr:
+    for one in reversed(shape):
+        if one.kind != "number":
+            raise fold.Unfit("The size of an array must be known")
+        value = Expr("array", (value,) * fold.count(one.args[0]), line)
+    return value
+
+
+def _line(args: tuple[Expr, ...], line: int) -> Expr:
+    if len(args) != 3 or any(one.kind != "number" for one in args):
+        raise fold.Unfit("linspace needs three known numbers")
+    start, stop, count = (one.args[0] for one in args)
+    return Expr(
+        "array",
+        tuple(fold.number(start + (stop - start) * k / max(count - 1, 1), line) for k in range(fold.count(count))),
+        line,
+    )
+
+
+def _product(args: tuple[Expr, ...], line: int) -> Expr:
+    made = fold.number(1, line)
+    for one in args[0].args:
+        made = fold.operation("*", (made, one), line)
+    return made
+
+
+def _identity(args: tuple[Expr, ...], line: int) -> Expr:
+    size = int(args[0].args[0])
+    rows = (tuple(fold.number(row == column, line) for column in range(size)) for row in range(size))
+    return Expr("array", tuple(Expr("array", row, line) for row in rows), line)
+
+
+OF_ARRAYS: dict[str, Callable[[tuple[Expr, ...], int], Expr]] = {
+    "sum": lambda args, line: fold.total(list(args[0].args), line),
+    "product": _product,
+    "fill": lambda args, line: _filled(args[0], args[1:], line),
+    "zeros": lambda args, line: _filled(fold.number(0, line), args, line),
+    "ones": lambda args, line: _filled(fold.number(1, line), args, line),
+    "identity": _identity,
+    "linspace": _line,
+    "vector": lambda args, line: args[0],
+    "scalar": lambda args, line: args[0].args[0],
+    "transpose": lambda args, line: Expr(
+        "array", tuple(Expr("array", c, line) for c in zip(*(row.args for row in args[0].args), strict=True)), line
+    ),
+}
+"""Functions whose arguments or results are arrays."""
+
+
+def size(items: Expr, dimension: int, line: int) -> Expr:
+    """Return the size of an array in one dimension, or in all as an array."""
+    made: list[Expr] = []
+    while items.kind == "array":
+        made.append(fold.number(len(items.args), line))
+        items = items.args[0] if items.args else fold.number(0)
+    return made[dimension - 1] if 0 < dimension <= len(made) else Expr("array", tuple(made), line)
+
+
+def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named: Mapping[str, Expr]) -> Expr:
+    """Return the result of a user's function, with its algorithm inlined.
+
+    Args:
+        resolver: of the place of the call.
+        expression: the call.
+        given: arguments by position.
+        named: arguments by name.
+
+    Raises:
+        ModelicaTextError: there is no such function, or it uses what is not supported.
+    """
+    name, line = expression.args[0], expression.line
+    text = resolver.find(name)
+    if name == "Integer":
+        return given[0]
+    if not isinstance(text, ClassText) or text.kind not in ("function", "record"):
+        raise refused(f"the function {name}", resolver.text, line, "Own functions with an algorithm are read.")
+    if text.kind == "record":
+        raise refused(f"the record {name}(…) as a value", resolver.text, line)
+    if resolver.depth > _DEEPEST:
+        raise refused(f"{name}, which calls itself,", resolver.text, line)
+    made = _Call(resolver, text).result(given, named, line)
+    known = made.kind in (*fold.KNOWN, "array")
+    return made if known else Expr("call", ("noEvent", (made,), ()), line)
+
+
+class _Call:
+    def __init__(self, resolver: Resolver, text: ClassText) -> None:
+        self.resolver, self.text = resolver, text
+        members = Instance(resolver.classes, text, Given()).members
+        self.declared = {name: one.declaration for name, one in members.items()}
+        self.local: dict[str, Expr] = {}
+
+    def result(self, given: tuple[Expr, ...], named: Mapping[str, Expr], line: int) -> Expr:
+        inputs = [name for name, one in self.declared.items() if "input" in one.prefixes]
+        outputs = [name for name, one in self.declared.items() if "output" in one.prefixes]
+        if len(outputs) != 1:
+            raise refused(f"{self.text.name}, a function with {len(outputs)} results,", self.text, self.text.line)
+        self.local.update(zip(inputs, given, strict=False))
+        self.local.update(named)
+        if len(given) > len(inputs) or any(name not in inputs for name in named):
+            raise refused(f"these arguments of {self.text.name}", self.resolver.text, line)
+        for name, one in self.declared.items():
+            if name not in self.local:
+                self.local[name] = self._start(name, one, line)
+        self.run(self.text.algorithm)
+        return self.local[outputs[0]]
+
+    def _start(self, name: str, one: Declaration, line: int) -> Expr:
+        value = one.modification.value
+        if value is not None:
+            return self.here()(value)
+        if "input" in one.prefixes:
+            raise refused(f"{self.text.name} without its argument {name}", self.resolver.text, line)
+        shape = tuple(self.here()(dimension) for dimension in one.dimensions if dimension.kind != "all")
+        return _filled(fold.number(0, line), shape, line)
+
+    def here(self) -> Resolver:
+        kind = type(self.resolver)
+        return kind(None, self.text, self.local, classes=self.resolver.classes, depth=self.resolver.depth + 1)
+
+    def run(self, statements: list[Statement]) -> None:
+        for one in statements:
+            self.resolver.classes.spend(5, self.text, one.line)
+            if one.kind == ":=":
+                self.assign(one.parts[0], self.here()(one.parts[1]))
+            elif one.kind == "if":
+                self.branch(list(one.parts), one.line)
+            elif one.kind == "for":
+                self.loop(list(one.parts[0]), one.parts[1])
+            elif one.kind == "while":
+                while self.here()(one.parts[0]) == Expr("boolean", (True,), one.parts[0].line):
+                    self.resolver.classes.spend(5, self.text, one.line)
+                    self.run(one.parts[1])
+            elif one.kind != "call" or one.parts[0].args[0] not in ("assert", "Modelica.Utilities.Streams.print"):
+                raise refused(f"'{one.kind}' in a function", self.text, one.line)
+
+    def assign(self, target: Expr, value: Expr) -> None:
+        if target.kind != "name" or len(target.args) != 1 or target.args[0][0] not in self.local:
+            raise refused("this target of an assignment", self.text, target.line)
+        name, subscripts = target.args[0]
+        places = [int(self.here().number(one)) - 1 for one in subscripts]
+        self.local[name] = _replaced(self.local[name], places, value)
+
+    def branch(self, branches: list[tuple[Expr | None, list[Statement]]], line: int) -> None:
+        """Run the branch that is taken; where that is not known, all of them."""
+        if not branches:
+            return
+        condition, statements = branches[0]
+        known = Expr("boolean", (True,)) if condition is None else self.here()(condition)
+        if known.kind == "boolean":
+            if known.args[0]:
+                self.run(statements)
+            else:
+                self.branch(branches[1:], line)
+            return
+        before = dict(self.local)
+        self.run(statements)
+        taken, self.local = self.local, before
+        self.branch(branches[1:], line)
+        for name, other in self.local.items():
+            if taken[name] != other:
+                self.local[name] = _either(known, taken[name], other, line)
+
+    def loop(self, iterators: list[tuple[str, Expr | None]], statements: list[Statement]) -> None:
+        (name, over), rest = iterators[0], iterators[1:]
+        if over is None:
+            raise refused("an iterator without a range", self.text, self.text.line)
+        for value in self.here().array(over):
+            self.local[name] = value
+            if rest:
+                self.loop(rest, statements)
+            else:
+                self.run(statements)
+        self.local.pop(name, None)
+
+
+def _replaced(whole: Expr, places: list[int], value: Expr) -> Expr:
+    if not places:
+        return value
+    items = list(whole.args)
+    while len(items) <= places[0]:  # an output of open size grows
+        items.append(fold.number(0))
+    items[places[0]] = _replaced(items[places[0]], places[1:], value)
+    return Expr("array", tuple(items), whole.line)
+
+
+def _either(condition: Expr, one: Expr, other: Expr, line: int) -> Expr:
+    if one.kind == "array" and other.kind == "array":
+        return Expr(
+            "array", tuple(_either(condition, a, b, line) for a, b in zip(one.args, other.args, strict=True)), line
+        )
+    return Expr("if", (condition, one, other), line)

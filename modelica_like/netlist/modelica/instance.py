@@ -1,0 +1,183 @@
+"""Instances: the members of a class with its bases, and the modifications that reach them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from modelica_like.errors import ModelicaTextError
+from modelica_like.netlist.modelica.classes import Classes, Found
+from modelica_like.netlist.modelica.library import Known
+from modelica_like.netlist.modelica.tree import (
+    ClassText,
+    Declaration,
+    Expr,
+    Extends,
+    Import,
+    Modification,
+    Statement,
+)
+
+_DEEPEST = 40
+
+
+@dataclass(slots=True)
+class Given:
+    """A modification, and where its names mean something.
+
+    Attributes:
+        value: behind the equals sign.
+        scope: instance and class text in which the value's names are looked up.
+        inner: modifications of members.
+        redeclared: the new declaration or class.
+    """
+
+    value: Expr | None = None
+    scope: tuple[Instance, ClassText] | None = None
+    inner: dict[str, Given] = field(default_factory=dict[str, "Given"])
+    redeclared: Declaration | ClassText | None = None
+    line: int = 0
+    each: bool = False
+
+    def over(self, weaker: Given) -> Given:
+        """Return both; this one wins."""
+        inner = dict(weaker.inner)
+        for name, one in self.inner.items():
+            inner[name] = one.over(inner[name]) if name in inner else one
+        mine = self.value is not None
+        return Given(
+            self.value if mine else weaker.value, self.scope if mine else weaker.scope, inner,
+            self.redeclared or weaker.redeclared, self.line or weaker.line, self.each if mine else weaker.each,
+        )  # fmt: skip
+
+
+def given(modification: Modification, scope: tuple[Instance, ClassText], line: int) -> Given:
+    """Return a modification with its scope."""
+    made = Given(modification.value, scope if modification.value is not None else None, {}, None, line)
+    for one in modification.arguments:
+        inner = given(one.modification, scope, one.line)
+        inner.each = one.each
+        if one.redeclared is not None:
+            inner.redeclared = one.redeclared
+            inner.scope = scope
+        for name in reversed(one.name.split(".")[1:]):
+            inner = Given(inner={name: inner}, line=one.line)
+        name = one.name.split(".")[0]
+        made.inner[name] = inner.over(made.inner[name]) if name in made.inner else inner
+    return made
+
+
+@dataclass(slots=True)
+class Member:
+    """A declared component of an instance.
+
+    Attributes:
+        text: class whose names the declaration uses.
+        given: its modifications, all levels merged.
+    """
+
+    declaration: Declaration
+    text: ClassText
+    given: Given
+    part: Instance | list[Instance] | None = None
+
+
+class Instance:
+    """One use of a class.
+
+    Args:
+        classes: finds classes.
+        text: the class.
+        given: modifications from outside.
+        owner: instance it is a part of.
+        name: in its owner.
+    """
+
+    def __init__(
+        self, classes: Classes, text: ClassText, given: Given, owner: Instance | None = None, name: str = ""
+    ) -> None:
+        self.classes, self.text, self.given, self.owner, self.name = classes, text, given, owner, name
+        self.members: dict[str, Member] = {}
+        self.equations: list[tuple[Statement, ClassText]] = []
+        self.initial_equations: list[tuple[Statement, ClassText]] = []
+        self.folded: set[str] = set()
+        self._replaced = {name: one for name, one in given.inner.items() if isinstance(one.redeclared, ClassText)}
+        self._collect(text, given, 0)
+
+    @property
+    def path(self) -> str:
+        """Dotted name from the outermost instance."""
+        before = self.owner.path if self.owner else ""
+        return f"{before}.{self.name}" if before else self.name
+
+    def find(self, name: str, text: ClassText) -> Found | None:
+        """Return the class that a name means, with classes that were redeclared."""
+        head, _, rest = name.partition(".")
+        replaced = self._replaced.get(head)
+        if replaced is not None and isinstance(replaced.redeclared, ClassText) and not rest:
+            new, scope = replaced.redeclared, replaced.scope
+            assert scope is not None
+            new.owner = new.owner or scope[1]
+            return new
+        return self.classes.find(name, text)
+
+    def _collect(self, text: ClassText, outer: Given, depth: int) -> None:
+        if depth > _DEEPEST:
+            raise ModelicaTextError(f"{text.path} extends itself.", where=text.place(text.line))
+        for what, line in text.unsupported:
+            raise refused(what, text, line)
+        if text.short is not None:
+            self._extend(text.short, text.owner or text, outer, depth)
+        for one in text.elements:
+            if isinstance(one, Extends):
+                self._extend(one, text, outer, depth)
+            elif not isinstance(one, Import):
+                self._declare(one, text, outer)
+        self.equations += [(one, text) for one in text.equations]
+        self.initial_equations += [(one, text) for one in text.initial_equations]
+
+    def _extend(self, one: Extends, text: ClassText, outer: Given, depth: int) -> None:
+        base = self.find(one.base, text)
+        if isinstance(base, ClassText):
+            inner = given(one.modification, (self, text), one.line)
+            self._replaced |= {k: v for k, v in inner.inner.items() if isinstance(v.redeclared, ClassText)}
+            self._collect(base, outer.over(inner), depth + 1)
+        elif isinstance(base, Known):
+            what = f"{text.name} extends {base.path}, for which a component of its own stands here"
+            raise refused(what, text, one.line, "Write it as a part, and connect its ends.")
+        elif ".Icons." not in f".{one.base}" and not one.base.endswith(".Icon"):
+            raise unknown_class(one.base, text, one.line)
+
+    def _declare(self, one: Declaration, text: ClassText, outer: Given) -> None:
+        for word in ("inner", "outer", "stream"):
+            if word in one.prefixes:
+                raise refused(f"'{word}' before {one.name}", text, one.line)
+        made = given(one.modification, (self, text), one.line)
+        from_outside = outer.inner.get(one.name)
+        if from_outside is not None:
+            made = from_outside.over(made)
+        if isinstance(made.redeclared, Declaration):
+            new = made.redeclared
+            scope = from_outside.scope if from_outside and from_outside.scope else (self, text)
+            made = given(new.modification, scope, new.line).over(made)
+            made.redeclared = None
+            prefixes = one.prefixes | new.prefixes
+            one = Declaration(
+                prefixes, new.type, one.name, one.dimensions, one.modification, one.condition, one.description, new.line
+            )
+            text = scope[1]
+        self.members.setdefault(one.name, Member(one, text, made))
+
+
+def refused(what: str, text: ClassText, line: int, advice: str = "") -> ModelicaTextError:
+    """Return the error about a construct that is not supported."""
+    # A name at the beginning stays as it is.
+    words = ("a", "an", "the", "this", "these", "external", "overloaded")
+    sentence = f"{what[0].upper()}{what[1:]}" if what.split()[0] in words else what
+    return ModelicaTextError(f"{sentence}: that is not supported here.", where=text.place(line), advice=advice)
+
+
+def unknown_class(name: str, text: ClassText, line: int) -> ModelicaTextError:
+    """Return the error about a class that is nowhere."""
+    library = name.lstrip(".").startswith("Modelica.") or text.within.startswith("Modelica")
+    why = "No component here stands for this class of the standard library." if library else ""
+    return ModelicaTextError(f"There is no class '{name}'.", where=text.place(line), why=why)

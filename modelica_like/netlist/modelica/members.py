@@ -1,0 +1,197 @@
+"""Members of instances: the values of parameters, the sizes of arrays, the instances of parts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from modelica_like.errors import ModelicaTextError, UnknownName
+from modelica_like.netlist.modelica import fold, resolve
+from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, refused, unknown_class
+from modelica_like.netlist.modelica.library import Known
+from modelica_like.netlist.modelica.tree import ClassText, Expr
+from modelica_like.netlist.modelica.types import basic_type
+
+
+def named_array(path: str, shape: tuple[int, ...], kind: str) -> Expr:
+    """Return the array of the names `path[1]`, `path[2]` and so on."""
+    if not shape:
+        return Expr("name" if kind != "Boolean" else "condition", ((path, ()),))
+    inner = [f"{path[:-1]},{k}]" if path.endswith("]") else f"{path}[{k}]" for k in range(1, shape[0] + 1)]
+    return Expr("array", tuple(named_array(one, shape[1:], kind) for one in inner))
+
+
+def unknown_name(what: str, text: ClassText, line: int) -> UnknownName:
+    """Return the error about a name."""
+    return UnknownName(what, where=text.place(line))
+
+
+def sizes(owner: Instance, member: Member) -> tuple[int, ...]:
+    """Return the dimensions of a declared array; a colon takes the size of the value."""
+    resolver = resolve.Resolver(owner, member.text, numeric=True)
+    made: list[int] = []
+    for k, one in enumerate(member.declaration.dimensions):
+        if one.kind != "all":
+            made.append(resolver.count(one))
+            continue
+        value = value_of(owner, member.declaration.name, member.text, one.line)
+        for _ in range(k):
+            value = value.args[0] if value.args and isinstance(value.args[0], Expr) else value
+        if value.kind != "array":
+            raise refused(f"the size of {member.declaration.name} from this value", member.text, one.line)
+        made.append(len(value.args))
+    if math.prod(made) > fold.LONGEST:
+        what = f"{member.declaration.name}, an array of {math.prod(made)} elements (at most {fold.LONGEST})"
+        raise refused(what, member.text, member.declaration.line)
+    return tuple(made)
+
+
+def exists(owner: Instance, member: Member) -> bool:
+    """Return whether a conditional component is there.
+
+    Raises:
+        ModelicaTextError: constants and parameters do not determine it.
+    """
+    declared = member.declaration
+    if declared.condition is None:
+        return True
+    known = resolve.Resolver(owner, member.text, numeric=True)(declared.condition)
+    if known.kind != "boolean":
+        raise refused("a condition of a component that is not known before the run", member.text, declared.line)
+    return known.args[0]
+
+
+def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
+    """Return the value of a parameter or constant.
+
+    Args:
+        owner: instance that declares it.
+        name: of the member.
+        text: of the place that asks.
+        line: of the place that asks.
+
+    Raises:
+        ModelicaTextError: it has none, or depends on itself.
+    """
+    member = owner.members[name]
+    given = member.given
+    if given.value is None and "start" in given.inner:
+        given = given.inner["start"]
+    if given.value is None or given.scope is None:
+        raise ModelicaTextError(
+            f"{name} has no value.", where=[text.place(line), member.text.place(member.declaration.line)]
+        )
+    if name in owner.folded:
+        raise ModelicaTextError(f"{name} depends on itself.", where=member.text.place(member.declaration.line))
+    owner.folded.add(name)
+    try:
+        value = resolve.Resolver(*given.scope, numeric=True)(given.value)
+    finally:
+        owner.folded.remove(name)
+    return value
+
+
+def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known | str:
+    """Return what a member is: an instance, a component of the standard library, or the name of a connector.
+
+    Args:
+        owner: instance that declares it.
+        member: the declaration.
+        index: of an array's element, from one; 0 for a single part.
+
+    Raises:
+        ModelicaTextError: its class does not exist.
+    """
+    declared = member.declaration
+    owner.classes.spend(1, member.text, declared.line)
+    found = owner.find(declared.type, member.text)
+    if found is None:
+        raise unknown_class(declared.type, member.text, declared.line)
+    while isinstance(found, ClassText) and found.short is not None and not found.prefixes:
+        # `model A = B(k = 1)`: the part is a B, and the modification one of the part.
+        scope = found.owner or found
+        base = owner.find(found.short.base, scope)
+        if base is None:
+            raise unknown_class(found.short.base, scope, found.line)
+        member.given = member.given.over(given(found.short.modification, (owner, scope), found.line))
+        member.declaration = declared = replace(declared, type=found.short.base)
+        member.text, found = scope, base
+    if not isinstance(found, ClassText):
+        return found
+    if member.part is None:
+        count = sizes(owner, member)
+        if len(count) > 1:
+            raise refused(
+                f"{declared.name}, an array of components with several dimensions", member.text, declared.line
+            )
+        if not count:
+            member.part = _instance(owner, member, found, declared.name, member.given)
+        else:
+            member.part = [
+                _instance(owner, member, found, f"{declared.name}[{k}]", element(member.given, k))
+                for k in range(1, count[0] + 1)
+            ]
+    if isinstance(member.part, list):
+        if not 1 <= index <= len(member.part):
+            raise refused(f"{declared.name}, an array of components, without an index", member.text, declared.line)
+        return member.part[index - 1]
+    return member.part
+
+
+def _instance(owner: Instance, member: Member, text: ClassText, name: str, given: Given) -> Instance:
+    """Create the instance of a part; a record may be given as a whole."""
+    owner.classes.spend(50, member.text, member.declaration.line)
+    depth, level = 0, owner
+    while level.owner is not None:
+        depth, level = depth + 1, level.owner
+    if depth > 30:
+        raise ModelicaTextError(f"{text.path} contains itself.", where=member.text.place(member.declaration.line))
+    value = given.value
+    if text.kind == "record" and value is not None and given.scope is not None and given.scope[0] is not None:
+        scope, inside = given.scope
+        if value.kind == "call":
+            arguments = {key: Given(one, given.scope, line=value.line) for key, one in value.args[2]}
+            given = Given(inner=given.inner).over(Given(inner=arguments))
+        elif value.kind == "name":
+            made = record_of(scope, value)
+            if made is None:
+                raise unknown_name(f"{value.path} is not a record.", inside, value.line)
+            return made
+    return Instance(owner.classes, text, given, owner, name)
+
+
+def record_of(scope: Instance, name: Expr) -> Instance | None:
+    """Return the record that a name means in an instance, None if it is none."""
+    made = scope
+    for one, _ in name.args:
+        member = made.members.get(one)
+        found = part_of(made, member) if member is not None and basic_type(made, member) is None else None
+        if not isinstance(found, Instance):
+            return None
+        made = found
+    return made if made.text.kind == "record" else None
+
+
+def element(given: Given, index: int) -> Given:
+    """Return the modification of one element of an array: arrays without `each` are taken apart."""
+    made = Given(given.value, given.scope, {}, given.redeclared, given.line, given.each)
+    for name, one in given.inner.items():
+        made.inner[name] = element(one, index)
+    if given.value is not None and given.scope is not None and not given.each:
+        value = resolve.Resolver(*given.scope, numeric=False)(given.value)
+        if value.kind == "array" and index <= len(value.args):
+            made.value = value.args[index - 1]
+    return made
+
+
+def value_of_known(owner: Instance, member: Member, part: Known, name: str, text: ClassText, line: int) -> Expr:
+    """Return the value of a parameter of a component of the standard library."""
+    given = member.given.inner.get(part.names.get(name, name))
+    if given is not None and given.value is not None and given.scope is not None:
+        return resolve.Resolver(*given.scope, numeric=True)(given.value)
+    field = part.type._class_fields.get(name)
+    if field is not None and isinstance(field.default, int | float):
+        return Expr("number", (float(field.default),), line)
+    raise ModelicaTextError(
+        f"{member.declaration.name}.{name} has no value that is known here.", where=text.place(line)
+    )

@@ -1,0 +1,248 @@
+"""Components without a counterpart in the standard library, written out as classes with their equations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.errors import ModelicaTextError
+from modelica_like.flatten.steps import event_steps
+from modelica_like.flatten.template import relative_path
+from modelica_like.language import Component, Connector, Input, Output, Parameter, Variable
+from modelica_like.language.discrete import Ending, Marker, When, silence
+from modelica_like.language.equation import Equation, as_statement
+from modelica_like.language.expr import TIME, Symbol, operands, symbols_in
+from modelica_like.language.fields import Discrete
+from modelica_like.language.formula import Formula
+from modelica_like.language.mode import StartMode, Transition
+from modelica_like.language.places import located
+from modelica_like.language.units.unit import coherent
+from modelica_like.netlist.modelica.library import connector_type, table
+from modelica_like.netlist.modelica.tokens import identifier
+
+_FUNCTIONS = {
+    ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan", ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan",
+    ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_SQRT: "sqrt", ca.OP_FABS: "abs", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh",
+    ca.OP_TANH: "tanh", ca.OP_SIGN: "sign", ca.OP_FLOOR: "floor", ca.OP_CEIL: "ceil", ca.OP_FMIN: "min",
+    ca.OP_FMAX: "max", ca.OP_ATAN2: "atan2",
+}  # fmt: skip
+_SIGNS = {
+    ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/", ca.OP_POW: "^", ca.OP_CONSTPOW: "^",
+    ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "<>", ca.OP_AND: "and", ca.OP_OR: "or",
+}  # fmt: skip
+_SINGLE: dict[int, Callable[[str], str]] = {
+    ca.OP_NEG: lambda x: f"(-{x})", ca.OP_SQ: lambda x: f"{x}^2", ca.OP_TWICE: lambda x: f"(2*{x})",
+    ca.OP_INV: lambda x: f"(1/{x})", ca.OP_NOT: lambda x: f"(not {x})", ca.OP_ASSIGN: lambda x: x,
+}  # fmt: skip
+
+
+def class_of_equations(
+    component: Component, name: str, write_formula: Callable[[Formula], str], driven: frozenset[str]
+) -> str:
+    """Return the text of a class with the equations of a component, its values as defaults.
+
+    Args:
+        component: without parts.
+        name: of the class.
+        write_formula: writes the formula of a default.
+        driven: names of the connected signals; other inputs become parameters.
+
+    Raises:
+        ModelicaTextError: it has parts, or a mode that is ideal or holds a motion.
+    """
+    held = [(key, mode) for key, mode in component.modes.items() if mode.holds or mode.ideal]
+    if component.parts or held:
+        what = "parts of its own"
+        if not component.parts:
+            what = f"the mode {held[0][0]}, which {'is ideal' if held[0][1].ideal else 'holds a motion'}"
+        raise ModelicaTextError(
+            f"{component.label} is a {type(component).__name__}, for which the Modelica Standard Library has no class, "
+            f"and it has {what}.",
+            where=component.place_of(),
+            advice="Impacts, shared loads and states that modes take away are no equations of Modelica text.",
+        )
+    lines = [f"model {name}", *_declarations(component, write_formula, driven), "equation"]
+    for item, source in located(component.equations()):
+        statement = as_statement(item, source, type(component).__name__)
+        if isinstance(statement, Equation):
+            sides = ca.vertsplit(ca.cse(ca.vertcat(statement.left, statement.right)))
+            events = event_steps(sides[0] - sides[1])
+            left, right = (_text(one, component, events=events) for one in sides)
+            lines.append(f"  {left} = {right};")
+    return "\n".join([*lines, *_events(component), f"end {name};"])
+
+
+def _events(component: Component) -> list[str]:
+    """Return the equations of the modes: a mode changes where a transition from its value before has its condition."""
+    events = [one for one, _ in located(component.events())]
+    ends = [one for one in events if isinstance(one, When) and _only_ends(one)]
+    if any(not isinstance(one, Transition | StartMode) and one not in ends for one in events):
+        raise ModelicaTextError(f"{component.label} has a 'when' or an assertion of Python, which is not written.")
+    lines: list[str] = []
+    for name, mode in component.modes.items():
+        goes = [one for one in events if isinstance(one, Transition) and one.mode.mode is mode and not one.fails]
+        begins = [one for one in events if isinstance(one, StartMode) and one.mode.mode is mode]
+        chosen = " else".join(f"if {_text(one.when, component, True)} then {mode.number(one.target)}" for one in begins)
+        first = str(mode.number(component.start_mode(name)))
+        first = f"{chosen} else {first}" if chosen else first
+        rest = "".join(f" elseif {_due(one, component)} then {mode.number(one.target)}" for one in goes)
+        name = identifier(name)
+        lines.append(f"  {name} = if initial() then ({first}){rest} else pre({name});")
+    resets = [one for one in events if isinstance(one, Transition) and one.reset]
+    for k, one in enumerate(resets):
+        lines.append(f"  {'elsewhen' if k else 'when'} {_due(one, component)} then")
+        for target, value in one.reset.items():
+            symbol, new = symbols_in(target)[0], _text(value, component, True)
+            field = symbol.owner.fields[symbol.name]
+            _check_reset(component, symbol, value)
+            path = identifier(relative_path(symbol.owner, component, symbol.name))
+            lines.append(f"    {path} = {new};" if isinstance(field, Discrete) else f"    reinit({path}, {new});")
+    lines += ["  end when;"] if resets else []
+    for one in ends:
+        lines += _ending(one, component)
+    for one in events:
+        if isinstance(one, Transition) and one.fails:
+            words = one.notice.replace('"', "'")
+            lines.append(f'  assert(not ({_due(one, component, False)}), "{words}");')
+    return lines
+
+
+def _only_ends(one: Any) -> bool:
+    """Return whether an event is a `when` that ends the run and does nothing else."""
+    whole = one.branches if isinstance(one, When) else ()
+    return len(whole) == 1 and all(isinstance(key, Ending) and not key.fails for key in whole[0][1])
+
+
+def _ending(one: When, component: Component) -> list[str]:
+    conditions = ", ".join(_text(each, component) for each in one.conditions)
+    texts = (key.text.replace('"', "'") for _, new in one.branches for key in new if isinstance(key, Ending))
+    written = (f'    terminate("{re.sub(r"[{}]", "", text)}");' for text in texts)
+    return [f"  when {{{conditions}}} then", *written, "  end when;"]
+
+
+def _due(one: Transition, component: Component, before: bool = True) -> str:
+    """Return the condition of a transition, with modes and discrete values before the event or after it."""
+    name = identifier(one.mode.mode.name)
+    name = f"pre({name})" if before else name
+    sources = " or ".join(f"{name} == {one.mode.mode.number(source)}" for source in one.sources)
+    when = f"time >= {_text(one.at, component, before)}" if one.when is None else _text(one.when, component, before)
+    return f"({sources}) and {when}"
+
+
+def _check_reset(component: Component, target: Symbol, value: Any) -> None:
+    """Refuse a new value that follows from what it sets: Modelica takes variables after the event."""
+    if not isinstance(component.fields.get(target.name), Discrete):
+        return
+    equations = (as_statement(item, source, "") for item, source in located(component.equations()))
+    sides = [side for one in equations if isinstance(one, Equation) for side in (one.left, one.right)]
+    states = {one.name for side in sides for one in symbols_in(side) if one.order}
+    for one in symbols_in(ca.SX(value)):
+        if one is not TIME and isinstance(one.owner.fields.get(one.name), Variable) and one.name not in states:
+            raise ModelicaTextError(
+                f"{component.label} sets {target.name} at an event by {one.name} before it, which has no Modelica text."
+            )
+
+
+def _declarations(component: Component, write_formula: Callable[[Formula], str], driven: frozenset[str]) -> list[str]:
+    lines = [f"  {connector_class(one)} {identifier(key)};" for key, one in component.connectors.items() if one.used]
+    for key, field in component.fields.items():
+        if isinstance(field, Parameter) or (isinstance(field, Input) and key not in driven):
+            value = component.value(key)
+            if value is None:
+                continue
+            given, default = key in component._values, ""
+            if not given:
+                default = f" = {value.number!r}" if value.formula is None else f" = {write_formula(value.formula)}"
+            lines.append(f"  parameter Real {identifier(key)}{_attributes(str(coherent(value.unit)))}{default};")
+        elif isinstance(field, Input | Output):
+            kind = "RealInput" if isinstance(field, Input) else "RealOutput"
+            lines.append(f"  Modelica.Blocks.Interfaces.{kind} {identifier(key)}{_attributes(field.unit_text)};")
+        elif isinstance(field, Variable):
+            begin = f"start = {field.default!r}" if isinstance(field.default, int | float) else ""
+            chosen = "" if field.state == "default" else f"stateSelect = StateSelect.{field.state}"
+            lines.append(f"  Real {identifier(key)}{_attributes(field.unit_text, begin, chosen)};")
+        elif isinstance(field, Discrete):
+            start = component.start(key)
+            number = 0.0 if start is None else start.number
+            text = write_formula(start.formula) if start is not None and start.formula is not None else repr(number)
+            lines.append(f"  discrete Real {identifier(key)}(start = {text});")
+    for key, mode in component.modes.items():
+        told = ", ".join(f"{number}: {one}" for number, one in enumerate(mode.names))
+        lines.append(f'  Integer {identifier(key)}(start = {mode.number(component.start_mode(key))}) "{told}";')
+    return _arrays(lines)
+
+
+def _arrays(lines: list[str]) -> list[str]:
+    """Join the declarations of `x[1]` and `x[2]` to one of an array: they differ in their index only."""
+    joined: dict[str, tuple[str, int]] = {}
+    for line in lines:
+        whole, index = re.sub(r"(?<=\w)\[\d+\]", "[#]", line, count=1), re.search(r"(?<=\w)\[(\d+)\]", line)
+        each = whole if index is None else re.sub(r"\b(unit|start|stateSelect) =", r"each \1 =", whole)
+        joined[whole] = each, max(int(index[1]) if index else 0, joined.get(whole, ("", 0))[1])
+    return [each.replace("[#]", f"[{count}]", 1) for each, count in joined.values()]
+
+
+def _attributes(unit: str, *more: str) -> str:
+    texts = [f'unit = "{unit}"'] if unit not in ("1", "*", "") else []
+    texts += [one for one in more if one]
+    return f"({', '.join(texts)})" if texts else ""
+
+
+def connector_class(connector: Connector) -> str:
+    """Return the class of the standard library for a connector.
+
+    Raises:
+        ModelicaTextError: there is none.
+    """
+    for path in table()["connectors"]:
+        if connector_type(path) is type(connector):
+            return path
+    raise ModelicaTextError(f"{connector.label} is a {type(connector).__name__}, which has no counterpart in Modelica.")
+
+
+def _text(expression: Any, component: Component, before: bool = False, events: Collection[int] = ()) -> str:
+    """Return an expression as text, with values before an event or the present ones, and steps that make events."""
+    node = ca.SX(expression)
+    if node.is_constant():
+        number = float(node)
+        return repr(number) if number >= 0 else f"({number!r})"
+    if node.is_symbolic():
+        symbol = symbols_in(node)[0]
+        if symbol is TIME:
+            return "time"
+        if isinstance(symbol, Marker) and symbol.kind in ("relation", "floor"):
+            inside = _text(symbol.of, component, before)
+            return inside if symbol.kind == "relation" else f"floor({inside})"
+        owner = symbol.owner  # None of what only the language has, such as a delay
+        field = owner.fields.get(symbol.name) if owner is not None else None
+        if owner is None or (field is None and symbol.name not in getattr(owner, "modes", {})):
+            raise ModelicaTextError(f"{component.label} asks for {symbol.name}, which Modelica text cannot say.")
+        path = identifier(relative_path(owner, component, symbol.name))
+        if before and (field is None or isinstance(field, Discrete)):
+            return f"pre({path})"
+        return "der(" * symbol.order + path + ")" * symbol.order
+    if silence(node):
+        return _text(node.dep(0), component, before)
+    operation, args = node.op(), [_text(one, component, before, events) for one in operands(node)]
+    quiet = not _has_events(node, events)
+    if operation in _SIGNS:
+        return f"({args[0]} {_SIGNS[operation]} {args[1]})"
+    if operation in _SINGLE:
+        return _SINGLE[operation](args[0])
+    if operation == ca.OP_IF_ELSE_ZERO:
+        made = f"if {args[0]} then {args[1]} else 0"
+        return f"noEvent({made})" if quiet else f"({made})"
+    if operation in _FUNCTIONS:
+        made = f"{_FUNCTIONS[operation]}({', '.join(args)})"
+        return f"noEvent({made})" if quiet and _FUNCTIONS[operation] in ("sign", "floor", "ceil") else made
+    raise ModelicaTextError(f"{component.label} uses a function that Modelica text does not have here.")
+
+
+def _has_events(node: Any, identities: Collection[int]) -> bool:
+    """Tell whether an expression has steps that make events."""
+    if node.is_symbolic():
+        return isinstance(symbols_in(node)[0], Marker)
+    return node.element_hash() in identities or any(_has_events(one, identities) for one in operands(node))

@@ -1,0 +1,356 @@
+"""From Modelica text to its syntax tree, by recursive descent over the grammar of Modelica 3.6."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from modelica_like.errors import ModelicaTextError
+from modelica_like.netlist.modelica.expressions import Expressions
+from modelica_like.netlist.modelica.tokens import KINDS, SECTIONS
+from modelica_like.netlist.modelica.tree import (
+    Argument,
+    ClassText,
+    Declaration,
+    Expr,
+    Extends,
+    Import,
+    Modification,
+    Statement,
+)
+
+_BEFORE_KIND = {"partial", "encapsulated", "expandable", "pure", "impure", "final", "replaceable", "inner", "outer"}
+_PREFIXES = {"flow", "stream", "parameter", "constant", "discrete", "input", "output"}
+_BEFORE = {"redeclare", "final", "inner", "outer", "replaceable"}
+
+
+def parse_modelica(text: str, file: str) -> list[ClassText]:
+    """Read the classes of a Modelica text.
+
+    Args:
+        text: of a `.mo` file.
+        file: its path, for messages.
+
+    Raises:
+        ModelicaTextError: the text is not Modelica.
+    """
+    parser = _Parser(text, file)
+    try:
+        return parser.stored()
+    except ModelicaTextError as error:
+        told = error if error.where else parser.error(error.what, parser.line)
+        raise told.with_traceback(None) from None  # hundreds of frames are no help, and too many for pickle
+
+
+def parse_expression(text: str) -> Expr:
+    """Read one expression, from the tables of this package.
+
+    Raises:
+        ModelicaTextError: the text is not an expression.
+    """
+    return _Parser(text, "").expression()
+
+
+class _Parser(Expressions):
+    def stored(self) -> list[ClassText]:
+        within = ""
+        if self.take("within"):
+            within = self.dotted() if self.kind == "name" else ""
+            self.need(";")
+        classes = []
+        while self.kind != "end of file":
+            self.take("final")
+            classes.append(self.class_text(None, within))
+            self.need(";")
+        if not classes:
+            self.refuse("The file has no class.", 1)
+        return classes
+
+    def is_class(self) -> bool:
+        at = self.at
+        while self.tokens[at][1] in _BEFORE_KIND:
+            at += 1
+        return self.tokens[at][0] in KINDS
+
+    def class_text(self, owner: ClassText | None, within: str = "") -> ClassText:
+        line, partial, unsupported = self.line, False, []
+        self.deeper()
+        while self.text in _BEFORE_KIND:
+            word = self.take(self.kind)
+            partial = partial or word == "partial"
+            if word in ("expandable", "inner", "outer"):
+                unsupported.append((f"'{word}'", line))
+        kind = self.take(*KINDS) or self.refuse(f"Expected a class before '{self.text}'.", self.line)
+        if kind == "operator":
+            kind = self.take("function", "record") or kind
+            unsupported.append(("overloaded operators", line))
+        if self.take("extends"):
+            unsupported.append(("'class extends'", line))
+        name = self.need("name")
+        made = ClassText(name, kind, line, self.file, owner, within, partial, unsupported=unsupported, lines=self.lines)
+        if self.take("="):
+            self._short(made)
+            self.depth -= 1
+            return made
+        if self.kind == "(":
+            self.modification()
+        made.description = self.strings()
+        self._composition(made)
+        self.need("end")
+        if self.text != name:
+            self.refuse(f"{kind} {name} of line {line} ends with 'end {self.text}'.", self.line)
+        self.take("name")
+        self.depth -= 1
+        return made
+
+    def _short(self, made: ClassText) -> None:
+        if self.take("enumeration"):
+            self.need("(")
+            made.literals = tuple(self._literals())
+            self.need(")")
+        else:
+            while word := self.take("input", "output", "flow"):
+                made.prefixes |= {word}
+            line, base = self.line, self.dotted()
+            if self.kind == "[":
+                made.unsupported.append(("a short class definition of an array", line))
+                self.subscripts()
+            made.short = Extends(base, self.modification(), line)
+        made.description = self.strings()
+        self.annotation(made)
+
+    def _literals(self) -> list[str]:
+        literals = []
+        while self.kind == "name":
+            literals.append(self.take("name"))
+            self.strings()
+            self.annotation(None)
+            self.take(",")
+        return literals
+
+    def _composition(self, made: ClassText) -> None:
+        hidden = False
+        while self.kind != "end":
+            line = self.line
+            if word := self.take("public", "protected"):
+                hidden = word == "protected"
+            elif self.kind == "annotation":
+                self.annotation(made)
+                self.need(";")
+            elif self.kind in ("initial", "equation", "algorithm"):
+                self._section(made, bool(self.take("initial")), line)
+            elif self.take("external"):
+                made.unsupported.append(("external functions", line))
+                while self.kind not in (";", "end of file"):
+                    self.at += 1
+                self.need(";")
+            elif self.kind == "end of file":
+                self.refuse(f"{made.kind} {made.name} of line {made.line} has no 'end {made.name};'.", line)
+            else:
+                self._element(made, hidden)
+                self.need(";")
+
+    def _section(self, made: ClassText, initial: bool, line: int) -> None:
+        if self.take("algorithm"):
+            if made.kind != "function":
+                made.unsupported.append(("an algorithm outside a function", line))
+            made.algorithm += self.statements()
+        else:
+            self.need("equation")
+            (made.initial_equations if initial else made.equations).extend(self.statements())
+
+    def _element(self, made: ClassText, hidden: bool) -> None:
+        line = self.line
+        if self.take("import"):
+            made.elements.append(self._import())
+        elif self.take("extends"):
+            made.elements.append(Extends(self.dotted(), self.modification(), line))
+        elif self._is_element_class():
+            inner = self._element_class(made)
+            made.classes[inner.name] = inner
+            return
+        else:
+            made.elements += self.declarations(hidden)
+        self.annotation(None)
+
+    def _is_element_class(self) -> bool:
+        at = self.at
+        while self.tokens[at][1] in _BEFORE:
+            at += 1
+        start, self.at = self.at, at
+        found = self.is_class()
+        self.at = start
+        return found
+
+    def _element_class(self, owner: ClassText | None) -> ClassText:
+        self.take("redeclare")
+        inner = self.class_text(owner)
+        self._constrained()
+        return inner
+
+    def _constrained(self) -> None:
+        if self.take("constrainedby"):
+            self.dotted()
+            self.modification()
+            self.strings()
+            self.annotation(None)
+
+    def _import(self) -> Import:
+        alias = ""
+        if self.kind == "name" and self.tokens[self.at + 1][0] == "=":
+            alias = self.need("name")
+            self.need("=")
+        path, names = self.dotted(), ()
+        if self.take(".*"):
+            names = ("*",)
+        elif self.take("."):
+            if self.take("*"):
+                names = ("*",)
+            else:
+                self.need("{")
+                names = self._names()
+        self.strings()
+        return Import(path.lstrip("."), alias or path.rpartition(".")[2], names)
+
+    def _names(self) -> tuple[str, ...]:
+        names = [self.need("name")]
+        while self.take(","):
+            names.append(self.need("name"))
+        self.need("}")
+        return tuple(names)
+
+    def declarations(self, hidden: bool = False, single: bool = False) -> list[Declaration]:
+        """Read one clause of declarations, `parameter Real a = 1, b = 2`; in a modification it has a single one."""
+        prefixes = {"protected"} if hidden else set[str]()
+        while self.text in _PREFIXES or self.text in _BEFORE:
+            prefixes.add(self.take(self.kind))
+        type_name = self.dotted()
+        common = self.subscripts() if self.kind == "[" else ()
+        made = [self._declared(frozenset(prefixes), type_name, common)]
+        while not single and self.take(","):
+            made.append(self._declared(frozenset(prefixes), type_name, common))
+        self._constrained()
+        return made
+
+    def _declared(self, prefixes: frozenset[str], type_name: str, common: tuple[Expr, ...]) -> Declaration:
+        line, name = self.line, self.need("name")
+        dimensions = (self.subscripts() if self.kind == "[" else ()) + common
+        modification = self.modification()
+        condition = self.expression() if self.take("if") else None
+        made = Declaration(prefixes, type_name, name, dimensions, modification, condition, self.strings(), line)
+        self.annotation(None)
+        return made
+
+    # -- modifications -----------------------------------------------------------------------------------------------
+
+    def modification(self) -> Modification:
+        made = Modification()
+        if self.take("("):
+            self.deeper()
+            while not self.take(")"):
+                made.arguments.append(self._argument())
+                if self.kind != ")":
+                    self.need(",")
+            self.depth -= 1
+        if self.take("=", ":="):
+            made.value = self.expression()
+        return made
+
+    def _argument(self) -> Argument:
+        line, redeclare, each = self.line, False, False
+        while word := self.take("each", "final", "redeclare", "replaceable"):
+            each, redeclare = each or word == "each", redeclare or word in ("redeclare", "replaceable")
+        if not redeclare:
+            name = self.dotted()
+            made = Argument(name, self.modification(), line, each)
+            self.strings()
+            return made
+        redeclared = self._element_class(None) if self.is_class() else self.declarations(single=True)[0]
+        return Argument(redeclared.name, Modification(), line, each, redeclared)
+
+    def annotation(self, made: ClassText | None) -> None:
+        """Skip an annotation; that of a class may say how long to simulate."""
+        if not self.take("annotation"):
+            return
+        depth = 0
+        while True:
+            kind, text, line = self.tokens[self.at]
+            if text == "experiment" and kind == "name" and depth == 1 and made is not None:
+                self.at += 1
+                for one in self.modification().arguments:
+                    value = one.modification.value
+                    if value is not None and value.kind == "number":
+                        made.experiment[one.name] = value.args[0]
+                continue
+            if kind == "end of file":
+                self.refuse("An annotation has no end.", line)
+            self.at += 1
+            depth += (kind == "(") - (kind == ")")
+            if depth == 0:
+                return
+
+    # -- equations and statements ------------------------------------------------------------------------------------
+
+    def statements(self) -> list[Statement]:
+        made = []
+        while self.kind not in ("else", "elseif", "elsewhen") and self.kind not in SECTIONS:
+            made.append(self._statement())
+            self.strings()
+            self.annotation(None)
+            self.need(";")
+        return made
+
+    def _statement(self) -> Statement:
+        self.deeper()
+        made = self._one_statement(self.line)
+        self.depth -= 1
+        return made
+
+    def _one_statement(self, line: int) -> Statement:
+        if word := self.take("if", "when"):
+            return Statement(word, self._branches(word), line)
+        if self.take("for"):
+            iterators = self.iterators()
+            self.need("loop")
+            made = Statement("for", (iterators, self.statements()), line)
+            self._ends("for")
+            return made
+        if self.take("while"):
+            condition = self.expression()
+            self.need("loop")
+            made = Statement("while", (condition, self.statements()), line)
+            self._ends("while")
+            return made
+        if self.take("connect"):
+            self.need("(")
+            left = self.expression()
+            self.need(",")
+            right = self.expression()
+            self.need(")")
+            return Statement("connect", (left, right), line)
+        if self.kind == "name" and self.text in ("return", "break"):
+            return Statement(self.take("name"), (), line)
+        left = self.simple()
+        if sign := self.take("=", ":="):
+            return Statement(sign, (left, self.expression()), line)
+        if left.kind != "call":
+            self.refuse(f"Expected '=' before '{self.text}'.", self.line)
+        return Statement("call", (left,), line)
+
+    def _branches(self, word: str) -> tuple[Any, ...]:
+        branches: list[tuple[Expr | None, list[Statement]]] = []
+        condition: Expr | None = self.expression()
+        while True:
+            if condition is not None:
+                self.need("then")
+            branches.append((condition, self.statements()))
+            if self.take(f"else{word}"):
+                condition = self.expression()
+            elif self.take("else"):
+                condition = None
+            else:
+                self._ends(word)
+                return tuple(branches)
+
+    def _ends(self, word: str) -> None:
+        self.need("end")
+        self.need(word)

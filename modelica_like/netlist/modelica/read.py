@@ -1,0 +1,47 @@
+"""Reading Modelica text: `load("drive.mo")`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from modelica_like.errors import ModelicaTextError
+from modelica_like.netlist.modelica.build import Notes, build_component
+from modelica_like.netlist.modelica.classes import Classes
+from modelica_like.netlist.modelica.instance import Given, Instance
+from modelica_like.netlist.modelica.written import Written
+
+
+def load_modelica(path: str | Path) -> Written:
+    """Read a model from a Modelica file.
+
+    Args:
+        path: a `.mo` file, or a class in it: `drive.mo:Rotor`; by default the last model of the file.
+
+    Raises:
+        NetlistError: the file cannot be read.
+        ModelicaTextError: it is not Modelica, or uses what is not supported.
+    """
+    file, dot, name = str(path).rpartition(".mo:")
+    return read_modelica(Path(f"{file}.mo"), name)[0] if dot else read_modelica(Path(path))[0]
+
+
+def read_modelica(path: Path, name: str = "") -> tuple[Written, list[str]]:
+    """Read a model, and what its reader should know; see `load_modelica`."""
+    classes = Classes(path)
+    text = classes.chosen(name)
+    notes = Notes()
+    try:
+        made = build_component(Instance(classes, text, Given()), notes)
+    except RecursionError:
+        raise ModelicaTextError(
+            "Classes, functions or formulas are nested too deeply.", where=text.place(text.line)
+        ) from None
+    # A variable whose start value is not fixed starts at the start value of its class, which is zero.
+    settings = {"start": "rest", "on_chattering": "rest"} | (
+        {"until": f"{text.experiment['StopTime']:g} s"} if "StopTime" in text.experiment else {}
+    )
+    made.__dict__.update(_simulate=settings, _display=notes.display, _origin=f"{path.resolve()}:{text.path}")
+    for part in made.walk():
+        if isinstance(part, Written) and part is not made:
+            part.__dict__["_origin"] = f"{path.resolve()}:{part.__dict__['_class']}"
+    return made, notes.told

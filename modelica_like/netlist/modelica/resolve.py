@@ -1,0 +1,348 @@
+"""Expressions with their names resolved: constants become values, the rest names of the component."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from modelica_like.errors import ModelicaTextError, did_you_mean
+from modelica_like.netlist.modelica import fold, members
+from modelica_like.netlist.modelica.classes import Classes
+from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
+from modelica_like.netlist.modelica.library import Known, table
+from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Import
+from modelica_like.netlist.modelica.types import Basic, basic_type
+
+ELEMENTARY = {
+    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "log10", "sqrt", "abs",
+    "sign", "floor", "ceil", "integer", "mod", "rem", "div", "min", "max",
+}  # fmt: skip
+"""Functions of numbers."""
+KEPT = {
+    "der", "pre", "noEvent", "smooth", "initial", "sample", "edge", "change", "reinit", "terminal", "delay",
+    "Clock", "previous", "hold",
+}  # fmt: skip
+_ARGUMENTS = {
+    **dict.fromkeys(("der", "pre", "noEvent", "edge", "change", "previous", "hold"), (1, 1)), "initial": (0, 0),
+    **dict.fromkeys(("sample", "Clock", "size"), (1, 2)), "smooth": (2, 2), "reinit": (2, 2), "delay": (2, 3),
+}  # fmt: skip
+"""Least and largest number of arguments."""
+_REFUSED = {
+    "spatialDistribution": "spatialDistribution", "cardinality": "cardinality(…)",
+    "terminal": "terminal()",
+    "inStream": "a stream connector", "actualStream": "a stream connector",
+    "subSample": "a clock that follows another",
+    "superSample": "a clock that follows another", "shiftSample": "a clock that follows another",
+    "backSample": "a clock that follows another",
+    "transition": "a state machine", "initialState": "a state machine",
+}  # fmt: skip
+
+
+class Resolver:
+    """Resolves expressions of one class text in one instance.
+
+    Args:
+        instance: whose members the names mean; None in a function.
+        text: class whose names the expressions use.
+        local: values of iterators, and of a function's variables.
+        numeric: whether parameters become their values.
+    """
+
+    def __init__(
+        self, instance: Instance | None, text: ClassText, local: Mapping[str, Expr] | None = None, *,
+        numeric: bool = False, classes: Classes | None = None, depth: int = 0,
+    ) -> None:  # fmt: skip
+        self.instance, self.text, self.numeric, self.depth = instance, text, numeric, depth
+        self.local = dict(local or {})
+        found = classes or (instance.classes if instance else None)
+        assert found is not None
+        self.classes = found
+
+    def __call__(self, expression: Expr) -> Expr:
+        """Return the resolved expression.
+
+        Raises:
+            ModelicaTextError: it uses what is not supported, or a name that does not exist.
+        """
+        kind, args, line = expression.kind, expression.args, expression.line
+        if kind in ("number", "string", "boolean", "literal", "all"):
+            return expression
+        if kind == "name":
+            return self._name(expression)
+        if kind == "call":
+            return self._call(expression)
+        if kind == "for":
+            return self._built(args[0], list(args[1]))
+        if kind == "if":
+            return self._chosen(args, line)
+        if kind == "range":
+            numbers = [self.number(one) for one in args]
+            start, step, stop = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
+            return self._told(lambda: fold.row(start, step, stop, line), line)
+        values = tuple(map(self, args))
+        return self._told(lambda: fold.operation(kind, values, line), line)
+
+    def _told(self, make: Callable[[], Expr], line: int) -> Expr:
+        try:
+            return make()
+        except fold.Unfit as error:
+            raise ModelicaTextError(f"{error}.", where=self.text.place(line)) from None
+        except ModelicaTextError as error:
+            error.where = error.where or (self.text.place(line),)
+            raise
+
+    def _chosen(self, args: tuple[Expr, ...], line: int) -> Expr:
+        """Resolve an `if`; branches that are known not to be taken are not looked at."""
+        kept: list[Expr] = []
+        for condition, value in zip(args[:-1:2], args[1::2], strict=True):
+            known = self(condition)
+            if known.kind != "boolean":
+                kept += [known, self(value)]
+            elif known.args[0]:
+                return Expr("if", (*kept, self(value)), line) if kept else self(value)
+        return Expr("if", (*kept, self(args[-1])), line) if kept else self(args[-1])
+
+    def _built(self, element: Expr, iterators: list[tuple[str, Expr | None]]) -> Expr:
+        """Resolve an array built by iterators, the last one innermost."""
+        (name, over), rest = iterators[-1], iterators[:-1]
+        if over is None:
+            raise refused("an iterator without a range", self.text, element.line)
+        items = []
+        for value in self.array(over):
+            inner = Resolver(
+                self.instance, self.text, {**self.local, name: value}, numeric=self.numeric, classes=self.classes
+            )
+            items.append(inner._built(element, rest) if rest else inner(element))
+        return Expr("array", tuple(items), element.line)
+
+    def array(self, expression: Expr) -> tuple[Expr, ...]:
+        """Return the elements of an array."""
+        made = self(expression)
+        if made.kind != "array":
+            raise refused("a loop over something that is not an array", self.text, expression.line)
+        return made.args
+
+    def number(self, expression: Expr) -> float:
+        """Return the value of an expression of constants and parameters.
+
+        Raises:
+            ModelicaTextError: it has none.
+        """
+        made = self if self.numeric else self.known()
+        value = made(expression)
+        if value.kind != "number":
+            raise ModelicaTextError(
+                "A number is needed here that constants and parameters determine.",
+                where=self.text.place(expression.line),
+            )
+        return value.args[0]
+
+    def count(self, expression: Expr) -> int:
+        """Return the value of an expression that is the size of an array.
+
+        Raises:
+            ModelicaTextError: it has none, or is no size.
+        """
+        size = self.number(expression)
+        self._told(lambda: fold.number(fold.count(size)), expression.line)
+        return int(size)
+
+    def known(self) -> Resolver:
+        """Return the same resolver with parameters as values."""
+        return Resolver(self.instance, self.text, self.local, numeric=True, classes=self.classes, depth=self.depth)
+
+    # -- names -------------------------------------------------------------------------------------------------------
+
+    def _name(self, expression: Expr) -> Expr:
+        head, subscripts = expression.args[0]
+        if head in self.local and len(expression.args) == 1:
+            return self.indexed(self.local[head], subscripts, expression.line)
+        if head == "time" and len(expression.args) == 1:
+            return Expr("name", (("time", ()),), expression.line)
+        if self.instance is not None and head in self.instance.members:
+            return self._member(self.instance, "", expression.args, expression.line)
+        return self._constant(expression)
+
+    def indexed(self, value: Expr, subscripts: tuple[Expr, ...], line: int) -> Expr:
+        """Return an element of an array."""
+        for k, one in enumerate(subscripts):
+            if value.kind != "array":
+                raise refused("a subscript of something that is not an array", self.text, line)
+            if one.kind == "all":
+                rest = subscripts[k + 1 :]
+                return Expr("array", tuple(self.indexed(item, rest, line) for item in value.args), line)
+            chosen = self.index(one, len(value.args))
+            if isinstance(chosen, Expr):
+                rest = subscripts[k + 1 :]
+                found = tuple(self.indexed(value, (index, *rest), line) for index in chosen.args)
+                return Expr("array", found, line)
+            value = value.args[chosen - 1]
+        return value
+
+    def index(self, expression: Expr, size: int) -> int | Expr:
+        """Return a subscript: a position, or an array of them; `end` is the size of the array.
+
+        Raises:
+            ModelicaTextError: it is no whole number from 1 to the size.
+        """
+        inside = self.known()
+        inside.local["end"] = fold.number(size)
+        chosen = inside(expression)
+        if chosen.kind == "array":
+            return chosen
+        position = inside.number(chosen)
+        if position != int(position) or not 1 <= position <= size:
+            what = f"The index {position:g} is {'outside' if position == int(position) else 'no whole number from'}"
+            raise ModelicaTextError(f"{what} 1 to {size}.", where=self.text.place(expression.line))
+        return int(position)
+
+    def _member(self, owner: Instance, before: str, parts: tuple[Any, ...], line: int) -> Expr:
+        """Resolve a path that begins with a member of an instance."""
+        (name, subscripts), rest = parts[0], parts[1:]
+        member = owner.members.get(name)
+        if member is None:
+            known = did_you_mean(name, owner.members) or "."
+            raise members.unknown_name(f"{owner.path or owner.text.name} has no '{name}'{known}", self.text, line)
+        basic = basic_type(owner, member)
+        if basic is not None:
+            if rest:
+                raise members.unknown_name(f"{name} is a number and has no '{rest[0][0]}'.", self.text, line)
+            return self._scalar(owner, member, basic, before + name, subscripts, line)
+        shape = members.sizes(owner, member)
+        if len(subscripts) > len(shape):
+            raise refused(f"a subscript of {name}, which is no array,", self.text, line)
+        whole = Expr("range", (fold.number(1), Expr("name", (("end", ()),), line)), line)
+        every = bool(shape) and (not subscripts or subscripts[0].kind == "all")
+        chosen = self.index(whole if every else subscripts[0], shape[0]) if shape else 0
+        if isinstance(chosen, Expr):
+            items = (((name, (one,)), *rest) for one in chosen.args)
+            return Expr("array", tuple(self._member(owner, before, one, line) for one in items), line)
+        part = members.part_of(owner, member, chosen)
+        path = f"{before}{name}[{chosen}]" if chosen else f"{before}{name}"
+        if not rest:
+            raise refused(f"{name}, a component, as a value", self.text, line)
+        if isinstance(part, Instance):
+            return self._member(part, f"{path}.", rest, line)
+        inner = ".".join(one + "".join(f"[{int(self.number(index))}]" for index in subs) for one, subs in rest)
+        if isinstance(part, Known):
+            inner = part.here(inner)
+            if self.numeric:
+                return members.value_of_known(owner, member, part, inner, self.text, line)
+            fields = part.type._class_fields
+            for below in table()["rates"].get(inner, "").split() if inner not in fields else ():
+                if below in fields:
+                    return Expr("call", ("der", (Expr("name", ((f"{path}.{below}", ()),), line),), ()), line)
+        return Expr("name", ((f"{path}.{inner}", ()),), line)
+
+    def _scalar(
+        self, owner: Instance, member: Member, basic: Basic, path: str, subscripts: tuple[Expr, ...], line: int
+    ) -> Expr:
+        declared = member.declaration
+        fixed = {"parameter", "constant"} & declared.prefixes
+        if fixed and (self.numeric or basic.kind != "Real" or declared.dimensions or "constant" in fixed):
+            return self.indexed(members.value_of(owner, declared.name, self.text, line), subscripts, line)
+        if not declared.dimensions:
+            return Expr("name" if basic.kind != "Boolean" else "condition", ((path, ()),), line)
+        return self.indexed(members.named_array(path, members.sizes(owner, member), basic.kind), subscripts, line)
+
+    def _constant(self, expression: Expr) -> Expr:
+        """Resolve a constant of a class, or a literal of an enumeration."""
+        path, line = expression.path, expression.line
+        package, _, name = path.rpartition(".")
+        found = self.find(package) if package else None
+        if package.endswith("StateSelect"):
+            return Expr("literal", (name,), line)
+        if isinstance(found, ClassText) and found.literals:
+            if name not in found.literals:
+                raise members.unknown_name(
+                    f"{package} has no '{name}'{did_you_mean(name, found.literals) or '.'}", self.text, line
+                )
+            return Expr("literal", (f"{found.name}.{name}",), line)
+        holder = found if isinstance(found, ClassText) else None
+        if holder is None and not package:
+            holder = self._around(name)
+        if holder is None:
+            holder = self._imported_constant(path)
+            name = path.rpartition(".")[2]
+        if isinstance(holder, ClassText):
+            inside = Instance(self.classes, holder, Given())
+            if name in inside.members:
+                return self.indexed(members.value_of(inside, name, self.text, line), expression.args[-1][1], line)
+        known = [*self.local, *(self.instance.members if self.instance else ())]
+        raise members.unknown_name(f"There is no '{path}'{did_you_mean(path, known) or '.'}", self.text, line)
+
+    def _imported_constant(self, name: str) -> ClassText | None:
+        """Return the package of a constant that is imported by its own name."""
+        level: ClassText | None = self.text
+        while level is not None:
+            for one in level.elements:
+                if isinstance(one, Import) and name in (one.alias, *one.names):
+                    found = self.classes.full(one.path if name in one.names else one.path.rpartition(".")[0])
+                    return found if isinstance(found, ClassText) else None
+            level = level.owner
+        return None
+
+    def _around(self, name: str) -> ClassText | None:
+        level: ClassText | None = self.text if self.instance is None else self.text.owner
+        while level is not None:
+            if any(isinstance(one, Declaration) and one.name == name for one in level.elements):
+                return level
+            level = level.owner
+        return None
+
+    def find(self, name: str) -> Any:
+        """Return the class that a name means."""
+        return self.instance.find(name, self.text) if self.instance else self.classes.find(name, self.text)
+
+    # -- calls -------------------------------------------------------------------------------------------------------
+
+    def _call(self, expression: Expr) -> Expr:
+        from modelica_like.netlist.modelica import functions
+
+        name, given, named = expression.args
+        line = expression.line
+        short = name.removeprefix("Modelica.Math.").removeprefix("Math.")
+        if short in _REFUSED:
+            raise refused(_REFUSED[short], self.text, line)
+        least, most = _ARGUMENTS.get(short, (0, len(given)))
+        if not least <= len(given) <= most:
+            count = f"{least} to {most}" if most > least else str(least)
+            what = f"{short}(…) has {count} argument{'s' if most != 1 else ''}, not {len(given)}."
+            raise ModelicaTextError(what, where=self.text.place(line))
+        if short == "homotopy":
+            others = dict(named)
+            return self._homotopy([*given, *(others[key] for key in ("actual", "simplified") if key in others)], line)
+        if short in ("smooth", "noEvent"):
+            value = self(given[1 if short == "smooth" else 0])
+            return value if value.kind in ("number", "array") else Expr("call", ("noEvent", (value,), ()), line)
+        if short in KEPT:
+            return Expr("call", (short, tuple(self(one) for one in given), ()), line)
+        if short == "size":
+            items = self._sized(given[0])
+            return functions.size(items, int(self.number(given[1])) if len(given) > 1 else 0, line)
+        values = tuple(self(one) for one in given)
+        if short in functions.OF_ARRAYS:
+            if not values or (short in ("sum", "product", "scalar", "transpose") and values[0].kind != "array"):
+                raise ModelicaTextError(f"{short}(…) needs an array.", where=self.text.place(line))
+            return self._told(lambda: functions.OF_ARRAYS[short](values, line), line)
+        if short in ELEMENTARY:
+            return self._told(lambda: fold.function(short, values, line), line)
+        others = {key: self(one) for key, one in named}
+        return self._told(lambda: functions.called(self, expression, values, others), line)
+
+    def _homotopy(self, given: list[Expr], line: int) -> Expr:
+        """Resolve a homotopy; one of arrays, or of what is known, is its actual expression."""
+        if len(given) != 2:
+            what = f"homotopy(…) has 2 arguments, actual and simplified, not {len(given)}."
+            raise ModelicaTextError(what, where=self.text.place(line))
+        actual, simplified = map(self, given)
+        known = actual.kind in ("number", "array") or simplified.kind == "array"
+        return actual if known else Expr("call", ("homotopy", (actual, simplified), ()), line)
+
+    def _sized(self, expression: Expr) -> Expr:
+        """Resolve an array for its size; one of components counts, too."""
+        simple = expression.kind == "name" and len(expression.args) == 1 and not expression.args[0][1]
+        member = self.instance.members.get(expression.path) if simple and self.instance is not None else None
+        if self.instance is None or member is None or basic_type(self.instance, member) is not None:
+            return self(expression)
+        return members.named_array(expression.path, members.sizes(self.instance, member), "")

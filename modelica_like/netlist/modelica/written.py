@@ -1,0 +1,269 @@
+"""A component written in Modelica: equations and events from resolved expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.errors import LanguageError, Source
+from modelica_like.language import (
+    TIME,
+    Assembly,
+    Connector,
+    Equations,
+    Events,
+    Expr,
+    assert_,
+    change,
+    clock,
+    delay,
+    der,
+    edge,
+    floor,
+    hold,
+    homotopy,
+    initial,
+    mod,
+    pre,
+    previous,
+    sample,
+    sign,
+    when,
+    where,
+)
+from modelica_like.language.discrete import Ending, is_a, silent
+from modelica_like.language.equation import Equation
+from modelica_like.language.expr import Symbol, symbol_of
+from modelica_like.language.fields import Discrete, Field
+from modelica_like.language.formula import Formula
+from modelica_like.netlist.modelica.tree import Expr as Node
+
+
+@dataclass
+class Happening:
+    """A `when` with its branches, or an assertion.
+
+    Attributes:
+        branches: conditions and new values by name; of an assertion one condition without values.
+        source: place in the text.
+        text: of an assertion.
+    """
+
+    branches: tuple[tuple[tuple[Node, ...], Mapping[str, Node]], ...]
+    source: Source
+    text: str = ""
+
+
+TERMINATE, ASSERT = "terminate()", "assert()"
+"""Among the new values of a `when`: it ends the run, with this text; and, followed by a number, where a condition is
+false then."""
+MEMORY = "_condition"
+"""Behind the name of a Boolean signal: the condition itself, which has a value before events."""
+
+
+class Written(Assembly):
+    """A component whose class is Modelica text.
+
+    Its numbers have no checked units, as in Modelica. What enters at its connectors counts as given to the outside: the
+    text does not say what is stored and what is lost.
+    """
+
+    units_checked = False
+    _statements: tuple[tuple[Node, Node, Source], ...] = ()
+    _initial: tuple[tuple[Node, Node, Source], ...] = ()
+    _happenings: tuple[Happening, ...] = ()
+    _instants: frozenset[str] = frozenset()
+
+    def __reduce__(self) -> Any:
+        # The class is made for one text; another process makes it again.
+        return _revived, (type(self).__name__,), self.__getstate__()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+
+    @property
+    def fields(self) -> dict[str, Field]:
+        """Declared fields; a copy, because the text of a class decides its equations, and not the class here."""
+        return dict(self._own_fields)
+
+    def equations(self) -> Equations:
+        """Yield the connections and the equations, each with its place in the text."""
+        yield from super().equations()
+        yield from self._equations(self._statements)
+
+    def initial_equations(self) -> Equations:
+        """Yield the equations of the start."""
+        yield from self._equations(self._initial)
+
+    def _equations(self, statements: Iterable[tuple[Node, Node, Source]]) -> Equations:
+        for left, right, source in statements:
+            yield Equation(self.symbolic(left), self.symbolic(right), source)
+
+    def events(self) -> Events:
+        """Yield the whens and the assertions."""
+        for one in self._happenings:
+            if one.text:
+                yield replace(assert_(self.symbolic(one.branches[0][0][0]), one.text), source=one.source)
+                continue
+            made = None
+            for conditions, values in one.branches:
+                active = tuple(self.symbolic(condition) for condition in conditions)
+                new = dict[Any, Any](self._changed(path, value) for path, value in values.items())
+                made = when(active, new) if made is None else made.elsewhen(active, new)
+            if made is not None:
+                yield replace(made, source=one.source)
+
+    def _changed(self, path: str, value: Node) -> tuple[Any, Any]:
+        """Return what a `when` changes, and its new value."""
+        if path == TERMINATE:
+            return Ending(f"says: {value.args[0]}"), 1.0
+        if path.startswith(ASSERT):
+            holds, words = value.args
+            return Ending(words.args[0], fails=True), where(self.symbolic(holds, events=None), 0.0, 1.0, events=None)
+        return self._symbol(path), self.symbolic(value, events=None)
+
+    def source_power(self) -> Expr | float:
+        """Return minus the power that enters at own connectors, unless parts take it on."""
+        joined = {end for ends in self.wires.values() for end in ends}
+        total: Any = 0.0
+        for name, one in self.connectors.items():
+            total = total if name in joined else total - one.power()
+        return total
+
+    def symbolic(self, node: Node, events: bool | None = True) -> Any:
+        """Return a resolved expression in symbols.
+
+        Args:
+            node: the expression.
+            events: whether its steps make events, as of `where`; None in what changes at events only.
+        """
+        kind, args = node.kind, node.args
+        if kind == "number":
+            return ca.SX(args[0])
+        if kind == "boolean":
+            return ca.SX(1.0 if args[0] else 0.0)
+        if kind == "name":
+            return self._symbol(args[0][0])
+        if kind == "condition":
+            symbol = self._symbol(args[0][0])
+            if f"{symbol.name}{MEMORY}" in symbol.owner.fields:
+                symbol = symbol_of(symbol.owner, f"{symbol.name}{MEMORY}")
+            discrete = isinstance(symbol.owner.fields[symbol.name], Discrete)
+            return symbol if discrete else ca.SX(symbol) > 0.5
+        if kind == "if":
+            made = self.symbolic(args[-1], events)
+            for condition, value in reversed(list(zip(args[:-1:2], args[1::2], strict=True))):
+                made = where(self.symbolic(condition, events), self.symbolic(value, events), made, events=events)
+            return made
+        if kind == "call":
+            events = False if args[0] == "noEvent" else events
+            return self._called(args[0], [self.symbolic(one, events) for one in args[1]], events)
+        made = _OPERATIONS[kind](*(self.symbolic(one, events) for one in args))
+        return silent(made) if events is False and kind in _RELATIONS else made
+
+    def _called(self, name: str, values: list[Any], events: bool | None) -> Any:
+        if name == "pre" and not (isinstance(values[0], Symbol) and is_a(values[0], Discrete)):
+            return values[0]  # of a state: the value before the event, as in all new values
+        return _STEPPED[name](*values, events) if name in _STEPPED else FUNCTIONS[name](*values)
+
+    def _symbol(self, path: str) -> Any:
+        if path == "time":
+            return TIME
+        owner: Any = self
+        *steps, last = path.split(".")
+        for step in steps:
+            inside = {} if isinstance(owner, Connector) else {**owner.parts, **owner.connectors}
+            if step not in inside:
+                raise LanguageError(f"{self.label} uses {path}, but there is no '{step}'.")
+            owner = inside[step]
+        if last not in owner.fields:
+            raise LanguageError(f"{self.label} uses {path}, but {owner.label} has no variable '{last}'.")
+        return symbol_of(owner, last)
+
+
+class WrittenConnector(Connector):
+    """A connector whose class is Modelica text; its fields are its own."""
+
+    kind = ""
+
+
+_RELATIONS: dict[str, Callable[..., Any]] = {
+    "<": lambda a, b: a < b, "<=": lambda a, b: a <= b, ">": lambda a, b: a > b, ">=": lambda a, b: a >= b,
+    "==": lambda a, b: a == b, "<>": lambda a, b: a != b,
+}  # fmt: skip
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "/": lambda a, b: a / b,
+    "^": lambda a, b: a**b, "neg": lambda a: -a,
+    **_RELATIONS, "and": ca.logic_and, "or": ca.logic_or, "not": ca.logic_not,
+}  # fmt: skip
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **{name: getattr(ca, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")},
+    **{name: getattr(ca, name) for name in ("tanh", "exp", "log", "log10", "sqrt")},
+    "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax, "noEvent": lambda x: x,
+    "der": der, "pre": pre, "edge": edge, "change": change, "initial": initial,
+    "delay": lambda value, time, most=None: delay(value, time),
+    "sample": lambda value, period=None: sample(value) if period is None else clock(period, value),
+    "Clock": lambda period, parts=1: clock(period / parts), "previous": previous, "hold": hold, "homotopy": homotopy,
+}  # fmt: skip
+
+
+def _towards_zero(x: Any, events: bool | None) -> Any:
+    return sign(x, events=None if events else events) * floor(ca.fabs(x), events=events)
+
+
+_STEPPED: dict[str, Callable[..., Any]] = {
+    "sign": lambda x, events: sign(x, events=events),
+    "floor": lambda x, events: floor(x, events=events), "integer": lambda x, events: floor(x, events=events),
+    "ceil": lambda x, events: -floor(-x, events=events),
+    "mod": lambda x, y, events: mod(x, y, events=events),
+    "div": lambda x, y, events: _towards_zero(x / y, events),
+    "rem": lambda x, y, events: x - y * _towards_zero(x / y, events),
+}  # fmt: skip
+"""Functions that jump, by their arguments and whether the jumps are events."""
+_IN_FORMULAS = {"sqrt", "abs", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh", "min", "max"}
+
+
+_classes: dict[str, type[Written]] = {}
+
+
+def written_class(name: str) -> type[Written]:
+    """Return the class for a name, always the same one."""
+    if name not in _classes:
+        _classes[name] = type(name, (Written,), {})
+    return _classes[name]
+
+
+def _revived(name: str) -> Written:
+    kind = written_class(name)
+    return kind.__new__(kind)
+
+
+def as_formula(node: Node, prefix: str = "") -> Formula | float | None:
+    """Return a resolved expression as a formula of parameters, or a number; None if formulas cannot have it.
+
+    Args:
+        node: the expression.
+        prefix: path of the component whose names it uses, with a dot, seen from where the formula is read.
+    """
+    if node.kind == "number":
+        return node.args[0]
+    return _formula(node, prefix)
+
+
+def _formula(node: Node, prefix: str) -> Formula | None:
+    kind, args = node.kind, node.args
+    if kind == "number":
+        return Formula("number", (args[0],))
+    if kind == "name" and args[0][0] != "time":
+        return Formula("name", (prefix + args[0][0],))
+    if kind == "call" and args[0] in ("noEvent", "homotopy"):
+        return _formula(args[1][0], prefix)
+    operation = {"^": "**"}.get(kind, kind) if kind in ("+", "-", "*", "/", "^", "neg") else ""
+    operands = args
+    if kind == "call" and args[0] in _IN_FORMULAS:
+        operation, operands = args[0], args[1]
+    inner = [_formula(one, prefix) for one in operands] if operation else [None]
+    return None if any(one is None for one in inner) else Formula(operation, tuple(inner))

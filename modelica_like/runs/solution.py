@@ -1,0 +1,202 @@
+"""The result of a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import UnknownName, did_you_mean
+from modelica_like.language.transition import NAME_IN_NOTICE
+from modelica_like.options import Options
+from modelica_like.runs.energy import EnergyBalance, energy_balance
+from modelica_like.runs.rates import differentiated, rate_along
+from modelica_like.runs.reading import TOGETHER, blocks, energy_term, variables
+from modelica_like.runs.trajectories import ENERGY_TERMS, Statistics, Trajectories, Values
+from modelica_like.solve.dense import Dense
+from modelica_like.solve.idas import Integrator
+from modelica_like.solve.initialize import Impact, Point, StartKind
+from modelica_like.solve.recorder import Ended, Event, Segment
+
+
+@dataclass(eq=False)
+class Solution(Trajectories):
+    """Trajectories of all variables of the unreduced model, in SI units.
+
+    Attributes:
+        model: the compiled model with the parameter values of the run.
+        options: the options of the run.
+        segments: smooth pieces with fixed modes.
+        events: mode changes.
+        statistics: of the run.
+        impacts: losses in impacts.
+        notices: messages about the run.
+        start: kind of its start.
+        dense: returns its dense output, or None if that was not kept.
+    """
+
+    model: CompiledDae
+    options: Options
+    segments: tuple[Segment, ...]
+    events: tuple[Event, ...]
+    statistics: Statistics
+    impacts: tuple[Impact, ...] = ()
+    notices: tuple[str, ...] = ()
+    start: StartKind = "given"
+    readings: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    dense: Callable[[], Dense] | None = field(default=None, repr=False)
+    _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def time(self) -> Vector:
+        """Times of the results in s: a regular grid, and both sides of every event."""
+        if "time" not in self._cache:
+            self._cache["time"] = np.concatenate([s.times for s in self.segments])
+        return self._cache["time"]
+
+    @property
+    def ended(self) -> Ended | None:
+        """Where and why a component has ended the run, or None."""
+        ends = (one for one in self.events if one.transition >= 0 and self.model.transitions[one.transition].ends)
+        if (event := next(ends, None)) is None:
+            return None
+        component, dot, _ = event.mode.rpartition(".")
+        text = self.model.transitions[event.transition].notice
+        reason = NAME_IN_NOTICE.sub(lambda name: f"{self.final[component + dot + name[1]]:g}", text)
+        return Ended(event.time, component or self.model.name, reason)
+
+    def __getitem__(self, key: str | Any) -> Vector:
+        """Return a trajectory, shape (len(time),).
+
+        Args:
+            key: path of a variable, mode, discrete value, parameter, or of an energy term (`clutch.loss_power`), the
+                time derivative of a variable (`der(load.w)`), or a component's attribute.
+
+        Raises:
+            UnknownName: there is no such variable.
+        """
+        path = self.path(key)
+        if path == "time":
+            return self.time
+        model = self.model
+        if path in model.position:
+            row = model.position[path]
+            return self._all()[row] if self._small else variables(model, self.segments, [row])[0]
+        if path in model.discrete_position:
+            row = model.discrete_position[path]
+            return np.repeat([s.d[row] for s in self.segments], [len(s.times) for s in self.segments])
+        if path in model.parameter_position:
+            return np.full(len(self.time), model.p[model.parameter_position[path]])
+        if path in model.derived_position:
+            return np.full(len(self.time), float(model.derived(model.p)[model.derived_position[path]]))
+        if name := differentiated(path):
+            return np.concatenate([rate_along(model, name, *block) for block in blocks(self.segments)])
+        owner, _, term = path.rpartition(".")
+        if term in ENERGY_TERMS and owner in model.components:
+            return energy_term(model, self.segments, model.components.index(owner), ENERGY_TERMS.index(term))
+        known = [*model.position, *model.discrete_position, *model.parameter_position, *model.derived_position]
+        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
+
+    def __contains__(self, key: object) -> bool:
+        path = self.path(key)  # type: ignore[arg-type]
+        model = self.model
+        known = (model.position, model.discrete_position, model.parameter_position, model.derived_position)
+        return any(path in one for one in known) or differentiated(path) in model.position
+
+    @property
+    def _small(self) -> bool:
+        return len(self.time) * len(self.model.flat_variables) <= TOGETHER
+
+    def _all(self) -> Vector:
+        if "variables" not in self._cache:
+            self._cache["variables"] = variables(self.model, self.segments, None)
+        return self._cache["variables"]
+
+    def together(self, *keys: str | Any) -> dict[str, Vector]:
+        """Return several trajectories by path, each of shape (len(time),); faster than one by one.
+
+        Raises:
+            UnknownName: there is no such variable.
+        """
+        paths = [self.path(key) for key in keys]
+        found = list(dict.fromkeys(path for path in paths if path in self.model.position and not self._small))
+        rows = [self.model.position[path] for path in found]
+        known = dict(zip(found, variables(self.model, self.segments, rows), strict=True)) if found else {}
+        return {path: known[path] if path in known else self[path] for path in paths}
+
+    def at(self, t: float) -> Values:
+        """Return all variables at a time, integrated from the result before (after an event at that time).
+
+        Raises:
+            ValueOutOfRange: the time is not within the run.
+        """
+        return self._values(self.point(t))
+
+    def point(self, t: float) -> Point:
+        """Return states, implicit unknowns and modes at a time, integrated from the result before.
+
+        Raises:
+            ValueOutOfRange: the time is not within the run.
+        """
+        self._check_within(t)
+        segment = next(s for s in reversed(self.segments) if s.times[0] <= t)
+        k = int(np.searchsorted(segment.times, t, side="right")) - 1
+        point = segment.point(k)
+        if t > point.t:
+            x, z = Integrator(self.model, self.options).run(point, t - point.t)
+            point.t, point.x, point.z = t, x[:, 0], z[:, 0]
+        return point
+
+    @property
+    def final(self) -> Values:
+        """All variables at the end."""
+        return self._values(self.segments[-1].point(-1))
+
+    def _values(self, now: Point) -> Values:
+        one = Segment(np.array([now.t]), now.x[:, None], now.z[:, None], now.d)
+        return Values(replace(self, segments=(one,), _cache={}))
+
+    def energy(self, begin: float | None = None, end: float | None = None) -> EnergyBalance:
+        """Return the energy balance of every component over the run, or over a part of it.
+
+        Args:
+            begin: time in s; an event at that time counts.
+            end: time in s; an event at that time does not count, unless the run ends there.
+
+        Raises:
+            ValueOutOfRange: a time is not within the run.
+        """
+        key = "balance", begin, end
+        if key not in self._cache:
+            first, last = (self.time[k] if t is None else float(t) for k, t in ((0, begin), (-1, end)))
+            segments = self.segments if (begin, end) == (None, None) else tuple(self._part(first, last))
+            until = np.inf if last == self.time[-1] else last
+            events = [one for one in self.events if first <= one.time < until]
+            impacts = [one for one in self.impacts if first <= one.time < until]
+            self._cache[key] = energy_balance(self.model, segments, self.options, events, impacts)
+        return self._cache[key]
+
+    def _part(self, begin: float, end: float) -> Iterator[Segment]:
+        """Yield the segments between two times."""
+        edges = {t: self.point(t) for t in (begin, end)}
+        for one in self.segments:
+            inside = (one.times >= begin) & (one.times <= end)
+            cuts = [edges[t] for t in (begin, end) if one.times[0] < t < one.times[-1] and t not in one.times[inside]]
+            times = np.concatenate([one.times[inside], [cut.t for cut in cuts]])
+            order = np.argsort(times, kind="stable")
+            if len(order) > 1:
+                x, z = (np.column_stack([getattr(one, n)[:, inside], *(getattr(c, n) for c in cuts)]) for n in "xz")
+                yield Segment(times[order], x[:, order], z[:, order], one.d)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_cache": {}, "dense": None}
+
+    def __repr__(self) -> str:
+        span = f"t = {self.time[0]:g} … {self.time[-1]:g} s"
+        return (
+            f"<Solution of {self.model.name}: {len(self.model.flat_variables)} variables, {span}, "
+            f"{len(self.events)} mode changes, {self.statistics.steps} steps in {self.statistics.seconds * 1e3:.1f} ms>"
+        )

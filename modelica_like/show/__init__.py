@@ -1,0 +1,1 @@
+"""What people see: plots, schematics, tables, reports, pages in a browser."""

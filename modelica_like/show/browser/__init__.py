@@ -1,0 +1,1 @@
+"""A drive as one page that computes it in a browser."""

@@ -1,0 +1,291 @@
+"""A drive as one page for a browser: the compiled run-time, the model, sliders and curves, without a server."""
+
+from __future__ import annotations
+
+import base64
+import ctypes
+import gzip
+import hashlib
+import json
+import re
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import UnknownName
+from modelica_like.flatten.model import FlatParameter
+from modelica_like.fmi.build import BROWSER
+from modelica_like.fmi.export import Report, compiled_open, silent, tool
+from modelica_like.fmi.interface import FmuVariable, interface
+from modelica_like.fmi.model_file import model_file
+from modelica_like.fmi.package import target_file
+from modelica_like.fmi.runtime import runtime_library
+from modelica_like.fmi.tables import make_tables
+from modelica_like.language.formula import Formula
+from modelica_like.language.units import ANY, ONE, Unit, coherent, parse_unit
+from modelica_like.native.library import MESSAGE_LENGTH, Run
+from modelica_like.options import Options
+from modelica_like.runs.display import Display
+from modelica_like.runs.signals import Signal, si_value
+from modelica_like.show.plot import for_page
+from modelica_like.show.plot import quantity as quantity_of
+from modelica_like.simulation import Model, seconds, simulate, without_garbage_search
+from modelica_like.writing import write_bytes
+
+_SPREAD = 5.0
+"""Sliders without bounds span from the value divided by this to the value times this."""
+HELPERS = Path(__file__).parent / "helpers.js"
+"""Common code of the scripts of pages."""
+_POINTER_SIZE = 4
+_HIGH = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+@dataclass(frozen=True)
+class Page:
+    """A written page.
+
+    Attributes:
+        path: the page.
+        sliders: number of adjustable parameters and inputs, without the end time.
+        curves: number of curves shown at first.
+        size: of the file in bytes.
+        seconds: wall time.
+    """
+
+    path: Path
+    sliders: int
+    curves: int
+    size: int
+    seconds: float
+
+    def __str__(self) -> str:
+        counts = f"{self.sliders} sliders, {self.curves} curves"
+        return f"{self.path}: {counts}, {self.size / 1000:.0f} kB, {self.seconds:.1f} s"
+
+
+@without_garbage_search()
+def export_html(
+    drive: Model, path: str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
+    report: Report = silent,
+) -> Page:  # fmt: skip
+    """Write a drive as a page that simulates it in a browser: one file that loads nothing else.
+
+    It has a slider for every tunable parameter and for every input without a value, and curves over time by unit, with
+    modes and events. Sliders go from min to max if both are declared, otherwise from a fifth of the value to five
+    times the value. IDAS runs the drive once first, to choose the curves.
+
+    Args:
+        drive: a component, a netlist file, or a compiled model.
+        path: the page to write, with the ending .html.
+        until: end time, a number in s or a quantity; by default that of the netlist.
+        show: names, patterns or formulas of the first curves; by default speeds, torques and forces of the parts, or
+            what a circuit has.
+        report: called with the present activity.
+
+    Raises:
+        ExportError: it cannot be exported, or the run-time cannot be compiled.
+        MissingExtra: the run-time must be compiled, and zig is not installed.
+        UnknownName: nothing matches a pattern.
+        ModelicaLikeError: the model has an error or no end time, or cannot be simulated.
+    """
+    begin = time.perf_counter()
+    target = target_file(path, ".html", "A page")
+    report("compiling the model")
+    model, description, _ = compiled_open(drive, (), "flow", ())
+    report("simulating")
+    end = seconds(until if until is not None else model.settings.get("until"))
+    solution = simulate(model, end)
+    content = page_content(model, for_page(solution, show)[0], end, solution.options)
+    report("writing the page")
+    variables = interface(model)
+    data = model_file(make_tables(model, variables.start), variables.variables, "{page}", solution.options.rtol)
+    content |= {
+        "model": _text(data), "runtime": _text(runtime_library(BROWSER.name, report).read_bytes()),
+        "layout": _layout(), "message_length": MESSAGE_LENGTH,
+    }  # fmt: skip
+    write_bytes(target, page(model.name, description, content, Path(__file__).parent / "wasm.js").encode())
+    shown = sum(one["shown"] for one in content["variables"])
+    size, elapsed = target.stat().st_size, time.perf_counter() - begin
+    return Page(target, len(content["sliders"]) - 1, shown, size, elapsed)
+
+
+def page(
+    name: str, description: str, content: Mapping[str, Any], runner: Path, *, schematic: str = "", more: str = "",
+    connect: str = "'none'",
+) -> str:  # fmt: skip
+    """Return a page with sliders and curves.
+
+    Args:
+        name: of the drive.
+        description: of the drive.
+        content: what `page_content` has returned, and what the runner reads.
+        runner: the script that runs the drive: it defines `openDrive`.
+        schematic: SVG above the curves.
+        more: HTML below the curves.
+        connect: where the page may ask, as its policy says it.
+    """
+    folder = Path(__file__).parent
+    # No text may contain the end of the script.
+    data = json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+    script = joined_scripts(HELPERS, runner, folder / "page.js")
+    parts = {
+        "name": escape(name), "description": escape(description), "page": data, "more": more, "connect": connect,
+        "schematic": schematic, "script": script, "hash": script_hash(script),
+    }  # fmt: skip
+    text = (folder / "page.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], text)
+
+
+def joined_scripts(*files: Path) -> str:
+    """Return the script of a page."""
+    return "\n".join(one.read_text(encoding="utf-8").rstrip() for one in files)
+
+
+def script_hash(script: str) -> str:
+    """Return how a content policy names a script: only this one runs, whatever else gets into the page."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+def page_content(model: CompiledDae, signals: Sequence[Signal], until: float, options: Options) -> dict[str, Any]:
+    """Return what the script of a page reads: sliders, variables, modes and units.
+
+    Args:
+        model: the compiled model.
+        signals: curves that are drawn at first.
+        until: end time in s.
+        options: of the runs.
+
+    Raises:
+        UnknownName: a formula has an energy in it.
+    """
+    variables = interface(model)
+    end = {
+        "name": "end time", "group": "", "reference": None, "description": "", "unit": "s", "factor": 1.0,
+        "offset": 0.0, "value": until, "low": until / _SPREAD, "high": until * _SPREAD, "log": True,
+    }  # fmt: skip
+    units, display = _Units(), Display(model)
+    return {
+        "tool": tool(), "until": until,
+        "rtol": options.rtol, "atol": options.atol, "points": options.points, "most_events": options.max_events,
+        "sliders": [end, *_sliders(model, variables.by_name, display)],
+        "variables": list(_variables(model, variables.by_name, signals, units, display)),
+        "modes": [
+            {
+                "name": one.path, "reference": variables.by_name[one.path].reference, "names": one.names or None,
+                "unit": units.number(ONE), "driving": 1,
+            }
+            for one in model.flat_discretes
+            if not one.hidden
+        ],
+        "units": units.rows,
+    }  # fmt: skip
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(gzip.compress(data, mtime=0)).decode()
+
+
+def _layout() -> dict[str, int]:
+    """Offsets of the fields of `NativeRun` with pointers of four bytes."""
+    places: dict[str, int] = {}
+    place = 0
+    for field in Run._fields_:
+        size = _POINTER_SIZE if field[1] is ctypes.c_void_p else ctypes.sizeof(field[1])
+        places[field[0]] = place + -place % size
+        place = places[field[0]] + size
+    return places | {"size": place}
+
+
+class _Units:
+    """Shown units, each once."""
+
+    def __init__(self) -> None:
+        self.rows: list[dict[str, Any]] = []
+        self._numbers: dict[Unit, int] = {}
+
+    def number(self, unit: Unit) -> int:
+        """Return the position of a unit."""
+        if unit not in self._numbers:
+            self._numbers[unit] = len(self.rows)
+            quantity = quantity_of(str(coherent(unit)))
+            row = {"text": _spelled(unit), "factor": unit.factor, "offset": unit.offset, "quantity": quantity}
+            self.rows.append(row)
+        return self._numbers[unit]
+
+
+def _spelled(unit: Unit) -> str:
+    """Write a unit in print form: `kg·m²`."""
+    if unit in (ONE, ANY):
+        return ""
+    text = "°" if str(unit) == "deg" else str(unit).replace(".", "·")
+    return re.sub(r"(?<=[A-Za-z])\d+", lambda found: found[0].translate(_HIGH), text)
+
+
+def _variables(
+    model: CompiledDae, known: dict[str, FmuVariable], signals: Sequence[Signal], units: _Units, display: Display
+) -> Iterator[dict[str, Any]]:
+    """Variables, each with its value reference; formulas as trees over several references."""
+    names, variables = {one.name for one in signals}, {one.path for one in model.flat_variables} & known.keys()
+    for one in model.flat_variables:
+        if one.path in known and (one.path in names or one.kind in ("local", "output")):
+            yield {
+                "name": one.path, "reference": known[one.path].reference, "description": one.description,
+                "unit": units.number(parse_unit(display.of(one.path))), "shown": one.path in names,
+                "driving": one.driving,
+            }  # fmt: skip
+    for one in signals:
+        if one.name not in variables:
+            references: list[int] = []
+            yield {
+                "name": one.name, "tree": _tree(one.formula, known, references), "references": references,
+                "unit": units.number(parse_unit(one.shown_in(display))), "shown": True, "driving": 1,
+            }  # fmt: skip
+
+
+def _tree(formula: Formula, known: Mapping[str, FmuVariable], references: list[int]) -> Any:
+    """A number; `[place]` for the value of a reference, -1 for time; or `[operation, operands…]`."""
+    kind, operands = formula.operation, formula.operands
+    if kind in ("number", "quantity"):
+        return operands[0] if kind == "number" else si_value(operands[0])
+    if kind != "name":
+        return [kind, *(_tree(one, known, references) for one in operands)]
+    if operands[0] != "time" and operands[0] not in known:
+        raise UnknownName(f"A page with sliders cannot show '{operands[0]}': it has variables, parameters and modes.")
+    if operands[0] != "time":
+        references.append(known[operands[0]].reference)
+    return [len(references) - 1 if operands[0] != "time" else -1]
+
+
+def _sliders(model: CompiledDae, known: dict[str, FmuVariable], display: Display) -> Iterator[dict[str, Any]]:
+    """Adjustable values in the shown unit, with factor and offset to SI units."""
+    inputs = (model.flat_variables[k] for k in model.inputs)
+    for one in (*model.flat_parameters, *inputs):
+        if isinstance(one, FlatParameter) and not one.tunable:
+            continue
+        about, asked = known[one.path], display.of_quantity(str(one.unit))
+        unit = one.written if isinstance(one, FlatParameter) and one.written and asked == str(one.unit) else None
+        unit = unit or parse_unit(asked)
+        shown = (None if si is None else (si - unit.offset) / unit.factor for si in (about.start, one.min, one.max))
+        value, least, most = shown
+        low, high, log = _span(value or 0.0, least, most)
+        yield {
+            "name": one.path, "group": one.path.rpartition(".")[0], "reference": about.reference,
+            "description": one.description, "unit": _spelled(unit), "factor": unit.factor, "offset": unit.offset,
+            "value": value or 0.0, "low": low, "high": high, "log": log,
+        }  # fmt: skip
+
+
+def _span(value: float, low: float | None, high: float | None) -> tuple[float, float, bool]:
+    """Return the range of a slider, and whether its scale is logarithmic."""
+    if low is not None and high is not None:
+        return low, high, False
+    first, last = sorted((value / _SPREAD, value * _SPREAD)) if value else (-1.0, 1.0)
+    if low is not None:
+        first = max(first, low)
+    if high is not None:
+        last = min(last, high)
+    return first, last, first * last > 0.0

@@ -1,0 +1,248 @@
+"""Layers of a schematic: columns from west to east, and the order in each."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import casadi as ca
+
+from modelica_like.language.icon import SIGNAL
+from modelica_like.show.draw.diagram import Diagram, Net, Node, Port
+
+_ROUNDS = 12
+"""Number of sweeps that order all columns, from west to east and back in turn."""
+
+
+@dataclass(eq=False)
+class Slot:
+    """A place in a layer: a node, or a net that passes.
+
+    Attributes:
+        node: the node.
+        net: the net.
+    """
+
+    node: Node | None = None
+    net: Net | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """Where a net meets a channel, the space between two layers.
+
+    Attributes:
+        slot: the node or passing net it comes from.
+        port: the port of the node.
+    """
+
+    slot: Slot
+    port: Port | None = None
+
+
+@dataclass(eq=False)
+class Channel:
+    """The space between two layers.
+
+    Attributes:
+        nets: the nets in it, with their ends in the layer before and in the layer after.
+    """
+
+    nets: dict[Net, tuple[list[End], list[End]]] = field(default_factory=dict["Net", "tuple[list[End], list[End]]"])
+
+
+@dataclass(eq=False)
+class Layers:
+    """Columns of slots; channel k lies before column k, the last one after all columns."""
+
+    columns: list[list[Slot]]
+    channels: list[Channel]
+
+
+def layered(diagram: Diagram) -> Layers:
+    """Assign every node to a column, let long nets pass between nodes, and order columns so that few lines cross."""
+    column_of = _columns(diagram)
+    made = Layers(
+        [[] for _ in range(max(column_of.values(), default=-1) + 1)],
+        [Channel() for _ in range(max(column_of.values(), default=-1) + 2)],
+    )
+    slots = {node: Slot(node) for node in diagram.nodes}
+    for node in diagram.nodes:
+        made.columns[column_of[node]].append(slots[node])
+    for net in diagram.nets:
+        met: dict[int, tuple[list[End], list[End]]] = defaultdict(lambda: ([], []))
+        for port in net.ports:
+            east = port.way == "E"
+            met[column_of[port.node] + east][not east].append(End(slots[port.node], port))
+        for k in range(min(met), max(met)):
+            passing = Slot(net=net)
+            made.columns[k].append(passing)
+            met[k][1].append(End(passing))
+            met[k + 1][0].append(End(passing))
+        for k, ends in met.items():
+            made.channels[k].nets[net] = ends
+    _order(made)
+    return made
+
+
+def _columns(diagram: Diagram) -> dict[Node, int]:
+    """Shortest total length by a linear programme; lines that would close a cycle, signals first, may run backwards."""
+    nodes = diagram.nodes
+    place = {node: k for k, node in enumerate(nodes)}
+    if not nodes:
+        return {}
+    x = ca.SX.sym("x", len(nodes))
+    after = dict[Node, set[Node]]()
+    steps: list[ca.SX] = []
+    cost = ca.SX(0)
+    spans: list[tuple[ca.SX, int]] = []
+    for net in sorted(diagram.nets, key=lambda one: -one.stroke.weight):
+        west, east = ([port.node for port in net.ports if port.way == way] for way in ("E", "W"))
+        for a in west:
+            for b in east:
+                if a is not b and not _reaches(after, b, a):
+                    after.setdefault(a, set()).add(b)
+                    steps.append(x[place[b]] - x[place[a]])
+        spans.append((ca.vertcat(*[x[place[port.node]] for port in net.ports]), net.stroke.weight))
+    low, high = ca.SX.sym("low", len(spans)), ca.SX.sym("high", len(spans))
+    bounds: list[ca.SX] = []
+    for k, (inside, weight) in enumerate(spans):
+        cost += weight * (high[k] - low[k])
+        bounds += [inside - low[k], high[k] - inside]
+    for node in nodes:
+        if node.border:
+            others = [place[one] for one in nodes if one.border != node.border]
+            steps += [(x[k] - x[place[node]]) * (1 if node.border == "W" else -1) for k in others]
+    solution = solve_lp(
+        ca.vertcat(x, low, high), cost + 1e-3 * ca.sum1(x), [(ca.vertcat(*steps), 1.0), (ca.vertcat(*bounds), 0.0)]
+    )
+    found = [round(float(value)) for value in solution[: len(nodes)]]
+    return {node: value - min(found) for node, value in zip(nodes, found, strict=True)}
+
+
+def solve_lp(x: ca.SX, cost: ca.SX, least: list[tuple[ca.SX, float | ca.DM]]) -> list[float]:
+    """Minimize a linear cost of x ≥ 0.
+
+    Args:
+        x: the unknowns.
+        cost: the cost.
+        least: linear expressions and their lower bounds.
+    """
+    g = ca.vertcat(*[expression for expression, _ in least])
+    low = ca.vertcat(*[ca.DM.ones(expression.shape[0]) * bound for expression, bound in least])
+    problem = {"x": x, "f": cost, "g": g}
+    options = {"highs": {"output_flag": False}, "print_time": False, "error_on_fail": True}
+    found = ca.qpsol("schematic", "highs", problem, options)(lbg=low, ubg=ca.inf, lbx=0)
+    return [float(value) for value in ca.vertsplit(found["x"])]
+
+
+def _reaches(after: dict[Node, set[Node]], start: Node, goal: Node) -> bool:
+    pending, seen = [start], set[Node]()
+    while pending:
+        node = pending.pop()
+        if node is goal:
+            return True
+        if node not in seen:
+            seen.add(node)
+            pending.extend(after.get(node, ()))
+    return False
+
+
+def _order(layers: Layers) -> None:
+    """Order each column by the mean place of its neighbours, back and forth; keep the best order."""
+    found: list[tuple[float, list[list[Slot]]]] = []
+    given = [list(column) for column in layers.columns]
+    for begin in (given, [sorted(column, key=_signals_first) for column in given]):
+        layers.columns[:] = [list(column) for column in begin]
+        for k in range(_ROUNDS):
+            east = k % 2 == 0
+            numbers = range(len(layers.columns))
+            for n in numbers if east else reversed(numbers):
+                _sort(layers, n, east)
+            _swap(layers)
+            found.append((_crossings(layers), [list(column) for column in layers.columns]))
+    layers.columns[:] = min(found, key=lambda one: one[0])[1]
+
+
+def _signals_first(slot: Slot) -> bool:
+    if slot.node is None:
+        return slot.net is None or slot.net.stroke is not SIGNAL
+    return any(not port.signal for port in slot.node.ports.values())
+
+
+def _sort(layers: Layers, n: int, east: bool) -> None:
+    """Order column n by the places in the column before (or after)."""
+    places = _places(layers)
+    channel = layers.channels[n if east else n + 1]
+    wanted: dict[Slot, list[tuple[float, int]]] = defaultdict(list)
+    for net, (before, after) in channel.nets.items():
+        own, others = (after, before) if east else (before, after)
+        for end in own:
+            near = others or [one for one in own if one is not end]
+            for other in near:
+                # A port above the middle of its node wants its node lower.
+                offset = (end.port.along if end.port else 0.0) * 0.01
+                wanted[end.slot].append((places[other.slot] + _port_shift(other) - offset, net.stroke.weight))
+    column = layers.columns[n]
+    mean = {
+        slot: sum(place * weight for place, weight in found) / sum(weight for _, weight in found)
+        for slot, found in wanted.items()
+    }
+    fixed = [slot for slot in column if slot not in mean]
+    movable = sorted((slot for slot in column if slot in mean), key=lambda slot: mean[slot])
+    kept = {column.index(slot): slot for slot in fixed}
+    ordered = iter(movable)
+    layers.columns[n] = [kept[k] if k in kept else next(ordered) for k in range(len(column))]
+
+
+def _port_shift(end: End) -> float:
+    if end.port is None:
+        return 0.0
+    up = {"N": -0.4, "S": 0.4}.get(end.port.side, 0.0)
+    return up + 0.004 * end.port.along
+
+
+def _places(layers: Layers) -> dict[Slot, float]:
+    return {slot: float(k) for column in layers.columns for k, slot in enumerate(column)}
+
+
+def _crossings(layers: Layers) -> float:
+    places = _places(layers)
+    return sum(_crossings_in(channel, places) for channel in layers.channels)
+
+
+def _crossings_in(channel: Channel, places: dict[Slot, float]) -> float:
+    lines = [
+        (places[a.slot] + _port_shift(a), places[b.slot] + _port_shift(b), net)
+        for net, (before, after) in channel.nets.items()
+        for a in before or after[:1]
+        for b in after or before[:1]
+    ]
+    count = 0.0
+    for k, (a, b, net) in enumerate(lines):
+        for c, d, other in lines[k + 1 :]:
+            if net is not other and (a - c) * (b - d) < 0:
+                count += 1.0 + 0.1 * min(net.stroke.weight, other.stroke.weight)
+    # Nets with both ends on one side enclose the slots between.
+    return count + sum(0.05 * abs(a - b) for a, b, _ in lines)
+
+
+def _swap(layers: Layers) -> None:
+    """Exchange neighbours as long as crossings decrease."""
+    for n, column in enumerate(layers.columns):
+        near = (layers.channels[n], layers.channels[n + 1])
+        places = _places(layers)
+        now = sum(_crossings_in(channel, places) for channel in near)
+        better = True
+        while better:
+            better = False
+            for a, b in pairwise(range(len(column))):
+                column[a], column[b] = column[b], column[a]
+                places[column[a]], places[column[b]] = float(a), float(b)
+                changed = sum(_crossings_in(channel, places) for channel in near)
+                if changed < now - 1e-9:
+                    now, better = changed, True
+                else:
+                    column[a], column[b] = column[b], column[a]
+                    places[column[a]], places[column[b]] = float(a), float(b)

@@ -1,0 +1,144 @@
+"""Results of analyses as tables: operating points, modes, sensitivities and sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.markup import escape
+
+from modelica_like.analyse.sensitivity.result import COLUMNS, SHOWN
+from modelica_like.show.report.tables import Listed, Shown, table
+
+if TYPE_CHECKING:
+    import xarray
+
+    from modelica_like.analyse.linear.model import Mode, Modes
+    from modelica_like.analyse.operating.curves import Curves
+    from modelica_like.analyse.operating.steady import OperatingPoint
+    from modelica_like.analyse.sensitivity.result import Sensitivities
+
+_FAILURES_TOLD = 3
+_SMALL = 1e-9
+"""Share of the largest power that counts as rounding."""
+_LEAST_SHARE = 0.005
+_SHARES_SHOWN = 4
+
+
+def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> RenderableType:
+    """Return the powers of an operating point, its efficiency, and the values of variables."""
+    model = point.model
+    powers = point.powers
+    largest = max((abs(one) for pair in powers.values() for one in pair), default=0.0)
+    rows = [
+        (path or model.name, source, loss)
+        for path, (source, loss) in powers.items()
+        if max(abs(source), abs(loss)) > _SMALL * largest
+    ]
+    made = table("powers in W", "component", "from outside>.6g", "lost>.6g", rows=rows)
+    parts: list[RenderableType] = [f"[bold]{escape(model.name)}[/]  steady state", "", made]
+    if np.isfinite(point.efficiency):
+        parts.append(f"Efficiency {100 * point.efficiency:.4g} %.")
+    if point.stuck:
+        parts.append(f"Sticking: {escape(', '.join(point.stuck))}.")
+    return Group(*parts, "", _values(point, names or model.states))
+
+
+def _values(point: OperatingPoint, names: Sequence[str]) -> Listed:
+    units = {one.path: str(one.unit) for one in (*point.model.flat_variables, *point.model.flat_parameters)}
+    rows = ((name, point[name], units.get(name, "")) for name in names)
+    return table("values", "name", "value>.8g", "unit", rows=rows)
+
+
+def curves_report(curves: Curves, names: Sequence[str] = ()) -> Listed:
+    """Return a characteristic curve, one row per operating point."""
+    columns = [curves.over, *(name for name in names if name != curves.over), "efficiency"]
+    columns = list(dict.fromkeys(columns))
+    titles = [f"{name}{'' if (unit := curves.unit(name)) == '1' else f' in {unit}'}>.6g" for name in columns]
+    rows = zip(*(map(float, curves[name]) for name in columns), strict=True)
+    return table(curves.points[0].model.name, *titles, rows=rows, name="curve")
+
+
+def modes_report(modes: Modes) -> RenderableType:
+    """Return eigenvalues, damping, and the components that store and lose the energy of each mode."""
+    linear = modes.linear
+    head = f"[bold]{escape(linear.model.name)}[/]  {len(linear.states)} states at t = {linear.time:g} s"
+    made = table(
+        "modes", "mode>", "eigenvalue in rad/s>.5g", "frequency in Hz>.4g", "damping>.3g", "time constant in s>.3g",
+        "energy in", "lost in",
+        rows=[(k, *_numbers(mode), _shares(mode.stored), _shares(mode.lost)) for k, mode in enumerate(modes, 1)],
+    )  # fmt: skip
+    parts: list[RenderableType] = [head, "", made]
+    if linear.held:
+        parts.append(f"[dim]Held by modes that are active there: {escape(', '.join(linear.held))}.[/]")
+    return Group(*parts)
+
+
+def _numbers(mode: Mode) -> tuple[Any, ...]:
+    value, nothing = mode.eigenvalue, Shown("", None)
+    if mode.oscillates:
+        text = f"{value.real:.5g} ± {value.imag:.5g}j"
+        return Shown(text, [value.real, value.imag]), mode.frequency, mode.damping, mode.time_constant
+    return Shown(f"{value.real:.5g}", [value.real, 0.0]), nothing, nothing, mode.time_constant if value else nothing
+
+
+def _shares(found: dict[str, float]) -> Shown:
+    return Shown(shares(found), found)
+
+
+def shares(found: dict[str, float]) -> str:
+    """Return the largest shares of components as text."""
+    shown = [(path, share) for path, share in found.items() if abs(share) >= _LEAST_SHARE][:_SHARES_SHOWN]
+    return ", ".join(f"{path} {100 * share:.0f} %" for path, share in shown)
+
+
+def sensitivity_report(result: Sensitivities) -> RenderableType:
+    """Return one ranking table per output, the most important parameters first."""
+    parts: list[RenderableType] = []
+    for output in result.outputs:
+        title, texts = result.table(output.name)
+        rows = (
+            (name, Shown(value, one.value), unit, Shown(text, derivative), Shown(per_cent, relative))
+            for (name, value, unit, text, per_cent), (one, derivative, relative) in zip(
+                texts, result.ranking(output.name), strict=True
+            )
+        )
+        parts += [table(title, *COLUMNS, rows=rows, name=output.name, most=SHOWN), ""]
+    parts += [
+        f"{escape(name)}: {rows.shape[0]} times, see Sensitivities.series" for name, rows in result.series.items()
+    ]
+    parts += [escape(sentence) for sentence in result.notes()]
+    parts.append(f"[dim]derivatives in SI units; relative: percent per percent; {result.method} method[/]")
+    return Group(*parts)
+
+
+def sweep_report(found: xarray.Dataset) -> RenderableType:
+    """Return smallest and largest value of every output with the parameters there, failures and differences."""
+    names = [str(name) for name in found.data_vars if name != "failure"]
+    told = found["failure"].to_numpy().ravel()
+    failed = int(np.sum(told != ""))
+    rows: list[tuple[Any, ...]] = []
+    for name in names:
+        values = found[name]
+        if not np.any(np.isfinite(values.to_numpy())):
+            rows.append((name, values.attrs["units"], "none"))
+            continue
+        low, high = values.argmin(...), values.argmax(...)
+        smallest, largest = float(values.min()), float(values.max())
+        rows.append((name, values.attrs["units"], smallest, _where(found, low), largest, _where(found, high)))
+    made = table("extremes", "output", "unit", "smallest>.6g", "smallest at", "largest>.6g", "largest at", rows=rows)
+    parts: list[RenderableType] = [f"[bold]{escape(found.attrs['model'])}[/]  {told.size} runs", "", made]
+    if failed:
+        parts.append(f"{failed} runs failed:")
+        parts += [f"  {escape(text.splitlines()[0])}" for text in dict.fromkeys(told[told != ""][:_FAILURES_TOLD])]
+    if found.attrs.get("notice"):
+        parts.append(escape(found.attrs["notice"]))
+    return Group(*parts)
+
+
+def _where(found: xarray.Dataset, place: Mapping[Any, xarray.DataArray]) -> Shown:
+    point = found.isel({str(key): value.item() for key, value in place.items()})
+    values = {str(name): point[name].item() for name in point.coords}
+    return Shown(", ".join(f"{name} = {value:.6g}" for name, value in values.items()), values)

@@ -1,0 +1,162 @@
+"""A component type as a page in Markdown, made from its declarations."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+from textwrap import dedent
+from typing import NamedTuple
+
+from modelica_like.language import Component
+from modelica_like.show.report.component_pages import latex_names as names
+from modelica_like.show.report.component_pages.markdown import (
+    cell,
+    markdown,
+    module_title,
+    page_link,
+    relative,
+    source_link,
+    table,
+)
+from modelica_like.show.report.component_pages.source import Event, Said, Source, Term
+from modelica_like.show.report.declared import Notation, declared
+
+_WIDE = 110
+"""Characters of LaTeX beyond which a sum gets a line per term."""
+
+
+class Example(NamedTuple):
+    """A netlist in which a type occurs, and its description."""
+
+    path: Path
+    title: str
+
+
+def page(kind: type[Component], file: Path, examples: Sequence[Example] = ()) -> str:
+    """Return the page of a component type with the netlists in which it occurs; links are relative to its file."""
+    source = Source(kind)
+    equations, events = (written(source.says(name)) for name in ("equations", "events"))
+    energy = written(source.energy())
+    definitions = written(source.definitions())
+    sections = [
+        f"# {kind.__name__}",
+        f"[All components](../README.md) · {module_title(kind.__module__)} · {source_link(kind, file)}",
+        markdown(inspect.cleandoc(kind.__doc__ or "")),
+        *(table(title.capitalize(), head, rows) for title, head, rows in declared(kind, _notation(_optional(source)))),
+        *_parts(kind),
+        equations and f"## Equations\n\n{equations}",
+        definitions and f"where\n\n{definitions}",
+        events and f"## Events\n\n{events}",
+        energy and f"## Energy\n\n{energy}",
+        *_example_links(examples, file),
+        *_bases(kind, file),
+    ]
+    return "\n\n".join(section for section in sections if section) + "\n"
+
+
+def _notation(optional: Mapping[str, str]) -> Notation:
+    return Notation(
+        code=lambda text: f"`{text}`",
+        text=cell,
+        symbol=lambda path: f"${names.name(path)}$",
+        flow=lambda path, unit: f"${names.name(path)}$ in {unit}",
+        missing=lambda name: optional.get(name, "required"),
+    )
+
+
+def _optional(source: Source) -> dict[str, str]:
+    """Return the note on optional parameters and on alternatives."""
+    told = dict.fromkeys(source.asked, "optional")
+    for name, uses in source.uses.items():
+        instead = [asked for asked in source.asked if all(use.get(asked) is False for use in uses)]
+        if instead and name not in told:
+            told[name] = "required without " + ", ".join(f"`{one}`" for one in instead)
+    return told
+
+
+def _parts(kind: type[Component]) -> list[str]:
+    """Return the parts that the class declares, and how it builds others."""
+    found = {name: part if isinstance(part, list) else [part] for name, part in kind._class_parts.items()}
+    rows = ((f"`{name}`", page_link(type(one)), _values(one)) for name, part in found.items() for one in part)
+    code = dedent(inspect.getsource(kind.build)).strip() if kind.build is not Component.build else ""
+    parts = [table("", ("part", "type", "values"), rows), code and f"```python\n{code}\n```"]
+    return ["## Parts", *parts] if any(parts) else []
+
+
+def _values(part: Component) -> str:
+    given = ", ".join(f"{name} = {value.given}" for name, value in part._values.items())
+    return f"`{given}`" if given else ""
+
+
+def _bases(kind: type[Component], file: Path) -> list[str]:
+    """Return the docstrings of the bases, with the physics common to several types."""
+    bases = [base for base in kind.__mro__[1:] if issubclass(base, Component) and base is not Component]
+    texts = [
+        f"### {base.__name__}\n\n{source_link(base, file)}\n\n{markdown(inspect.cleandoc(base.__doc__ or ''))}"
+        for base in bases
+    ]
+    return ["## What it extends", *texts] if texts else []
+
+
+def _example_links(examples: Sequence[Example], file: Path) -> list[str]:
+    if not examples:
+        return []
+    links = (f"- [{one.path.name}]({relative(one.path, file)}): {cell(one.title)}" for one in examples)
+    return ["## In netlists\n\n" + "\n".join(links)]
+
+
+# -- content of a class
+# -------------------------------------------------------------------------------------------------
+
+
+def written(says: Iterable[Said]) -> str:
+    """Return the items: equations in blocks, events as tables, paragraphs unchanged."""
+    parts: list[str] = []
+    for _, group in groupby(says, type):
+        many = list(group)
+        parts += [one for one in many if isinstance(one, str) and one]
+        parts += filter(None, [_equations([one for one in many if isinstance(one, Term)])])
+        parts += filter(None, [_events([one for one in many if isinstance(one, Event)])])
+    # Consecutive ends become one list, consecutive source texts one text.
+    return "\n\n".join(parts).replace("`\n\n- `", "`\n- `").replace("\n```\n\n```python\n", "\n")
+
+
+def _equations(terms: Sequence[Term]) -> str:
+    if len(terms) == 1 and "\\cr\n" not in _broken(terms[0].right):
+        return f"$$\n{terms[0].left} {terms[0].sign} {terms[0].right}{_condition(terms[0])}\n$$"
+    if not terms:
+        return ""
+    lines = [rf"{term.left} &{term.sign} {_broken(term.right)}{_condition(term)}" for term in terms]
+    return "$$\n\\begin{aligned}\n" + " \\cr\n".join(lines) + "\n\\end{aligned}\n$$"
+
+
+def _condition(term: Term) -> str:
+    return rf" \quad {term.where}" if term.where else ""
+
+
+def _broken(right: str) -> str:
+    """Break a long sum before its terms, outside of all brackets and case distinctions."""
+    if len(right) <= _WIDE:
+        return right
+    pieces, depth = [""], 0
+    for word in right.split(" "):
+        if depth == 0 and word in ("+", "-") and len(pieces[-1]) > _WIDE // 2:
+            pieces.append("")
+        depth += word.count(r"\left") + word.count("{") + word.count(r"\begin")
+        depth -= word.count(r"\right") + word.count("}") + word.count(r"\end")
+        pieces[-1] += f"{word} "
+    return " \\cr\n& \\quad ".join(piece.strip() for piece in pieces)
+
+
+def _events(events: Sequence[Event]) -> str:
+    several = len({event.mode for event in events}) > 1
+    rows = (
+        (
+            f"`{event.mode}`" if several else "", event.source or "*at the start*", event.target, f"${event.when}$",
+            event.resets, cell(event.notice), f"${event.where}$" if event.where else "",
+        )
+        for event in events
+    )  # fmt: skip
+    return table("", ("mode", "from", "to", "when", "sets", "notice", "where"), rows)

@@ -1,0 +1,101 @@
+"""Several runs of one system in one picture: variants, a family over a parameter, a measurement beside a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from modelica_like.errors import UnknownName
+from modelica_like.language.units import parse_unit, to_si
+from modelica_like.runs.display import Display
+from modelica_like.runs.signals import Signal, named, read_signals
+from modelica_like.runs.trajectories import Trajectories
+from modelica_like.show.bands import bands_of, listed, marks_of
+from modelica_like.show.panels import Panel, draw_panels
+from modelica_like.show.plot import usual
+from modelica_like.show.report.sources import trajectories
+from modelica_like.style import COLOURS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_USUAL = ("rad/s", "m/s", "N.m", "N", "A")
+_MOST = 8
+"""Signals that nobody has asked for."""
+
+
+def overlay(
+    runs: Mapping[str, str | Path | Trajectories], *patterns: str, title: str = "",
+    display: Mapping[str, str] | None = None,
+) -> Figure:  # fmt: skip
+    """Draw runs of one system on top of each other, a panel per signal; tables of measurements as dots.
+
+    Args:
+        runs: by the name that the legend shows: solutions, netlists, FMUs, systems, or CSV files with a column `time`
+            and titles such as `motor.w [rpm]`. The first one that is no table says names, units and signs.
+        patterns: names, patterns or formulas of the signals; by default what was measured, or what one usually wants.
+        title: heading; by default the name of the model.
+        display: units by path, pattern or quantity, in addition to those of the netlist.
+
+    Raises:
+        UnknownName: nothing matches a pattern, or the runs have nothing in common.
+        UnitError: a measured column has another dimension than its variable, or a unit cannot be shown.
+        ModelicaLikeError: a run fails.
+    """
+    found = {label: trajectories(source) for label, source in runs.items()}
+    first = next((run for run in found.values() if not run.measured), next(iter(found.values())))
+    signals, left = (read_signals(first.model, patterns), []) if patterns else _common(first, list(found.values()))
+    shown, looks = Display(first.model, display), _looks(found)
+    panels: list[Panel] = []
+    for one in signals:
+        curves = {label: curve for label, run in found.items() if (curve := _curve(one, run)) is not None}
+
+        def draw(axes: Any, one: Signal = one, curves: Mapping[str, Any] = curves) -> None:
+            for label, curve in curves.items():
+                values = one.driving * shown.converted(curve, one.unit, one.shown_in(shown))
+                axes.plot(found[label].time, values, label=label, **looks[label])
+
+        panels.append(Panel(one.label, one.shown_in(shown), [] if panels else list(curves), draw))
+    others = [run for run in found.values() if run is not first and not run.measured]
+    bands, notes = ([], []) if others else bands_of(first)
+    marks, more = ([], []) if others else marks_of(first, [band.mode for band in bands])
+    told = ["Events differ from run to run; they are not drawn."] if others and first.events else []
+    told += [f"Not drawn: {listed(left)}; name them to draw them."] if left else []
+    return draw_panels(title or first.model.name, first.time, panels, bands, marks, [*told, *notes, *more])
+
+
+def _common(first: Trajectories, runs: Sequence[Trajectories]) -> tuple[list[Signal], list[str]]:
+    """Return what was measured, or the usual signals that all runs have; also the names of those that are too many."""
+    measured = [name for run in runs if run.measured for name in run.names]
+    if measured:
+        for name in measured:
+            if name not in first:
+                read_signals(first.model, [name])
+        return named(first.model, list(dict.fromkeys(measured))), []
+    signals = [one for one in usual(first, _USUAL) if all(one.name in run for run in runs)]
+    if not signals:
+        raise UnknownName("The runs have no signals in common.", advice="Name the signals to draw.")
+    return signals[:_MOST], [one.name for one in signals[_MOST:]]
+
+
+def _curve(signal: Signal, run: Trajectories) -> Any:
+    """Return a signal of a run in SI units; None if the run does not have it."""
+    if not all(name in run for name in signal.formula.names()):
+        return None
+    if run.measured and signal.plain and (unit := run.unit_of(signal.name)) != "1":
+        to_si(f"0 {unit}", parse_unit(signal.unit), signal.name)  # raises an error for another dimension
+    return signal.values(run)
+
+
+def _looks(runs: Mapping[str, Trajectories]) -> dict[str, dict[str, Any]]:
+    """Return colours, and dots for what was measured; a large family gets a range of colours."""
+    import matplotlib as mpl
+
+    computed = [label for label, run in runs.items() if not run.measured]
+    wide = mpl.colormaps["viridis"]
+    colours = COLOURS if len(computed) < len(COLOURS) else [wide(k / len(computed)) for k in range(len(computed))]
+    dots = {"linestyle": "", "marker": ".", "markersize": 3.5, "zorder": 1.9}
+    looks: dict[str, dict[str, Any]] = {label: {"color": colours[k]} for k, label in enumerate(computed)}
+    tables = [label for label in runs if label not in looks]
+    return looks | {label: {"color": COLOURS[-1 - k % len(COLOURS)], **dots} for k, label in enumerate(tables)}

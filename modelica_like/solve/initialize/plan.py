@@ -1,0 +1,291 @@
+"""The use of start values: chosen once, for simulation, export and derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae, StartEntry, StartSystem, Vector
+from modelica_like.errors import MissingStart
+from modelica_like.flatten.generic import spread
+from modelica_like.netlist.document import StartKind as StartKind
+from modelica_like.solve.initialize.point import Point
+from modelica_like.structure.matching import Elimination, Matching
+
+_DENSE = 100
+_WELL_CONDITIONED = 1e9
+_KNOWN = 16
+
+
+@dataclass(frozen=True)
+class StartPlan:
+    """The use of start values.
+
+    Attributes:
+        kind: kind of start, which replaces missing start values.
+        system: the start system.
+        direct: (state, start value) of given states; the first of several counts.
+        rows: start values that are equations for the other states.
+        dependent: fixed start values that must follow from the others.
+        resting: variables (nodes) that are zero because nothing else is given.
+        zero: states that are zero for the same reason.
+        columns: unknowns of the start system among (x, y, z); none if there is nothing to solve.
+        wanted: its rows: those of y and z, of `rows`, of `resting`.
+    """
+
+    kind: StartKind
+    system: StartSystem
+    direct: tuple[tuple[int, int], ...]
+    rows: tuple[int, ...] = ()
+    dependent: tuple[int, ...] = ()
+    resting: tuple[int, ...] = ()
+    zero: tuple[int, ...] = ()
+    columns: tuple[int, ...] = ()
+    wanted: tuple[int, ...] = ()
+
+    @property
+    def own(self) -> int:
+        """Number of explicit and implicit equations at the beginning of the start system."""
+        return len(self.wanted) - len(self.rows) - len(self.resting)
+
+    @cached_property
+    def _part(self) -> tuple[ca.Sparsity, Any]:
+        """Pattern of the wanted rows and columns, and positions of its entries in the system's Jacobian."""
+        pattern, places = self.system.function.sparsity_out(1).sub(list(self.wanted), list(self.columns))
+        return pattern, np.array(places, int)
+
+    def entries(self, jacobian: Vector) -> Vector:
+        """Return the nonzeros of the plan's matrix, from those of the whole Jacobian."""
+        return jacobian[self._part[1]]
+
+    def matrix(self, entries: Vector) -> ca.DM:
+        """Return the plan's matrix, sparse."""
+        return ca.DM(self._part[0], entries)
+
+    def targets(self, values: Vector) -> Vector:
+        """Values that the wanted rows must have.
+
+        Args:
+            values: one value, or one row, for every start value.
+        """
+        shape = values.shape[1:]
+        parts = [np.zeros((self.own, *shape)), values[list(self.rows)], np.zeros((len(self.resting), *shape))]
+        return np.concatenate(parts)
+
+
+def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
+    """Choose the use of the start values of a model.
+
+    The structure decides. If the chosen rows are numerically dependent (several clutches between the same shafts),
+    numbers decide: redundant defaults and zeros are left out, redundant given start values must be
+    consistent.
+
+    Args:
+        model: the compiled model.
+        kind: kind of start, which replaces missing start values.
+        point: a point with the modes that count.
+
+    Raises:
+        MissingStart: the start values do not determine all states.
+    """
+    plan = model.once(("start plan", kind), lambda: _Choice(model, kind).plan(None))
+    if plan.columns and not _is_regular(model, plan, point):
+        matrix = _generic_matrix(model, plan.system, point)
+        if matrix is not None:
+            return _Choice(model, kind).plan(matrix)
+    return plan
+
+
+def _is_regular(model: CompiledDae, plan: StartPlan, point: Point) -> bool:
+    """Return whether the plan's matrix is far from singular, without motion from rest.
+
+    The last positive answer of each combination of modes is kept: a start often looks at two of them in turn.
+    """
+    function = plan.system.function
+    fast = model.fast(("start matrix", plan.kind), lambda: function, (1,))
+    x, y = point.x.copy(), np.zeros(function.size1_out(0))
+    x[[k for k in plan.system.rates if k < len(x)]] = 0.0
+    entries = fast(point.t, x, y, point.z, model.p, model.u, point.d)[0]
+    entries = plan.entries(entries)
+    known: dict[bytes, Vector] = model.once(("regular start", plan.kind), dict)
+    modes = point.d.tobytes()
+    if np.array_equal(known.get(modes, ()), entries):
+        return True
+    regular = _regular(plan.matrix(entries), entries)
+    if regular:
+        if len(known) >= _KNOWN:
+            known.clear()
+        known[modes] = entries
+    return regular
+
+
+def matrix_and_values(model: CompiledDae, system: StartSystem, point: Point, y: Vector) -> tuple[Any, Vector]:
+    """Return the Jacobian of the whole start system by (x, y, z), sparse, and its values.
+
+    Args:
+        model: the compiled model.
+        system: the start system.
+        point: where.
+        y: the variables that start values need.
+    """
+    _, jacobian, values = system.function(point.t, point.x, y, point.z, model.p, model.u, point.d)
+    return jacobian, np.asarray(values.full()).ravel()
+
+
+def _regular(matrix: Any, entries: Vector) -> bool:
+    """Return whether a square matrix with these entries is far from singular."""
+    if not np.all(np.isfinite(entries)):
+        return False
+    sizes, rows = np.zeros(matrix.size1()), np.array(matrix.sparsity().row(), int)
+    np.maximum.at(sizes, rows, np.abs(entries))
+    if not np.all(sizes > 0.0):
+        return False
+    scaled = ca.DM(matrix.sparsity(), entries / sizes[rows])
+    if matrix.size1() <= _DENSE:
+        return bool(np.linalg.cond(scaled.full()) < _WELL_CONDITIONED)
+    upper = ca.qr_sparse(scaled)[1]
+    on_diagonal = np.equal(*upper.sparsity().get_triplet())
+    factor = np.array(upper.nonzeros())[on_diagonal]  # norms
+    return bool(factor.max() < _WELL_CONDITIONED * factor.min())
+
+
+def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> Any:
+    """Jacobian of the start system at a generic point nearby, None if it is not finite.
+
+    Where the start is from rest, nothing moves there: speeds that are zero do not determine positions.
+    """
+    moved, ends = point.copy(), np.cumsum([len(point.x), len(point.z)])
+    of_x, of_z, y = np.split(spread(0.5, 1.0, ends[-1] + system.function.size1_out(0)), ends)
+    for part, by in ((moved.x, of_x), (moved.z, of_z)):
+        part += 0.1 * (1.0 + np.abs(part)) * by
+    for k in system.rates:
+        part, place = (moved.x, k) if k < len(moved.x) else (y, k - len(moved.x))
+        part[place] = 0.0
+    matrix, _ = matrix_and_values(model, system, moved, y)
+    return matrix if np.all(np.isfinite(matrix.nonzeros())) else None
+
+
+def direct_starts(model: CompiledDae) -> dict[int, int]:
+    """Return the number of the first fixed start value of every state that has one, by state."""
+    found: dict[int, int] = {}
+    for number, entry in enumerate(model.starts):
+        if entry.strength == "fixed" and entry.state is not None:
+            found.setdefault(entry.state[0], number)
+    return found
+
+
+class _Choice:
+    """Start values are taken as long as they add information: fixed ones, defaults, zeros."""
+
+    def __init__(self, model: CompiledDae, kind: StartKind) -> None:
+        self.model = model
+        self.kind: StartKind = kind
+        self.system = model.rest_system if kind == "rest" else model.start_system
+        self.direct = direct_starts(model)
+        nx, ny, nz = len(model.states), self.system.function.size1_out(0), len(model.implicit)
+        self.free = [k for k in range(nx) if k not in self.direct]
+        self.columns = [*self.free, *range(nx, nx + ny + nz)]
+        self.place = {column: k for k, column in enumerate(self.columns)}
+        self.own = ny + nz
+        self.row_of = {node: self.own + k for k, node in enumerate(self.system.nodes)}
+
+    def plan(self, matrix: Any) -> StartPlan:
+        """Choose by structure, or by the numbers of a Jacobian."""
+        direct = tuple(self.direct.items())
+        general = [k for k, e in enumerate(self.model.starts) if e.strength == "fixed" and e.state is None]
+        if self.kind == "steady" or not (self.free or general):
+            return StartPlan(self.kind, self.system, direct)
+        # Where modes do not determine reactions, redundant implicit equations and as many reactions are left out.
+        own = self._begin(matrix)
+        kept = self._keep(len(own) < self.own)
+        rows = [k for k in general if self._accept(self.model.starts[k].node)]
+        taken = set(rows)
+        dependent = [k for k in general if k not in taken]
+        # What nothing else determines starts at its guess rather than at rest.
+        rows += [k for k in (*self.system.guesses, *self._defaults()) if self._accept(self.model.starts[k].node)]
+        resting, zero = self._rest()
+        if self.choice.size < len(self.columns):
+            raise self._missing()
+        known = {*zero, *kept}
+        columns = [column for column in self.columns if column not in known]
+        nodes = [*(self.model.starts[k].node for k in rows), *resting]
+        wanted = [*own, *(self.row_of[node] for node in nodes)]
+        lists = (rows, dependent, resting, zero, columns, wanted)
+        return StartPlan(self.kind, self.system, direct, *map(tuple, lists))
+
+    def _begin(self, matrix: Any) -> list[int]:
+        """Start with the explicit equations, which determine y, and the implicit ones, which determine z."""
+        pattern = self.system.function.sparsity_out(1)
+        numbers = [1.0] * pattern.nnz() if matrix is None else matrix.nonzeros()
+        self.entries: list[dict[int, float]] = [{} for _ in range(pattern.size1())]
+        for row, column, number in zip(*pattern.get_triplet(), numbers, strict=True):
+            if column in self.place:
+                self.entries[row][self.place[column]] = number
+        self.choice: Matching | Elimination = (Matching if matrix is None else Elimination)(len(self.columns))
+        if matrix is None:  # each has its own unknown, whatever structure solves it
+            for row in range(self.own):
+                self.entries[row][len(self.free) + row] = 1.0
+        return [row for row in range(self.own) if self.choice.add(self.entries[row])]
+
+    def _keep(self, some: bool) -> list[int]:
+        """Implicit unknowns that keep their values."""
+        implicit = self.columns[len(self.columns) - len(self.model.implicit) :] if some else []
+        return [column for column in implicit if self.choice.add({self.place[column]: 1.0})]
+
+    def _accept(self, node: int) -> bool:
+        return self.choice.add(self.entries[self.row_of[node]])
+
+    def _defaults(self) -> list[int]:
+        """Defaults in an order that does not depend on the order of lines."""
+        chosen = [k for k, e in enumerate(self.model.starts) if e.strength == "default"]
+        return sorted(chosen, key=lambda k: start_name(self.model, self.model.starts[k]))
+
+    def _rest(self) -> tuple[list[int], list[int]]:
+        """Variables and states at rest."""
+        resting: list[int] = []
+        zero: list[int] = []
+        for node, state in self.system.rest:
+            if state is None and self._accept(node):
+                resting.append(node)
+            elif state is not None and state in self.place and self.choice.add({self.place[state]: 1.0}):
+                zero.append(state)
+        return resting, zero
+
+    def _missing(self) -> MissingStart:
+        model, count = self.model, len(self.columns) - self.choice.size
+        names = [model.states[self.free[k]] for k in self.choice.undetermined() if k < len(self.free)]
+        parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
+        names = [_to_give(model, name) for name in names]
+        if count == 1:
+            what = f"one equation: give {' or '.join(names[:4]) + (' …' if len(names) > 4 else '')} a start value"
+        else:
+            shown = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
+            which = "" if count == len(names) else f"{count} of "
+            what = f"{count} equations: give {which}{shown} start values"
+        return MissingStart(
+            f"Initialization (not the model) lacks {what}.",
+            where=[model.places[part] for part in parts if part in model.places][:3],
+            advice='Or start from rest (start = "rest") or in the steady state (start = "steady").',
+        )
+
+
+def _to_give(model: CompiledDae, name: str) -> str:
+    """Return what can get a start value: a state, or a variable of one that follows the motion."""
+    base = name.removeprefix("der(").removesuffix(")")
+    if base not in model.following:
+        return name
+    return f"{'' if name == base else 'a rate of '}{' or '.join(model.following[base])}"
+
+
+def start_name(model: CompiledDae, entry: StartEntry) -> str:
+    """Path of the variable of a start value."""
+    return model.flat_variables[entry.node].path
+
+
+def is_near(model: CompiledDae, entry: StartEntry) -> bool:
+    """Whether a start value is the first guess of a variable that is no state; a default, if there is no guess."""
+    return entry.state is None and (entry.strength != "default" or not model.flat_variables[entry.node].guess)
