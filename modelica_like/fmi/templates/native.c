@@ -80,6 +80,16 @@ EXPORTED void *native_instance(const Native *n) { return n->c; }
 
 EXPORTED const char *native_message(const Native *n) { return n->message; }
 
+/* What has failed: its number in codes.h; place and numbers of its sentence (4), and the point: states, implicit
+ * unknowns and d. */
+EXPORTED int native_failure(const Native *n, double *told, double *point) {
+    const Instance *c = n->c;
+    memcpy(told, &c->failure.place, 4 * sizeof(double));
+    memcpy(point, c->x, (size_t)c->model->n_unknowns * sizeof(double));
+    memcpy(point + c->model->n_unknowns, c->d, (size_t)c->model->n_d * sizeof(double));
+    return (int)c->failure.code;
+}
+
 /* Back to the model's values; start and end (infinite: unknown) in s, relative tolerance, absolute one in nominals. */
 Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol) {
     instance_reset(c);
@@ -152,7 +162,7 @@ EXPORTED int native_states(Native *n, const double *given, double *x) {
     if (event_first(c) && !handle_event(c)) return NATIVE_FAILED;
     if (given != NULL) {
         if (!set_states(c, given)) return NATIVE_FAILED;
-        gradient_lose(c, "the states were set", NULL);
+        gradient_lose(c, FAILURE_LOST_BY_STATES, NULL);
         for (int k = 0; k < c->model->n_d; k++) c->d_before[k] = -1;
         memset(c->entered, 0, (size_t)c->model->n_holds);
         c->stopped = c->state.piece_valid = c->state.event_pending = 0;
