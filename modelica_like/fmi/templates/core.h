@@ -136,7 +136,7 @@ typedef enum {
 
 typedef struct { /* see codes.h; place -1: none */
     FailureCode code;
-    double place, numbers[3];
+    double place, numbers[2];
 } Failure;
 
 /* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns; `wanting` transitions fire at the
@@ -345,8 +345,9 @@ Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t s
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy);
 Result report(Instance *c, LogCategory category, Result result, const char *format, ...);
 /* Fails, with numbers and places in the order of the sentence in codes.h. */
-Result fail_with(Instance *c, FailureCode code, const double *values);
-#define fail(c, name, ...) fail_with(c, FAILURE_##name, (const double[]){__VA_ARGS__})
+Result fail_with(Instance *c, FailureCode code, double v0, double v1, double v2);
+#define fail(c, name, ...) FAIL(c, FAILURE_##name, __VA_ARGS__, 0, 0, 0)
+#define FAIL(c, code, v0, v1, v2, ...) fail_with(c, code, v0, v1, v2)
 /* For calls that the interface does not allow. */
 #define refuse(c, ...) report(c, LOG_ERROR, RESULT_ERROR, __VA_ARGS__)
 Result set_log_category(Instance *c, const char *category, int on);

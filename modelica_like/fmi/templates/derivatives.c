@@ -17,7 +17,7 @@ Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
         if (is_start(c, v) ? v->start < 0 || v->start >= c->model->n_starts : known_slot(c->model, v) < 0)
-            return is_start(c, v) ? fail(c, BY_NO_START, v->reference) : fail(c, BY_NOTHING, v->reference);
+            return fail_with(c, FAILURE_BY_NOTHING + is_start(c, v), v->reference, 0, 0);
     }
     return RESULT_OK;
 }

@@ -43,7 +43,7 @@ struct Gradient {
     double *rates;         /* before it */
     unsigned char *rounds; /* transitions that have fired there, by rounds */
     FailureCode lost;      /* why there are no derivatives, or 0 */
-    double lost_by;        /* value reference, or -1: anything */
+    uint32_t lost_by;      /* value reference, or the largest number: anything */
     double lost_at;
 };
 
@@ -51,7 +51,7 @@ void gradient_lose(Instance *c, FailureCode why, const Variable *by) {
     Gradient *g = c->gradient;
     if (g == NULL || c->passing || g->lost != 0) return;
     g->lost = why;
-    g->lost_by = by == NULL ? -1 : (double)by->reference;
+    g->lost_by = by == NULL ? UINT32_MAX : by->reference;
     g->lost_at = c->state.t;
 }
 
@@ -396,7 +396,7 @@ int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, dou
     if (c == NULL || !allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED)) return 1;
     const Gradient *g = c->gradient;
     if (g == NULL || of == NULL || gradient == NULL) return !fail(c, NOT_ASKED, 0);
-    if (g->lost != 0) return !fail_with(c, g->lost, (double[]){g->lost_by, g->lost_at});
+    if (g->lost != 0) return !fail_with(c, g->lost, g->lost_by, g->lost_at, 0);
     if (!check_unknowns(c, of, n_of) || !factor_implicit(c)) return 1;
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);

@@ -17,7 +17,6 @@ Result report(Instance *c, LogCategory category, Result result, const char *form
     char message[MESSAGE_LENGTH];
     int bit = 0;
     va_list arguments;
-    if (category == LOG_ERROR && !c->passing) c->failure.code = FAILURE_MISUSED;
     if (c->log == NULL || c->passing || (category != LOG_ERROR && !(c->log_enabled & category))) return result;
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
@@ -30,9 +29,6 @@ Result report(Instance *c, LogCategory category, Result result, const char *form
 static const char *name_of(const Model *m, char kind, double place) {
     int k = place < INT32_MAX ? (int)place : 0;
     const Variable *v = kind == 'V' ? find_variable(m, (uint32_t)place) : NULL;
-    if (place < 0) return kind == 'V' ? "anything" : "they";
-    for (const Variable *one = m->variables; kind == 'E' && one < m->variables + m->n_variables && v == NULL; one++)
-        if ((one->kind == KIND_STATE || one->kind == KIND_VARIABLE) && one->start == k) v = one;
     switch (kind) {
         case 'A': return text_of(m, m->rising[k].above_name);
         case 'B': return text_of(m, m->singular_names[k]);
@@ -43,35 +39,36 @@ static const char *name_of(const Model *m, char kind, double place) {
         case 'S': return text_of(m, m->state_names[k]);
         case 'T': return text_of(m, m->transitions[k].name);
         case 'Z': return text_of(m, m->implicit_names[k]);
-        default: return v == NULL ? "a variable" : text_of(m, v->name);
+        case 'E':
+            for (const Variable *one = m->variables; one < m->variables + m->n_variables; one++)
+                if (one->kind <= KIND_VARIABLE && one->start == k) v = one;
     }
+    return v == NULL ? "anything" : text_of(m, v->name);
 }
 
 /* Fails, with values in the order of the sentence; keeps what it is about, for native.c. */
-Result fail_with(Instance *c, FailureCode code, const double *values) {
-    char message[MESSAGE_LENGTH];
+Result fail_with(Instance *c, FailureCode code, double v0, double v1, double v2) {
+    const double all[] = {v0, v1, v2}, *value = all;
+    char message[MESSAGE_LENGTH + 1];
     Failure failure = {.code = code, .place = -1};
+    double *number = failure.numbers;
     size_t used = 0;
-    int numbers = 0;
     const char *s = sentences;
     for (int k = 0; k < (int)code; k++) s += strlen(s) + 1;
-    for (; *s != 0 && used < sizeof message - 1; s++) {
-        char *here = message + used;
-        size_t room = sizeof message - used;
-        int digits = s[1] == '.' ? 0 : 6, wrote;
+    for (; *s != 0 && used < MESSAGE_LENGTH; s++) {
         if (*s != '%') {
-            *here = *s;
-            used++;
+            message[used++] = *s;
             continue;
         }
-        while (strchr(".0123456789", *++s) != NULL) digits = *s == '.' ? 0 : 10 * digits + *s - '0';
-        if (*s == 'g') wrote = snprintf(here, room, "%.*g", digits, failure.numbers[numbers++] = *values);
-        else if (*s == 'R') wrote = snprintf(here, room, "%.0f", failure.place = *values);
-        else wrote = snprintf(here, room, "%s", name_of(c->model, *s, failure.place = *values));
-        used += (size_t)wrote;
-        values++;
+        char *here = message + used;
+        size_t room = MESSAGE_LENGTH - used;
+        if (*++s == 'g') *number++ = *value;
+        else if (*s != 'C') failure.place = *value;
+        if (*s == 'g' || *s == 'R') used += (size_t)snprintf(here, room, "%.10g", *value);
+        else used += (size_t)snprintf(here, room, "%s", name_of(c->model, *s, failure.place));
+        value += *s != 'C';
     }
-    message[used < sizeof message ? used : sizeof message - 1] = 0;
+    message[used < MESSAGE_LENGTH ? used : MESSAGE_LENGTH] = 0;
     report(c, LOG_ERROR, RESULT_ERROR, "%s", message);
     if (!c->passing) c->failure = failure;
     return RESULT_ERROR;

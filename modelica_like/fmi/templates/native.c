@@ -35,7 +35,9 @@ typedef struct {
 
 static void keep_message(const Instance *c, int status, const char *category, const char *message) {
     Native *n = c->environment;
-    if (!status) snprintf(n->message, sizeof n->message, "%s", message);
+    if (status) return;
+    snprintf(n->message, sizeof n->message, "%s", message);
+    if (n->c != NULL) n->c->failure.code = FAILURE_MISUSED; /* `fail` knows better */
 }
 
 static int code(Result result) { return result ? NATIVE_OK : NATIVE_FAILED; }
@@ -80,14 +82,13 @@ EXPORTED void *native_instance(const Native *n) { return n->c; }
 
 EXPORTED const char *native_message(const Native *n) { return n->message; }
 
-/* What has failed: its number in codes.h; place and numbers of its sentence (4), and the point: states, implicit
- * unknowns and d. */
-EXPORTED int native_failure(const Native *n, double *told, double *point) {
+/* What has failed, and the point: states and implicit unknowns, d, and d before the last change. */
+EXPORTED const Failure *native_failure(const Native *n, const double *point[3]) {
     const Instance *c = n->c;
-    memcpy(told, &c->failure.place, 4 * sizeof(double));
-    memcpy(point, c->x, (size_t)c->model->n_unknowns * sizeof(double));
-    memcpy(point + c->model->n_unknowns, c->d, (size_t)c->model->n_d * sizeof(double));
-    return (int)c->failure.code;
+    point[0] = c->x;
+    point[1] = c->d;
+    point[2] = c->d_before;
+    return &c->failure;
 }
 
 /* Back to the model's values; start and end (infinite: unknown) in s, relative tolerance, absolute one in nominals. */

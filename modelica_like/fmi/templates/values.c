@@ -16,12 +16,11 @@ const Variable *find_variable(const Model *m, uint32_t reference) {
 
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) {
     const Variable *v = find_variable(c->model, reference);
-    if (v != NULL && (v->type == (int)type || type == ANY_TYPE)) return v;
-    if (v == NULL) fail(c, NO_VARIABLE, reference);
-    else if (v->type == TYPE_ARRAY) fail(c, OF_ARRAY, reference);
-    else if (type == TYPE_FLOAT64) fail(c, NOT_REAL, reference);
-    else fail(c, NOT_ENUMERATION, reference);
-    return NULL;
+    FailureCode why = FAILURE_MISUSED;
+    if (v == NULL) why = FAILURE_NO_VARIABLE;
+    else if (v->type != (int)type && type != ANY_TYPE)
+        why = v->type == TYPE_ARRAY ? FAILURE_OF_ARRAY : FAILURE_NOT_REAL + (type != TYPE_FLOAT64);
+    return why == FAILURE_MISUSED || fail_with(c, why, reference, 0, 0) ? v : NULL;
 }
 
 /* Values that a tape gives are computed once per point. */
@@ -105,8 +104,8 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
     double low = c->model->parameter_min[v->index], high = c->model->parameter_max[v->index];
     if (!v->tunable && !before_start(&c->state)) return fail(c, PARAMETER_FIXED, v->reference);
     if (v->tunable && c->state.phase == PHASE_CONTINUOUS) return fail(c, TUNED_OUTSIDE_EVENTS, v->reference);
-    if (value < low) return fail(c, BELOW_LEAST, v->reference, value, low);
-    if (value > high) return fail(c, ABOVE_MOST, v->reference, value, high);
+    if (value < low || value > high)
+        return fail_with(c, FAILURE_BELOW_LEAST + (value > high), v->reference, value, value < low ? low : high);
     if (c->p[v->index] == value) return RESULT_OK;
     if (!before_start(&c->state)) mark_tuned(c, v->index);
     keep_before_change(c);
@@ -120,8 +119,7 @@ Result check_tables(Instance *c) {
     const Model *m = c->model;
     for (int k = 0; k < m->n_rising; k++) {
         const Rising *one = &m->rising[k];
-        if (!(c->p[one->below] < c->p[one->above]))
-            return fail(c, COLUMN_FALLS, k, c->p[one->above], k, c->p[one->below]);
+        if (!(c->p[one->below] < c->p[one->above])) return fail(c, COLUMN_FALLS, k, c->p[one->above], c->p[one->below]);
     }
     return RESULT_OK;
 }
