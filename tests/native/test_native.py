@@ -241,7 +241,7 @@ def test_an_interrupt_keeps_what_was_done(monkeypatch):
 
     with pytest.raises(KeyboardInterrupt) as caught:
         simulate(STARTUP, solver="native", progress=stop)
-    run = vars(caught.value)["run"]
+    run = caught.value.run
     assert 0.3 < run.time[-1] < 0.6
     assert run.events[0].time < 0.3
 

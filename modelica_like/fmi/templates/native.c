@@ -82,12 +82,14 @@ EXPORTED void *native_instance(const Native *n) { return n->c; }
 
 EXPORTED const char *native_message(const Native *n) { return n->message; }
 
-/* What has failed, and the point: states and implicit unknowns, d, and d before the last change. */
-EXPORTED const Failure *native_failure(const Native *n, const double *point[3]) {
+/* What has failed, and where: states and implicit unknowns, d, d before the last change, parameters, inputs. */
+EXPORTED const Failure *native_failure(const Native *n, const double *point[5]) {
     const Instance *c = n->c;
     point[0] = c->x;
     point[1] = c->d;
     point[2] = c->d_before;
+    point[3] = c->p;
+    point[4] = c->u;
     return &c->failure;
 }
 
