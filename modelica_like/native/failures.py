@@ -76,8 +76,8 @@ class Failure:
 
 def error_of(failure: Failure) -> ModelicaLikeError:
     """Return the error to be raised."""
-    if failure.code in _WRITTEN:
-        return _WRITTEN[failure.code](failure)
+    if failure.code in WRITTEN:
+        return WRITTEN[failure.code](failure)
     return WORDED[failure.code](failure.what, advice=failure.sentence.partition(". ")[2])
 
 
@@ -149,7 +149,7 @@ def _not_asked(_: Failure) -> ModelicaLikeError:
     return NoGradient("No derivatives were asked for.", advice='Name parameters, inputs or start values: by=["J.J"].')
 
 
-_WRITTEN: dict[Code, Callable[[Failure], ModelicaLikeError]] = {
+WRITTEN: dict[Code, Callable[[Failure], ModelicaLikeError]] = {
     Code.STARTS_CONTRADICT: _starts_contradict,
     Code.START_NOT_MET: _start_not_met,
     Code.START_NOT_FOUND: _start_not_found,

@@ -12,10 +12,8 @@ from components import Mass, MassWithStopAndFriction, TranslationalSpring
 from modelica_like import build, sensitivities, simulate
 from modelica_like.errors import (
     Chattering,
-    ContradictingStart,
     ExportError,
     ModelicaLikeError,
-    SingularAtStart,
     StepFailed,
     UnknownName,
     ValueOutOfRange,
@@ -216,15 +214,6 @@ def test_a_run_that_idas_gives_up_is_done_by_the_run_time(monkeypatch):
     with pytest.raises(StepFailed, match=r"^IDAS gave up at about t = ") as caught:
         simulate(gearbox, rtol=1e-14, atol=1e-16)
     assert caught.value.run.time[-1] > 1.0
-
-
-def test_messages_become_the_same_errors():
-    assert isinstance(
-        model.failure("The Jacobian is singular at t = 0 s in the equations for a. Do b."), SingularAtStart
-    )
-    error = model.failure("Two start values of x contradict each other: 1 and 2.")
-    assert isinstance(error, ContradictingStart)
-    assert error.what == "Two start values of x contradict each other: 1 and 2."
 
 
 def test_an_unknown_solver():
