@@ -121,7 +121,7 @@ ALONE: dict[Code, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
     ),
     Code.STAYS_TRUE: (
         Chattering, native(Rebound(x=1.0, v=0.0)),
-        r"At 0\.55186\d* s the condition of relation\[1\] stays true: .*\n  in test_failures\.py:.*\nLet it rest: .*",
+        r"At 0\.55186\d* s the condition of relation\[1\] stays true: .*\n  in failing\.py:.*\nLet it rest: .*",
     ),
     Code.PAST_TOO_LONG: (
         StepFailed, native(Late(x=0.0, a=1.0)),
