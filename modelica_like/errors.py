@@ -92,6 +92,10 @@ class ValueOutOfRange(ModelicaLikeError):
     """A value is not finite, or outside the declared range."""
 
 
+class NotEnoughMemory(ModelicaLikeError, MemoryError):
+    """A model or a run needs more memory than there is."""
+
+
 class UnknownName(ModelicaLikeError):
     """A name of a component, connector, parameter, variable or type does not exist."""
 
@@ -180,11 +184,27 @@ class SolveError(ModelicaLikeError):
     """The simulation cannot continue.
 
     Attributes:
-        run: the `Solution` up to the error, if there is one. The `KeyboardInterrupt` that ends a simulation also has
-            it.
+        run: the `Solution` up to the error, if there is one.
     """
 
     run: Any = None
+
+
+class Interrupted(KeyboardInterrupt):
+    """A simulation was interrupted by the user, or by its progress.
+
+    Attributes:
+        run: the `Solution` up to then, if there is one.
+    """
+
+    run: Any = None
+
+    @classmethod
+    def after(cls, run: Any) -> Interrupted:
+        """Return the interrupt of a run."""
+        made = cls()
+        made.run = run
+        return made
 
 
 class SingularAtStart(SolveError):

@@ -19,6 +19,7 @@ from modelica_like.compile.sliding import as_asked
 from modelica_like.errors import (
     ExportError,
     InitializationError,
+    Interrupted,
     LanguageError,
     MissingExtra,
     SolveError,
@@ -151,7 +152,7 @@ def simulate(
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot continue.
-        KeyboardInterrupt: the run was interrupted. `run` of this and of a `SolveError` is the solution up to then.
+        Interrupted: the run was interrupted. `run` of this and of a `SolveError` is the solution up to then.
     """
     model = build(drive if inputs is None else driven(drive, inputs))
     if parameters:
@@ -172,9 +173,11 @@ def simulate(
             loop.record.keeper.read = lambda stretches: asked.feed(loop.dense(stretches))
         try:
             loop.run()
-        except (SolveError, KeyboardInterrupt) as error:
-            vars(error)["run"] = _solution(loop, begin, kind) if loop.record.segments else None
+        except SolveError as error:
+            error.run = _solution(loop, begin, kind) if loop.record.segments else None
             raise
+        except KeyboardInterrupt as interrupt:
+            raise Interrupted.after(_solution(loop, begin, kind) if loop.record.segments else None) from interrupt
         for segment in loop.record.segments if model.ideal else ():
             refuse_contradiction(model, segment.point(-1))
         run = _solution(loop, begin, kind)

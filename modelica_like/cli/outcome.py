@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from modelica_like.cli.shared import DEFECTS, Page, warn
-from modelica_like.errors import ModelicaLikeError, SolveError
+from modelica_like.errors import Interrupted, ModelicaLikeError, SolveError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,13 +29,13 @@ class Outcome:
         self._debug = debug
         self._written: list[str] = []
         self._unwritten: OSError | None = None
-        self.stopped: SolveError | KeyboardInterrupt | None = None
+        self.stopped: SolveError | Interrupted | None = None
         try:
             self.solution = run()
-        except (SolveError, KeyboardInterrupt) as error:
-            if getattr(error, "run", None) is None:
+        except (SolveError, Interrupted) as error:
+            if error.run is None:
                 raise
-            self.stopped, self.solution = error, vars(error)["run"]
+            self.stopped, self.solution = error, error.run
 
     def attempt(self, what: str, make: Callable[[], object], file: Path | None = None) -> bool:
         """Make one output, and its file; False if it failed."""

@@ -127,6 +127,18 @@ typedef struct {
 
 typedef struct Gradient Gradient; /* see gradient.c */
 
+#define FAILURE(name, sentence) FAILURE_##name,
+typedef enum {
+#include "codes.h"
+    N_FAILURES
+} FailureCode;
+#undef FAILURE
+
+typedef struct { /* see codes.h; place -1: none */
+    FailureCode code;
+    double place, numbers[2];
+} Failure;
+
 /* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns; `wanting` transitions fire at the
  * end of the piece. */
 #define SMOOTH_NUMBERS(A) A(x, n), A(p, m->n_p), A(u, m->n_u), A(u_rate, m->n_u), A(d, n_d), A(start_value, starts)
@@ -169,6 +181,7 @@ typedef struct Instance {
     int co_simulation, event_mode_used, early_return_allowed, inputs_move;
     Allocate allocate;
     Release release;
+    Failure failure;     /* the last one */
     int passing;         /* a gradient passes an instant again, of which nobody is told */
     int bounded;         /* the work of a step is bounded: iterations end early */
     int budget;          /* rounds of events and further pieces that are left of a bounded step */
@@ -314,7 +327,7 @@ Result factor_implicit(Instance *c);
 void gradient_move(Instance *c, double t);
 int gradient_round(Instance *c, int round, unsigned char *wanting, int any);
 Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start);
-void gradient_lose(Instance *c, const char *why, const Variable *by);
+void gradient_lose(Instance *c, FailureCode why, const Variable *by);
 void gradient_end(Instance *c);
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 /* instance.c */
@@ -331,7 +344,12 @@ size_t state_size(const Instance *c);
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size);
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy);
 Result report(Instance *c, LogCategory category, Result result, const char *format, ...);
-#define fail(c, ...) report(c, LOG_ERROR, RESULT_ERROR, __VA_ARGS__)
+/* Fails, with numbers and places in the order of the sentence in codes.h. */
+Result fail_with(Instance *c, FailureCode code, double v0, double v1, double v2);
+#define fail(c, name, ...) FAIL(c, FAILURE_##name, __VA_ARGS__, 0, 0, 0)
+#define FAIL(c, code, v0, v1, v2, ...) fail_with(c, code, v0, v1, v2)
+/* For calls that the interface does not allow. */
+#define refuse(c, ...) report(c, LOG_ERROR, RESULT_ERROR, __VA_ARGS__)
 Result set_log_category(Instance *c, const char *category, int on);
 Result allowed(Instance *c, const char *function, int phases);
 

@@ -160,8 +160,7 @@ static Result renew_delays(Instance *c) {
     evaluate_now(c, &m->tapes.delays, delayed);
     for (int k = 0; k < m->n_delays; k++) {
         double time = delayed[2 * k + 1];
-        if (!(time > 0) || isinf(time))
-            return fail(c, "The time of %s is %g s: it must be positive.", text_of(m, m->delays[k].name), time);
+        if (!(time > 0) || isinf(time)) return fail(c, DELAY_NOT_POSITIVE, k, time);
         end = fmin(end, s->t + time);
         for (int i = 0; i < s->n_past; i++) {
             const Row *row = row_at(c, i);
@@ -170,9 +169,7 @@ static Result renew_delays(Instance *c) {
             else end = fmin(end, row->t + time);
         }
     }
-    if (s->past_lost)
-        return fail(c, "Delays reach back over more than %d points of the past. Shorten them, or simulate with IDAS.",
-            MOST_PAST);
+    if (s->past_lost) return fail(c, PAST_TOO_LONG, MOST_PAST);
     half = resolved(c, 0.5 * (end - s->t), delayed, terms);
     for (int k = 0; k < m->n_delays; k++) {
         double *d = c->d + m->delays[k].first;
@@ -206,7 +203,7 @@ Result reach_instant(Instance *c) {
 Result leave_instant(Instance *c, int happened) {
     int begins = c->state.n_past == 0;
     if (c->model->n_delays == 0 || !(begins || happened)) return RESULT_OK;
-    if (begins) gradient_lose(c, "a value is delayed", NULL);
+    if (begins) gradient_lose(c, FAILURE_LOST_BY_DELAY, NULL);
     keep_past(c, c->state.t, c->x, 0);
     return begins ? renew_delays(c) : RESULT_OK;
 }

@@ -17,9 +17,7 @@ Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
         if (is_start(c, v) ? v->start < 0 || v->start >= c->model->n_starts : known_slot(c->model, v) < 0)
-            return fail(c, "Derivatives with respect to %s are not available: it is neither %s.",
-                text_of(c->model, v->name),
-                is_start(c, v) ? "a start value, input nor parameter" : "state, input nor parameter");
+            return fail_with(c, FAILURE_BY_NOTHING + is_start(c, v), v->reference, 0, 0);
     }
     return RESULT_OK;
 }
@@ -28,8 +26,7 @@ Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, unknowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
-        if (v->kind == KIND_DISCRETE)
-            return fail(c, "%s changes at events only: it has no derivatives.", text_of(c->model, v->name));
+        if (v->kind == KIND_DISCRETE) return fail(c, OF_DISCRETE, v->reference);
     }
     return RESULT_OK;
 }
@@ -38,8 +35,7 @@ Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
 Result factor_implicit(Instance *c) {
     if (!settle(c)) return RESULT_ERROR;
     evaluate_now(c, &c->model->tapes.alg_jacobian, c->dense_matrix);
-    if (!lu_factor(c->model->n_z, c->dense_matrix, c->order))
-        return fail(c, "The implicit equations are singular at t = %.9g s.", c->state.t);
+    if (!lu_factor(c->model->n_z, c->dense_matrix, c->order)) return fail(c, IMPLICIT_SINGULAR, c->state.t);
     return RESULT_OK;
 }
 
@@ -73,8 +69,7 @@ static Result start_system_tangent(Instance *c, const double *start_dots) {
     const Model *m = c->model;
     evaluate_now(c, &m->tapes.start_system, c->start_residual);
     tape_run(&m->tapes.start_jacobian, c->slots, c->jacobian);
-    if (!qr_factor(&m->start, c->jacobian, c))
-        return fail(c, "The start equations are singular at t = %.9g s.", c->state.t);
+    if (!qr_factor(&m->start, c->jacobian, c)) return fail(c, START_SINGULAR, c->state.t);
     tangent_now(c, &m->tapes.start_system, c->start_residual);
     for (int k = 0; k < m->n_start_unknowns; k++) {
         int start = m->start_rows[k].start;
@@ -93,7 +88,7 @@ static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const
     c->state.solved = 0;
     if (!start_solve(c)) return RESULT_ERROR;
     if (m->settings->steady || anything_shared(c))
-        return fail(
+        return refuse(
             c, "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
     seed_knowns(c, knowns, n, seed);
     tangent_now(c, &m->tapes.discrete_starts, c->guards);
@@ -357,9 +352,9 @@ Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     double *terms = c->dots, factorial = 1;
     if (v == NULL) return RESULT_ERROR;
-    if (order < 1 || order >= ORDERS) return fail(c, "Outputs have derivatives of order 1 to %d only.", ORDERS - 1);
+    if (order < 1 || order >= ORDERS) return refuse(c, "Outputs have derivatives of order 1 to %d only.", ORDERS - 1);
     if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE)
-        return fail(c, "%s has no time derivative: it is not a variable.", text_of(m, v->name));
+        return refuse(c, "%s has no time derivative: it is not a variable.", text_of(m, v->name));
     if (!factor_implicit(c)) return RESULT_ERROR;
     for (int n = 1; n < ORDERS; n++) memset(terms + (n - 1) * m->n_slots, 0, m->slot_results * sizeof(double));
     terms[0] = 1;

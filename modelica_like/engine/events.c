@@ -150,8 +150,8 @@ static Result fire(Instance *c, unsigned char *wanting) {
         if (!wanting[k]) continue;
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
-        if (one->ends == 1) return fail(c, "t = %.9g s: %s", c->state.t, notice);
-        if (one->ends) gradient_lose(c, "a component ends the run there", NULL);
+        if (one->ends == 1) return fail(c, LIMIT_PASSED, c->state.t, k);
+        if (one->ends) gradient_lose(c, FAILURE_LOST_AT_END, NULL);
         c->state.ended |= one->ends;
         if (*notice) report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, notice);
         d[one->mode] = one->target;
@@ -194,8 +194,7 @@ static Result crowded(Instance *c) {
         s->n_instants = 0;
         return RESULT_OK;
     }
-    return fail(
-        c, "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
+    return fail(c, EVER_FASTER, s->t);
 }
 
 /* Of state events that want to fire, keep those whose guards are positive. */
@@ -264,13 +263,10 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         }
         if (changes && m->n_guards > 0) want_jumped(c, jumped, wanting);
     }
-    if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", c->state.t);
+    if (changes) return fail(c, NOT_SETTLED, c->state.t, rounds);
     int last = 0;
     while (last < m->n_transitions - 1 && !wanting[last]) last++;
-    return fail(c,
-        "Modes still switch after %d rounds at t = %.12g s: %s. Give the switching a hysteresis, or smooth what drives "
-        "it.",
-        rounds, c->state.t, text_of(m, m->transitions[last].name));
+    return fail(c, STILL_SWITCHING, rounds, c->state.t, last);
 }
 
 /* An error if a relation became true and stays true, because what it sets is at rest and is turned back too late: as in
@@ -288,12 +284,9 @@ Result check_turned_back(Instance *c, const double *before) {
         double rate = rates[g], turn = later[g] - rate;
         int slow = fmax(fabs(before[m->n_guards + g]), fabs(rate)) < turn && fabs(before[g]) < turn * step;
         if (!slow || c->d_begun[one->mode] == one->target || c->d[one->mode] != one->target) continue;
-        if (strstr(text_of(m, one->name), "relation[") == NULL) continue; /* a declared mode may keep its condition */
+        if (!m->modes[one->mode].hidden) continue; /* a declared mode may keep its condition */
         if (rate > -turn / LATER || now[g] > rate * rate * step / (2 * turn))
-            return fail(c,
-                "At %.9g s the condition of %s stays true: what is set there is at rest, and would pass without "
-                "another event. Let it rest: a mode that holds the motion, with a restitution.",
-                c->state.t, text_of(m, one->name));
+            return fail(c, STAYS_TRUE, c->state.t, m->guard_transition[g]);
     }
     return RESULT_OK;
 }

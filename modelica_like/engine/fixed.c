@@ -77,10 +77,7 @@ static Result go_on(Instance *c, double limit, int *fired) {
     int behind_event = *fired;
     *fired = 0;
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
-    if (rosenbrock_step(c, begin, first, limit - begin, 0, c->piece) < 0)
-        return fail(c,
-            "The step from t = %.12g s gives values that are not finite, or singular equations. Take smaller steps.",
-            begin);
+    if (rosenbrock_step(c, begin, first, limit - begin, 0, c->piece) < 0) return fail(c, FIXED_STEP_FAILED, begin);
     c->piece->end = limit;
     if (c->budget < 2) c->state.looked = !(c->state.at_event = 1);
     else if (c->model->n_guards > 0) part = first_crossing(c, behind_event);

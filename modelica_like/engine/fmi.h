@@ -24,7 +24,7 @@
 /* Are arguments what they must be: no null pointers where n > 0, the right sizes? If not, it is told. */
 #define GIVEN(n, ...) ((n) == 0 || all_given(c, (const void *const[]){__VA_ARGS__}, TEXT((__VA_ARGS__))))
 #define SIZED(n, wanted, what) \
-    ((n) == (size_t)(wanted) || fail(c, "There must be %zu %s, not %zu.", (size_t)(wanted), what, n))
+    ((n) == (size_t)(wanted) || refuse(c, "There must be %zu %s, not %zu.", (size_t)(wanted), what, n))
 #define NEED(n, ...) \
     if (!GIVEN(n, __VA_ARGS__)) return FMI(Error)
 
@@ -38,7 +38,7 @@ static inline Status status(Result result) {
 static inline int all_given(Instance *c, const void *const *given, const char *names) {
     for (; *names != ')'; given++) {
         size_t length = strcspn(++names, ",)");
-        if (*given == NULL) return fail(c, "The argument %.*s is a null pointer.", (int)length, names);
+        if (*given == NULL) return refuse(c, "The argument %.*s is a null pointer.", (int)length, names);
         names += length + strspn(names + length, ", ") - (names[length] == ',');
     }
     return 1;
@@ -62,7 +62,7 @@ static inline int all_given(Instance *c, const void *const *given, const char *n
         return status(call);           \
     }
 #define CHANGE_PHASE(name, from, to, forbidden, why) \
-    DO(name, from, (forbidden) ? fail(c, TEXT(FMI(name)) why) : (c->state.phase = (to), RESULT_OK))
+    DO(name, from, (forbidden) ? refuse(c, TEXT(FMI(name)) why) : (c->state.phase = (to), RESULT_OK))
 
 static inline Status failed(Instance *c) {
     c->state.phase = PHASE_FAILED;

@@ -49,9 +49,9 @@ CHANGE_PHASE(EnterEventMode, PHASE_CONTINUOUS | PHASE_EVENT, PHASE_EVENT, 0, "")
 
 #define REFERENCES const fmi2ValueReference vr[], size_t nvr
 #define VALUES(name, phases, type, call) EACH(name, phases, nvr, GIVEN(nvr, vr, value), call, REFERENCES, type value[])
-#define NO_VALUES(name, phases, type, kind)                                                                            \
-    CALL(name, phases, 1, nvr == 0 ? RESULT_OK : fail(c, "This model has no variables of type " kind "."), REFERENCES, \
-        type value[])
+#define NO_VALUES(name, phases, type, kind)                                                                  \
+    CALL(name, phases, 1, nvr == 0 ? RESULT_OK : refuse(c, "This model has no variables of type " kind "."), \
+        REFERENCES, type value[])
 
 VALUES(GetReal, READABLE, fmi2Real, get_value(c, known_variable(c, vr[k], TYPE_FLOAT64), &value[k]))
 VALUES(SetReal, SETTABLE, const fmi2Real, set_value(c, known_variable(c, vr[k], TYPE_FLOAT64), value[k]))
@@ -97,7 +97,7 @@ fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint
 }
 
 DO(CancelStep, ANY_PHASE,
-    fail(c, "fmi2CancelStep: there is no step to cancel, as fmi2DoStep returns when its step is done."))
+    refuse(c, "fmi2CancelStep: there is no step to cancel, as fmi2DoStep returns when its step is done."))
 
 /* fmi2DoStep is never pending, and discarded only where a component has ended the run. */
 #define GET_STATUS(name, type, told, answer)                                                                       \

@@ -105,8 +105,8 @@ VALUES(GetInt64, READABLE, fmi3Int64, get_mode(c, r, values))
 VALUES(SetInt64, SETTABLE, const fmi3Int64, set_value(c, known_variable(c, r, TYPE_ENUMERATION), (double)*values))
 
 /* Functions for what no model has: other types, clocks, parts. They refuse every call that asks for something. */
-#define NOTHING(name, phases, what, ...)                                                                          \
-    CALL(name, phases, 1, nValueReferences == 0 ? RESULT_OK : fail(c, "This model has no " what "."), REFERENCES, \
+#define NOTHING(name, phases, what, ...)                                                                            \
+    CALL(name, phases, 1, nValueReferences == 0 ? RESULT_OK : refuse(c, "This model has no " what "."), REFERENCES, \
         __VA_ARGS__)
 #define NO_VALUES(type)                                                                \
     NOTHING(Get##type, READABLE, "variables of type " #type, fmi3##type a[], size_t n) \
@@ -137,7 +137,7 @@ NO_CLOCK(SetIntervalFraction, const fmi3UInt64 a[], const fmi3UInt64 b[])
 NO_CLOCK(GetIntervalFraction, fmi3UInt64 a[], fmi3UInt64 b[], fmi3IntervalQualifier q[])
 
 /* Dependencies stand in the description, which does not announce these (providesPerElementDependencies). */
-#define REFUSED(name, why, ...) CALL(name, ANY_PHASE, 1, fail(c, why), __VA_ARGS__)
+#define REFUSED(name, why, ...) CALL(name, ANY_PHASE, 1, refuse(c, why), __VA_ARGS__)
 REFUSED(ActivateModelPartition, "This model has no scheduled execution.", fmi3ValueReference r, fmi3Float64 t)
 #define SEE_DESCRIPTION "The model description lists the dependencies of variables."
 REFUSED(GetNumberOfVariableDependencies, SEE_DESCRIPTION, fmi3ValueReference v, size_t *n)

@@ -42,15 +42,16 @@ struct Gradient {
     void *before, *behind; /* copies of the state at an instant */
     double *rates;         /* before it */
     unsigned char *rounds; /* transitions that have fired there, by rounds */
-    const char *why, *by;  /* why there are no derivatives, or NULL; by what */
+    FailureCode lost;      /* why there are no derivatives, or 0 */
+    uint32_t lost_by;      /* value reference, or the largest number: anything */
     double lost_at;
 };
 
-void gradient_lose(Instance *c, const char *why, const Variable *by) {
+void gradient_lose(Instance *c, FailureCode why, const Variable *by) {
     Gradient *g = c->gradient;
-    if (g == NULL || c->passing || g->why != NULL) return;
-    g->why = why;
-    g->by = by == NULL ? "anything" : text_of(c->model, by->name);
+    if (g == NULL || c->passing || g->lost != 0) return;
+    g->lost = why;
+    g->lost_by = by == NULL ? UINT32_MAX : by->reference;
     g->lost_at = c->state.t;
 }
 
@@ -99,7 +100,7 @@ static void move_smoothly(Instance *c, double end) {
     const Model *m = c->model;
     double begin = c->state.t, h = (end - begin) / STEPS, *rates = c->rhs;
     if (h <= 0) return;
-    if (!factor_implicit(c)) gradient_lose(c, "its equations are singular there", NULL);
+    if (!factor_implicit(c)) gradient_lose(c, FAILURE_LOST_AT_SINGULAR, NULL);
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);
         tangent_now(c, &m->tapes.rates, g->tangents[j].stages);
@@ -109,7 +110,7 @@ static void move_smoothly(Instance *c, double end) {
         double t = begin + h * ((i - 1) / (N_STAGES - 1) + NODES[stage]);
         piece_at(m, c->piece, t, c->point);
         evaluate(c, &m->tapes.jacobian, t, c->point, c->jacobian);
-        if (!factor_step(c, 4 / h)) gradient_lose(c, "its equations are singular there", NULL);
+        if (!factor_step(c, 4 / h)) gradient_lose(c, FAILURE_LOST_AT_SINGULAR, NULL);
         evaluate(c, &m->tapes.rates, t, c->point, rates);
         for (int j = 0; j < g->n; j++) {
             double *stages = g->tangents[j].stages;
@@ -207,15 +208,15 @@ static void check_kinks(Instance *c) {
         int kink = has_kink(c, &g->tangents[j]);
         for (int k = 0; k < c->model->n_guards; k++)
             if (c->positive[k]) kink |= has_other_mode(c, &g->tangents[j], k);
-        if (kink) gradient_lose(c, "it is at a kink there", g->tangents[j].by);
+        if (kink) gradient_lose(c, FAILURE_LOST_AT_KINK, g->tangents[j].by);
     }
     c->variables_valid = c->state.z_valid = 0;
 }
 
 /* States are smooth enough at edges within a step, slopes of tangents are not. */
 void gradient_move(Instance *c, double end) {
-    if (c->gradient != NULL && c->gradient->why == NULL && c->state.t < end) check_kinks(c);
-    for (int k = 0; c->gradient != NULL && c->gradient->why == NULL && c->state.t < end; k++) {
+    if (c->gradient != NULL && c->gradient->lost == 0 && c->state.t < end) check_kinks(c);
+    for (int k = 0; c->gradient != NULL && c->gradient->lost == 0 && c->state.t < end; k++) {
         double behind = INFINITY, before = k < MOST_EDGES ? edge_ahead(c, c->state.t, &behind) : INFINITY;
         move_smoothly(c, fmin(before, end));
         if (!(behind < end)) return;
@@ -260,8 +261,7 @@ static void check_shifts(Instance *c, Gradient *g) {
     for (int k = 0; k < m->n_modes; k++) matters |= d[k] != c->d[k] && m->modes[k].n_names == 0;
     for (int j = 0; j < g->n; j++) {
         if (!matters) g->tangents[j].shift = 0;
-        else if (!isfinite(g->tangents[j].shift))
-            gradient_lose(c, "the guard of that event only touches zero", g->tangents[j].by);
+        else if (!isfinite(g->tangents[j].shift)) gradient_lose(c, FAILURE_LOST_AT_TOUCH, g->tangents[j].by);
     }
 }
 
@@ -269,11 +269,11 @@ static void check_shifts(Instance *c, Gradient *g) {
 int gradient_round(Instance *c, int round, unsigned char *wanting, int any) {
     Gradient *g = c->gradient;
     size_t n = (size_t)c->model->n_transitions;
-    if (g == NULL || g->why != NULL) return any;
+    if (g == NULL || g->lost != 0) return any;
     if (c->passing && round < g->n_rounds) memcpy(wanting, g->rounds + n * (size_t)round, n);
     if (c->passing) return round < g->n_rounds;
     g->n_rounds = any ? round + 1 : round;
-    if (any && round >= MOST_ROUNDS) gradient_lose(c, "that event has too many rounds", NULL);
+    if (any && round >= MOST_ROUNDS) gradient_lose(c, FAILURE_LOST_IN_ROUNDS, NULL);
     else if (any) memcpy(g->rounds + n * (size_t)round, wanting, n);
     return any;
 }
@@ -313,7 +313,7 @@ static void pass_tangents(Instance *c, Gradient *g, Result (*pass)(Instance *c))
     }
     state_copy_in(c, g->behind);
     c->passing = 0;
-    if (other != NULL) gradient_lose(c, "a small change of it leads to other modes there", other);
+    if (other != NULL) gradient_lose(c, FAILURE_LOST_AT_OTHER_MODES, other);
     evaluate_now(c, &c->model->tapes.rates, c->rhs);
     move_on(c, g, c->rhs, -1);
 }
@@ -322,19 +322,19 @@ Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
     Gradient *g = c->gradient;
     if (g == NULL || c->passing) return pass(c);
     for (int j = 0; j < g->n && start; j++) {
-        g->why = NULL;
+        g->lost = 0;
         g->tangents[j].shift = 0;
         memset(g->tangents[j].now, 0, c->n_smooth * sizeof(double));
         g->tangents[j].now[g->tangents[j].place] = 1;
     }
-    if (!start && g->why == NULL) find_shifts(c, g);
+    if (!start && g->lost == 0) find_shifts(c, g);
     g->n_rounds = 0;
     if (!state_copy_out(c, &g->before)) return RESULT_ERROR;
     Result result = pass(c);
-    if (!result || g->why != NULL) return result;
+    if (!result || g->lost != 0) return result;
     if (!state_copy_out(c, &g->behind)) return RESULT_ERROR;
     if (!start) check_shifts(c, g);
-    if (g->why == NULL) pass_tangents(c, g, pass);
+    if (g->lost == 0) pass_tangents(c, g, pass);
     return RESULT_OK;
 }
 
@@ -378,12 +378,11 @@ static double *value_of(Instance *c, const Variable *v) {
 int modelica_like_gradient_start(void *instance, const uint32_t by[], size_t n) {
     Instance *c = instance;
     if (c == NULL || !allowed(c, "modelica_like_gradient_start", PHASE_INITIALIZATION)) return 1;
-    if (!c->co_simulation || c->model->settings->fixed_step > 0)
-        return !fail(c, "Derivatives of a run need Co-Simulation with adaptive steps.");
-    if (by == NULL && n > 0) return !fail(c, "The argument by is a null pointer.");
+    if (!c->co_simulation || c->model->settings->fixed_step > 0) return !fail(c, FIXED_STEPS_HAVE_NONE, 0);
+    if (by == NULL && n > 0) return !refuse(c, "The argument by is a null pointer.");
     if (!check_knowns(c, by, n)) return 1;
     gradient_end(c);
-    if (n > 0 && (c->gradient = gradient_new(c, n)) == NULL) return !fail(c, "There is not enough memory.");
+    if (n > 0 && (c->gradient = gradient_new(c, n)) == NULL) return !fail(c, NO_MEMORY, 0);
     for (size_t j = 0; j < n; j++) {
         c->gradient->tangents[j].by = find_variable(c->model, by[j]);
         c->gradient->tangents[j].place = value_of(c, c->gradient->tangents[j].by) - c->numbers;
@@ -396,10 +395,8 @@ int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, dou
     Instance *c = instance;
     if (c == NULL || !allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED)) return 1;
     const Gradient *g = c->gradient;
-    if (g == NULL || of == NULL || gradient == NULL)
-        return !fail(c, "An argument is a null pointer, or modelica_like_gradient_start has not been called.");
-    if (g->why != NULL)
-        return !fail(c, "There are no derivatives with respect to %s after t = %.9g s: %s.", g->by, g->lost_at, g->why);
+    if (g == NULL || of == NULL || gradient == NULL) return !fail(c, NOT_ASKED, 0);
+    if (g->lost != 0) return !fail_with(c, g->lost, g->lost_by, g->lost_at, 0);
     if (!check_unknowns(c, of, n_of) || !factor_implicit(c)) return 1;
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);

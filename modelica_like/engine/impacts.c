@@ -358,11 +358,7 @@ Result meet(Instance *c, double keep, int *any) {
     for (int k = 0; k < m->n_ideals; k++) {
         int met = row_of(c, k)[1] == 0 || excess(c, k, values, keep < 0 ? LOST : keep) <= 0;
         if (!moved(c, k)) continue;
-        if (!met && keep < 0)
-            return fail(c,
-                "At t = %.9g s no combination of modes is valid: %s would take %.4g at once. Give the current another "
-                "path (a freewheeling diode), or put a resistance in series with a capacitor.",
-                c->state.t, text_of(m, m->ideals[k].name), fabs(values[zero_of(c, k)]));
+        if (!met && keep < 0) return fail(c, NO_VALID_MODES, c->state.t, k, fabs(values[zero_of(c, k)]));
         if (!met) continue;
         c->places[(*any)++] = zero_of(c, k);
         row_of(c, k)[1] = 0;
@@ -378,11 +374,7 @@ Result refuse_contradiction(Instance *c) {
     for (int k = 0; k < c->model->n_ideals; k++) {
         if (row_of(c, k)[HEAD - 1] == 0) continue;
         const double *values = variables_now(c);
-        if (excess(c, k, values, LOST) > 0)
-            return fail(c,
-                "At t = %.9g s %s contradicts the rest of the circuit: it is ideal and makes zero what the rest makes "
-                "%.4g. Put a resistance in series or in parallel with it.",
-                c->state.t, text_of(c->model, c->model->ideals[k].name), values[zero_of(c, k)]);
+        if (excess(c, k, values, LOST) > 0) return fail(c, CONTRADICTS, c->state.t, k, values[zero_of(c, k)]);
     }
     return RESULT_OK;
 }

@@ -2,6 +2,12 @@
 #include <stdarg.h>
 #include "core.h"
 
+#define FAILURE(name, sentence) sentence "\0"
+static const char sentences[] = /* one after the other: no table of addresses */
+#include "codes.h"
+    ;
+#undef FAILURE
+
 static const char *const categories[] = {
     "logStatusError", "logStatusWarning", "logEvents", "logIntegrator"}; /* by the bits of LogCategory */
 enum { N_CATEGORIES = sizeof categories / sizeof categories[0] };
@@ -20,11 +26,59 @@ Result report(Instance *c, LogCategory category, Result result, const char *form
     return result;
 }
 
+static const char *name_of(const Model *m, char kind, double place) {
+    int k = place < INT32_MAX ? (int)place : 0;
+    const Variable *v = kind == 'V' ? find_variable(m, (uint32_t)place) : NULL;
+    switch (kind) {
+        case 'A': return text_of(m, m->rising[k].above_name);
+        case 'B': return text_of(m, m->singular_names[k]);
+        case 'C': return text_of(m, m->rising[k].below_name);
+        case 'D': return text_of(m, m->delays[k].name);
+        case 'I': return text_of(m, m->ideals[k].name);
+        case 'N': return text_of(m, m->transitions[k].notice);
+        case 'S': return text_of(m, m->state_names[k]);
+        case 'T': return text_of(m, m->transitions[k].name);
+        case 'Z': return text_of(m, m->implicit_names[k]);
+        case 'E':
+            for (const Variable *one = m->variables; one < m->variables + m->n_variables; one++)
+                if (one->kind <= KIND_VARIABLE && one->start == k) v = one;
+    }
+    return v == NULL ? "anything" : text_of(m, v->name);
+}
+
+/* Fails, with values in the order of the sentence; keeps what it is about, for native.c. */
+Result fail_with(Instance *c, FailureCode code, double v0, double v1, double v2) {
+    const double all[] = {v0, v1, v2}, *value = all;
+    char message[MESSAGE_LENGTH + 1];
+    Failure failure = {.code = code, .place = -1};
+    double *number = failure.numbers;
+    size_t used = 0;
+    const char *s = sentences;
+    for (int k = 0; k < (int)code; k++) s += strlen(s) + 1;
+    for (; *s != 0 && used < MESSAGE_LENGTH; s++) {
+        if (*s != '%') {
+            message[used++] = *s;
+            continue;
+        }
+        char *here = message + used;
+        size_t room = MESSAGE_LENGTH - used;
+        if (*++s == 'g') *number++ = *value;
+        else if (*s != 'C') failure.place = *value;
+        if (*s == 'g' || *s == 'R') used += (size_t)snprintf(here, room, "%.10g", *value);
+        else used += (size_t)snprintf(here, room, "%s", name_of(c->model, *s, failure.place));
+        value += *s != 'C';
+    }
+    message[used < MESSAGE_LENGTH ? used : MESSAGE_LENGTH] = 0;
+    report(c, LOG_ERROR, RESULT_ERROR, "%s", message);
+    if (!c->passing) c->failure = failure;
+    return RESULT_ERROR;
+}
+
 Result set_log_category(Instance *c, const char *category, int on) {
     unsigned chosen = category == NULL || strcmp(category, "logAll") == 0 ? LOG_ALL : 0;
     for (int k = 0; k < N_CATEGORIES && chosen == 0; k++)
         if (strcmp(category, categories[k]) == 0) chosen = 1u << k;
-    if (chosen == 0) return fail(c, "There is no log category '%.100s'.", category);
+    if (chosen == 0) return refuse(c, "There is no log category '%.100s'.", category);
     c->log_enabled = on ? c->log_enabled | chosen : c->log_enabled & ~chosen;
     return RESULT_OK;
 }
@@ -37,7 +91,7 @@ Result allowed(Instance *c, const char *function, int phases) {
     int phase = 0;
     if (c->state.phase & phases) return RESULT_OK;
     while (!(c->state.phase >> phase & 1)) phase++;
-    return fail(c, "%s is not allowed now: %s.", function, names[phase]);
+    return refuse(c, "%s is not allowed now: %s.", function, names[phase]);
 }
 
 static uint64_t larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
@@ -115,14 +169,14 @@ Instance *instance_new(Instance bare, const char *token) {
     const char *name = bare.name;
     if (name == NULL || *name == 0) bare.name = "?";
     bare.log_enabled = bare.log_enabled ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
-    if (name != bare.name) return fail(&bare, "The instance needs a name."), NULL;
+    if (name != bare.name) return refuse(&bare, "The instance needs a name."), NULL;
     if (token == NULL || strcmp(token, m->token) != 0)
-        return fail(&bare, "The instantiation token is that of another export of the model."), NULL;
+        return refuse(&bare, "The instantiation token is that of another export of the model."), NULL;
     Instance measured = bare;
     size_t length = strlen(name) + 1, head = (sizeof bare + length) / sizeof(double) + 1;
     uint64_t size = head + lay_out(&measured, NULL);
     Instance *c = size > SIZE_MAX / sizeof(double) ? NULL : bare.allocate((size_t)size, sizeof(double));
-    if (c == NULL) return fail(&bare, "There is not enough memory."), NULL;
+    if (c == NULL) return fail(&bare, NO_MEMORY, 0), NULL;
     *c = bare;
     c->name = memcpy(c + 1, name, length);
     c->numbers = (double *)(void *)c + head;
@@ -143,7 +197,7 @@ Instance *instance_open(Instance bare, const char *token, const char *location) 
                                            bare.release, message)
                                      : model_open(location, bare.allocate, bare.release, message);
     if (own == NULL && bare.name == NULL) bare.name = "?";
-    if (own == NULL) return fail(&bare, "%s", message), NULL;
+    if (own == NULL) return refuse(&bare, "%s", message), NULL;
     bare.model = own;
     Instance *c = instance_new(bare, token);
     if (c == NULL) model_free(own);
@@ -160,10 +214,8 @@ void instance_free(Instance *c) {
 Result set_experiment(
     Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined, double stop) {
     State *s = &c->state;
-    if (!isfinite(start) || (stop_defined && !(stop >= start)))
-        return fail(c, "The start time %g s must be finite and not after the stop time %g s.", start, stop);
-    if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
-        return fail(c, "The tolerance must be between 0 and 1, not %g.", tolerance);
+    if (!isfinite(start) || (stop_defined && !(stop >= start))) return fail(c, SPAN, start, stop);
+    if (tolerance_defined && !(tolerance > 0 && tolerance < 1)) return fail(c, TOLERANCE, tolerance);
     if (tolerance_defined) s->tolerance = tolerance;
     if (tolerance_defined) s->absolute = tolerance * c->model->settings->absolute_to_relative;
     s->t = s->start_time = s->u_time = start;
@@ -186,7 +238,7 @@ static Header header_of(const Instance *c, const void *copy) {
 
 Result state_copy_out(Instance *c, void **copy) {
     if (*copy == NULL) *copy = c->allocate(1, copy_size(c));
-    if (*copy == NULL) return fail(c, "There is not enough memory for a copy of the state.");
+    if (*copy == NULL) return fail(c, NO_MEMORY, 0);
     memcpy(*copy, &c->state, sizeof(State));
     memcpy((char *)*copy + sizeof(State), c->numbers, c->n_numbers * sizeof(double));
     return RESULT_OK;
@@ -196,7 +248,7 @@ Result state_copy_in(Instance *c, const void *copy) {
     memcpy(&c->state, copy, sizeof(State));
     memcpy(c->numbers, (const char *)copy + sizeof(State), c->n_numbers * sizeof(double));
     c->variables_valid = c->look_valid = c->edges_valid = 0;
-    gradient_lose(c, "the state was set", NULL);
+    gradient_lose(c, FAILURE_LOST_BY_COPY, NULL);
     return RESULT_OK;
 }
 
@@ -210,17 +262,17 @@ size_t state_size(const Instance *c) { return sizeof(Header) + copy_size(c); }
 
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size) {
     Header h = header_of(c, copy);
-    if (size < state_size(c)) return fail(c, "The state needs %zu bytes, not %zu.", state_size(c), size);
+    if (size < state_size(c)) return refuse(c, "The state needs %zu bytes, not %zu.", state_size(c), size);
     memcpy(bytes, &h, sizeof h);
     memcpy(bytes + sizeof h, copy, copy_size(c));
     return RESULT_OK;
 }
 
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy) {
-    if (size != state_size(c)) return fail(c, "A state of this model has %zu bytes, not %zu.", state_size(c), size);
+    if (size != state_size(c)) return refuse(c, "A state of this model has %zu bytes, not %zu.", state_size(c), size);
     Header h = header_of(c, bytes + sizeof h);
     if (memcmp(&h, bytes, sizeof h) != 0)
-        return fail(c, "These bytes are not a state of this model: it is another model's, or they are damaged.");
+        return refuse(c, "These bytes are not a state of this model: it is another model's, or they are damaged.");
     *copy = NULL;
     if (!state_copy_out(c, copy)) return RESULT_ERROR;
     memcpy(*copy, bytes + sizeof h, copy_size(c));

@@ -224,10 +224,7 @@ static Result take_step(Instance *c, double limit) {
         return RESULT_OK;
     }
     leave_piece(c);
-    return fail(c,
-        "The integrator gave up at t = %.12g s: the step became too small. Look for a stiff spring, a vanishing "
-        "mass or a speed without bound.",
-        s->t);
+    return fail(c, STEP_TOO_SMALL, s->t);
 }
 
 Result move_to(Instance *c, double t) {
@@ -293,8 +290,7 @@ Result check_whole(Instance *c, double size) {
     double fixed = c->model->settings->fixed_step;
     if (!(fixed > 0) || (fabs(size / fixed - floor(size / fixed + 0.5)) <= SAME_PART && size > 0.5 * fixed))
         return RESULT_OK;
-    return fail(c, "The step of %.9g s is not a whole number of fixed steps of %.9g s, for which the model was made.",
-        size, fixed);
+    return fail(c, NOT_WHOLE_STEPS, size, fixed);
 }
 
 /* Checks what the importer asks for and says where the step ends. */
@@ -303,12 +299,12 @@ Result check_step(Instance *c, double point, double size, double *target) {
     double slack = SAME_POINT * fmax(1, fabs(s->t));
     *target = point + size;
     if (!isfinite(point) || fabs(point - s->t) > slack)
-        return fail(c, "The communication point is %.12g s, but the instance is at %.12g s.", point, s->t);
-    if (!(size > 0) || !isfinite(*target)) return fail(c, "The communication step size %g s is not positive.", size);
+        return refuse(c, "The communication point is %.12g s, but the instance is at %.12g s.", point, s->t);
+    if (!(size > 0) || !isfinite(*target)) return refuse(c, "The communication step size %g s is not positive.", size);
     if (!check_whole(c, size)) return RESULT_ERROR;
     if (!s->stop_time_defined || *target <= s->stop_time) return RESULT_OK;
     if (*target > s->stop_time + slack)
-        return fail(c, "The step to %.12g s goes beyond the stop time %.12g s.", *target, s->stop_time);
+        return refuse(c, "The step to %.12g s goes beyond the stop time %.12g s.", *target, s->stop_time);
     *target = s->stop_time;
     return RESULT_OK;
 }

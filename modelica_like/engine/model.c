@@ -3,7 +3,7 @@
  * resources, which importers name in many ways. */
 #include "model.h"
 
-#define FORMAT 7
+#define FORMAT 8
 #define UNKNOWN (-1)
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
 

@@ -76,7 +76,7 @@ typedef struct {
     uint64_t sources;
 } Transition;
 typedef struct {
-    int first_name, n_names; /* none: a discrete value */
+    int first_name, n_names, hidden; /* no names: a discrete value; hidden: of a relation, nobody has declared it */
 } Mode;
 typedef struct {
     int mode, target;

@@ -35,7 +35,9 @@ typedef struct {
 
 static void keep_message(const Instance *c, int status, const char *category, const char *message) {
     Native *n = c->environment;
-    if (!status) snprintf(n->message, sizeof n->message, "%s", message);
+    if (status) return;
+    snprintf(n->message, sizeof n->message, "%s", message);
+    if (n->c != NULL) n->c->failure.code = FAILURE_MISUSED; /* `fail` knows better */
 }
 
 static int code(Result result) { return result ? NATIVE_OK : NATIVE_FAILED; }
@@ -79,6 +81,17 @@ EXPORTED void native_free(Native *n) {
 EXPORTED void *native_instance(const Native *n) { return n->c; }
 
 EXPORTED const char *native_message(const Native *n) { return n->message; }
+
+/* What has failed, and where: states and implicit unknowns, d, d before the last change, parameters, inputs. */
+EXPORTED const Failure *native_failure(const Native *n, const double *point[5]) {
+    const Instance *c = n->c;
+    point[0] = c->x;
+    point[1] = c->d;
+    point[2] = c->d_before;
+    point[3] = c->p;
+    point[4] = c->u;
+    return &c->failure;
+}
 
 /* Back to the model's values; start and end (infinite: unknown) in s, relative tolerance, absolute one in nominals. */
 Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol) {
@@ -152,7 +165,7 @@ EXPORTED int native_states(Native *n, const double *given, double *x) {
     if (event_first(c) && !handle_event(c)) return NATIVE_FAILED;
     if (given != NULL) {
         if (!set_states(c, given)) return NATIVE_FAILED;
-        gradient_lose(c, "the states were set", NULL);
+        gradient_lose(c, FAILURE_LOST_BY_STATES, NULL);
         for (int k = 0; k < c->model->n_d; k++) c->d_before[k] = -1;
         memset(c->entered, 0, (size_t)c->model->n_holds);
         c->stopped = c->state.piece_valid = c->state.event_pending = 0;

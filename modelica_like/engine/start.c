@@ -21,8 +21,7 @@ static Result apply_direct(Instance *c) {
         const StartOf *one = &m->start_direct[k];
         double value = c->start_values[one->start] / one->factor;
         if (known[one->position] && fabs(value - x[one->position]) > CONSISTENT * (1 + fabs(x[one->position])))
-            return fail(c, "Two start values of %s contradict each other: %.9g and %.9g.",
-                text_of(m, m->state_names[one->position]), x[one->position], value);
+            return fail(c, STARTS_CONTRADICT, one->start, x[one->position], value);
         if (!known[one->position]) x[one->position] = value;
         known[one->position] = 1;
     }
@@ -67,7 +66,7 @@ static Result solve_start_system(Instance *c) {
         if (change < 1e-13) break;
     }
     if (error <= CONSISTENT) return RESULT_OK;
-    return fail(c, "No start was found that meets all start values. Give others, or start values of states.");
+    return fail(c, START_NOT_FOUND, 0);
 }
 
 static Result check_dependent(Instance *c) {
@@ -77,7 +76,7 @@ static Result check_dependent(Instance *c) {
     for (int k = 0; k < m->n_start_dependent; k++) {
         double value = c->start_values[m->start_dependent[k].start], actual = c->variables[m->start_dependent[k].node];
         if (!(fabs(actual - value) <= CONSISTENT * (1 + fabs(value))))
-            return fail(c, "A start value of %.9g cannot be met: the variable would be %.9g.", value, actual);
+            return fail(c, START_NOT_MET, value, m->start_dependent[k].start, actual);
     }
     return RESULT_OK;
 }
@@ -185,8 +184,7 @@ static Result check_modes_hold(Instance *c) {
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
         if (guard_active(c, k) && c->guards_before[k] > 0 && one->target != (int)c->d[one->mode])
-            return fail(c, "No steady state was found at t = %.9g s: %s does not stay in its mode.", c->state.t,
-                text_of(m, one->name));
+            return fail(c, MODE_NOT_STEADY, c->state.t, m->guard_transition[k]);
     }
     return RESULT_OK;
 }
@@ -216,14 +214,14 @@ static Result start_settled(Instance *c, double *begun, int declared) {
         share(c);
     }
     if (begun) return RESULT_ERROR;
-    return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
+    return fail(c, START_NOT_SETTLED, 0);
 }
 
 static Result pass_start(Instance *c) {
     double *begun = c->model->settings->steady ? c->begun : NULL;
     if (!check_tables(c)) return RESULT_ERROR;
     if (!start_settled(c, begun, 0) && !(begun && start_settled(c, begun, 1)))
-        return begun ? fail(c, "No steady state was found at t = %.9g s.", c->state.t) : RESULT_ERROR;
+        return begun ? fail(c, NOT_STEADY, c->state.t) : RESULT_ERROR;
     rest(c);
     replace_dependent(c);
     if (!solve_now(c, 0) || !check_singular(c) || !check_modes_hold(c)) return RESULT_ERROR;

@@ -255,14 +255,6 @@ int any_of(const unsigned char *marks, int n) {
     return any;
 }
 
-static Result singular(Instance *c, double t, int quiet, const char *names) {
-    return !quiet &&
-           fail(c,
-               "The Jacobian is singular at t = %.9g s in the equations for %s. Where two frictions stick on the "
-               "same motion, make one compliant, or let one start open.",
-               t, names);
-}
-
 double largest_of(int n, const double *values) {
     double largest = 0;
     for (int k = 0; k < n; k++) largest = fmax(largest, fabs(values[k]));
@@ -280,8 +272,8 @@ Result solve_implicit(Instance *c, double t, double *point, int quiet) {
         residual = largest_of(m->n_z, step);
         run_special(c, &m->tapes.alg_jacobian, matrix);
         for (int k = 0; k < m->n_z; k++)
-            if (!isfinite(step[k])) return singular(c, t, quiet, text_of(m, m->implicit_names[k]));
-        if (!lu_factor(m->n_z, matrix, order)) return singular(c, t, quiet, text_of(m, m->implicit_names[0]));
+            if (!isfinite(step[k])) return !quiet && fail(c, UNKNOWN_SINGULAR, t, k);
+        if (!lu_factor(m->n_z, matrix, order)) return !quiet && fail(c, UNKNOWN_SINGULAR, t, 0);
         lu_solve(m->n_z, matrix, order, step);
         change = 0;
         for (int k = 0; k < m->n_z; k++) {
@@ -293,8 +285,7 @@ Result solve_implicit(Instance *c, double t, double *point, int quiet) {
             return RESULT_OK;
     }
     if (change <= 1e-9 || c->bounded) return RESULT_OK;
-    return !quiet &&
-           fail(c, "The equations for %s were not solved at t = %.9g s.", text_of(m, m->implicit_names[0]), t);
+    return !quiet && fail(c, NOT_SOLVED, 0, t);
 }
 
 Result solve_now(Instance *c, int quiet) { return solve_implicit(c, c->state.t, c->x, quiet); }
@@ -304,14 +295,11 @@ Result check_singular(Instance *c) {
     double t = c->state.t, *values = c->rhs;
     evaluate_now(c, &m->tapes.determinants, values);
     for (int k = 0; k < m->n_determinants; k++)
-        if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, t, 0, text_of(m, m->singular_names[k]));
+        if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return fail(c, BLOCK_SINGULAR, t, k);
     if (c->bounded) return RESULT_OK; /* the next step tells */
     tape_run(&m->tapes.rates, c->slots, values);
     for (int k = 0; k < m->n_x; k++)
-        if (!isfinite(values[k]))
-            return fail(c,
-                "The derivative of %s is not finite at t = %.9g s. Look for a mass, inertia or ratio of zero.",
-                text_of(m, m->state_names[k]), t);
+        if (!isfinite(values[k])) return fail(c, RATE_NOT_FINITE, k, t);
     return RESULT_OK;
 }
 

@@ -16,13 +16,11 @@ const Variable *find_variable(const Model *m, uint32_t reference) {
 
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) {
     const Variable *v = find_variable(c->model, reference);
-    if (v != NULL && (v->type == (int)type || type == ANY_TYPE)) return v;
-    fail(c,
-        v == NULL               ? "There is no variable with value reference %u."
-        : v->type == TYPE_ARRAY ? "The variable with value reference %u is an array: it has no derivatives."
-                                : "The variable with value reference %u is not of type %s.",
-        (unsigned)reference, type == TYPE_FLOAT64 ? "Real (Float64)" : "Enumeration (Integer, Int64)");
-    return NULL;
+    FailureCode why = FAILURE_MISUSED;
+    if (v == NULL) why = FAILURE_NO_VARIABLE;
+    else if (v->type != (int)type && type != ANY_TYPE)
+        why = v->type == TYPE_ARRAY ? FAILURE_OF_ARRAY : FAILURE_NOT_REAL + (type != TYPE_FLOAT64);
+    return why == FAILURE_MISUSED || fail_with(c, why, reference, 0, 0) ? v : NULL;
 }
 
 /* Values that a tape gives are computed once per point. */
@@ -78,10 +76,6 @@ void get_indicators(Instance *c, double *indicators) {
     }
 }
 
-static Result refuse_value(Instance *c, int name, const char *why) {
-    return fail(c, "%s cannot be set: %s", text_of(c->model, name), why);
-}
-
 static void touch(Instance *c) {
     c->state.z_valid = c->state.solved = 0;
     c->state.inputs_changed = 1;
@@ -108,13 +102,10 @@ void mark_tuned(Instance *c, int parameter) {
 
 static Result set_parameter(Instance *c, const Variable *v, double value) {
     double low = c->model->parameter_min[v->index], high = c->model->parameter_max[v->index];
-    if (!v->tunable && !before_start(&c->state))
-        return refuse_value(c, v->name, "it is a fixed parameter. Set it before the end of the initialization.");
-    if (v->tunable && c->state.phase == PHASE_CONTINUOUS)
-        return refuse_value(c, v->name, "tunable parameters change in event mode only.");
+    if (!v->tunable && !before_start(&c->state)) return fail(c, PARAMETER_FIXED, v->reference);
+    if (v->tunable && c->state.phase == PHASE_CONTINUOUS) return fail(c, TUNED_OUTSIDE_EVENTS, v->reference);
     if (value < low || value > high)
-        return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(c->model, v->name), value,
-            value < low ? "least" : "most", value < low ? low : high);
+        return fail_with(c, FAILURE_BELOW_LEAST + (value > high), v->reference, value, value < low ? low : high);
     if (c->p[v->index] == value) return RESULT_OK;
     if (!before_start(&c->state)) mark_tuned(c, v->index);
     keep_before_change(c);
@@ -126,23 +117,22 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
 /* Columns of tables must rise; they are set number by number, so this is asked where they are needed. */
 Result check_tables(Instance *c) {
     const Model *m = c->model;
-    for (const Rising *one = m->rising; one < m->rising + m->n_rising; one++)
-        if (!(c->p[one->below] < c->p[one->above]))
-            return fail(c, "%s = %g is not above %s = %g: this column of the table must rise.",
-                text_of(m, one->above_name), c->p[one->above], text_of(m, one->below_name), c->p[one->below]);
+    for (int k = 0; k < m->n_rising; k++) {
+        const Rising *one = &m->rising[k];
+        if (!(c->p[one->below] < c->p[one->above])) return fail(c, COLUMN_FALLS, k, c->p[one->above], c->p[one->below]);
+    }
     return RESULT_OK;
 }
 
 static Result set_start(Instance *c, const Variable *v, double value) {
-    if (!before_start(&c->state))
-        return refuse_value(c, v->name, "start values are settable before the end of the initialization only.");
+    if (!before_start(&c->state)) return fail(c, START_TOO_LATE, v->reference);
     if (v->kind == KIND_DISCRETE) {
         c->d[v->index] = value;
         c->mode_given[v->index] = 1;
     } else if (v->start >= 0 && v->start < c->model->n_starts) {
         c->start_value[v->start] = value;
         c->start_given[v->start] = 1;
-    } else return refuse_value(c, v->name, "it follows from other variables.");
+    } else return fail(c, FOLLOWS, v->reference);
     touch(c);
     return RESULT_OK;
 }
@@ -151,10 +141,9 @@ static Result set_start(Instance *c, const Variable *v, double value) {
 Result set_value(Instance *c, const Variable *v, double value) {
     const Model *m = c->model;
     if (v == NULL) return RESULT_ERROR;
-    if (!isfinite(value)) return refuse_value(c, v->name, "the value is not a finite number.");
+    if (!isfinite(value)) return fail(c, NOT_FINITE, v->reference);
     if (v->type == TYPE_ENUMERATION && (value < 0 || value >= m->modes[v->index].n_names))
-        return fail(
-            c, "%s has no mode %.0f: they are 0 to %d.", text_of(m, v->name), value, m->modes[v->index].n_names - 1);
+        return fail(c, NO_SUCH_MODE, v->reference, value, m->modes[v->index].n_names - 1);
     if (v->kind == KIND_PARAMETER) return set_parameter(c, v, value);
     if (v->kind != KIND_INPUT) return set_start(c, v, v->type == TYPE_ENUMERATION ? floor(value) : value);
     if (input_at(c, v->index, c->state.t) == value) return RESULT_OK;
@@ -166,10 +155,10 @@ Result set_value(Instance *c, const Variable *v, double value) {
 /* From now on the input moves with this rate. */
 Result set_input_rate(Instance *c, uint32_t reference, int order, double rate) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
-    if (order != 1) return fail(c, "Inputs have derivatives of order 1 only.");
+    if (order != 1) return refuse(c, "Inputs have derivatives of order 1 only.");
     if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_INPUT) return refuse_value(c, v->name, "it is not an input, so it has no input derivative.");
-    if (!isfinite(rate)) return refuse_value(c, v->name, "the derivative is not a finite number.");
+    if (v->kind != KIND_INPUT) return fail(c, NO_INPUT, v->reference);
+    if (!isfinite(rate)) return fail(c, INPUT_RATE_NOT_FINITE, v->reference);
     if (c->u_rate[v->index] == rate) return RESULT_OK;
     touch_inputs(c);
     c->u_rate[v->index] = rate;
@@ -177,7 +166,7 @@ Result set_input_rate(Instance *c, uint32_t reference, int order, double rate) {
 }
 
 Result set_time(Instance *c, double time) {
-    if (!isfinite(time)) return fail(c, "The time is not a finite number.");
+    if (!isfinite(time)) return refuse(c, "The time is not a finite number.");
     c->state.t = time;
     c->state.z_valid = c->variables_valid = 0;
     return RESULT_OK;
@@ -186,7 +175,7 @@ Result set_time(Instance *c, double time) {
 Result set_states(Instance *c, const double *x) {
     const Model *m = c->model;
     for (int k = 0; k < m->n_x; k++)
-        if (!isfinite(x[k])) return refuse_value(c, m->state_names[k], "the value is not a finite number.");
+        if (!isfinite(x[k])) return fail(c, STATE_NOT_FINITE, k);
     memcpy(c->x, x, m->n_x * sizeof(double));
     c->state.z_valid = c->variables_valid = 0;
     return RESULT_OK;

@@ -30,7 +30,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
 """Path of the file in an FMU."""
-FORMAT = 7
+FORMAT = 8
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
 _ENTRY = struct.Struct("<4i")
@@ -73,7 +73,7 @@ SECTIONS: dict[str, Any] = {
     "resets": _RESET,
     "reset_nodes": _INTEGER,
     "updates": _RESET,
-    "modes": _record("first_name n_names"),
+    "modes": _record("first_name n_names hidden"),
     "mode_names": _INTEGER,
     "holds": _record("mode number loose motion state reaction approach moved name unused", "factor nominal"),
     "circuits": _record("first_member n_members first"),
@@ -248,7 +248,12 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
             (_place(model, r), k, 0, r.index if one.at_start else -1, r.factor)
             for k, (one, r) in enumerate((one, one.reset) for one in model.update_rows)
         ],
-        "modes": _counted(len(one.names) for one in model.flat_discretes),
+        "modes": [
+            (*place, int(one.hidden))
+            for place, one in zip(
+                _counted(len(one.names) for one in model.flat_discretes), model.flat_discretes, strict=True
+            )
+        ],
         "mode_names": names,
         "start_modes": [(mode, target) for mode, target, _ in model.start_modes],
     }

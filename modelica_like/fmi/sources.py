@@ -62,7 +62,7 @@ def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
 def own_sources(faces: Iterable[Face]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
     own = (name for face in faces for name in _FACES[face])
-    names = ("core.h", "model.h", "modelica_like.h", "operations.h", "model_data.c", *RUNTIME, *own)
+    names = ("codes.h", "core.h", "model.h", "modelica_like.h", "operations.h", "model_data.c", *RUNTIME, *own)
     return {name: (_ENGINE / name).read_text(encoding="utf-8") for name in names}
 
 

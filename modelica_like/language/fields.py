@@ -141,10 +141,15 @@ def in_range(number: float, given: object, label: str, unit: str, bounds: tuple[
         raise ValueOutOfRange(f"{label} must be a finite number, not {number:g}.")
     low, high = bounds
     if (low is not None and number < low) or (high is not None and number > high):
-        bound = f"at least {low:g}" if low is not None and number < low else f"at most {high:g}"
-        shown = "" if unit in ("1", "*") else f" {unit}"
-        raise ValueOutOfRange(f"{label} = {given} is out of range: it must be {bound}{shown}.")
+        bound = ("least", low) if low is not None and number < low else ("most", high)
+        raise out_of_range(given, label, unit, *bound)
     return number
+
+
+def out_of_range(given: object, label: str, unit: str, most: str, bound: float | None) -> ValueOutOfRange:
+    """Return the error of a value beyond the `least` or `most`; the others are those of `in_range`."""
+    shown = "" if unit in ("1", "*") else f" {unit}"
+    return ValueOutOfRange(f"{label} = {given} is out of range: it must be at {most} {bound:g}{shown}.")
 
 
 if TYPE_CHECKING:

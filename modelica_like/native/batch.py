@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import NotEnoughMemory
 from modelica_like.native.library import BatchArguments
 from modelica_like.native.model import NativeModel
 from modelica_like.options import Options
@@ -85,5 +86,5 @@ class Batch:
         stops = ctypes.pointer(ctypes.c_int(0) if stop is None else stop)
         arguments = BatchArguments(*self._span, options.rtol, options.atol, *counts, *places, stops)
         if self._native.library.batch(self._native.address, ctypes.byref(arguments)) < 0:
-            raise MemoryError(f"There is not enough memory for runs of {self._native.name}.")
+            raise NotEnoughMemory(f"There is not enough memory for runs of {self._native.name}.")
         return values, failed.astype(bool)

@@ -44,12 +44,22 @@ class BatchArguments(c.Structure):
     ]
 
 
+class Failure(c.Structure):
+    """`Failure` in core.h."""
+
+    _fields_ = [("code", c.c_int), ("place", _NUMBER), ("numbers", 2 * _NUMBER)]
+
+
+POINT = 5 * c.POINTER(_NUMBER)
+"""What `failure` points to: states and implicit unknowns, d, d before the last change, parameters, inputs."""
+
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "open": (_POINTER, [c.c_char_p, c.c_size_t, c.c_char_p]),
     "close": (None, [_POINTER]),
     "new": (_POINTER, [_POINTER]),
     "free": (None, [_POINTER]),
     "message": (c.c_char_p, [_POINTER]),
+    "failure": (c.POINTER(Failure), [_POINTER, POINT]),
     "reset": (_CODE, [_POINTER, *4 * [_NUMBER]]),
     "limit": (None, [_POINTER, _NUMBER]),
     "set": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),

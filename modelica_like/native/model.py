@@ -3,55 +3,24 @@
 from __future__ import annotations
 
 import ctypes
-import re
 import weakref
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.compile.sliding import as_asked
-from modelica_like.errors import (
-    Chattering,
-    ContradictingStart,
-    InitializationError,
-    LimitPassed,
-    ModelicaLikeError,
-    NoGradient,
-    NoValidModes,
-    SingularAtStart,
-    StepFailed,
-    UnknownName,
-    ValueOutOfRange,
-    did_you_mean,
-)
+from modelica_like.errors import ModelicaLikeError, NotEnoughMemory, UnknownName, did_you_mean
 from modelica_like.fmi.interface import FmuVariable, interface
 from modelica_like.fmi.model_file import model_file
 from modelica_like.fmi.tables import make_tables
-from modelica_like.native.library import MESSAGE_LENGTH, OK, library
+from modelica_like.native.codes import Code
+from modelica_like.native.failures import Failure, error_of
+from modelica_like.native.library import MESSAGE_LENGTH, OK, POINT, library
 from modelica_like.options import Options
 from modelica_like.solve.initialize import Point, StartKind
-
-_ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
-    ("The integrator gave up|The step from", StepFailed),
-    (r"Modes still switch|Discrete variables do not|Events follow each other|At \S+ s the condition of", Chattering),
-    (r"At t = \S+ s no combination", NoValidModes),
-    (r"At t = \S+ s .* contradicts the rest of the circuit", NoValidModes),
-    ("The Jacobian is singular|The derivative of .* is not finite", SingularAtStart),
-    (r"t = \S+ s: ", LimitPassed),
-    ("Two start values|A start value of", ContradictingStart),
-    ("There are no derivatives", NoGradient),
-    ("The equations for|No start|No steady|The modes at the start", InitializationError),
-)
-"""Error class of a message of the run-time; all others are wrong values."""
-
-
-def failure(message: str) -> ModelicaLikeError:
-    """Return a message of the run-time as the corresponding Python error, with message and advice."""
-    kind = next((kind for pattern, kind in _ERRORS if re.match(pattern, message)), ValueOutOfRange)
-    what, _, advice = message.partition(". ")
-    return kind(f"{what.removesuffix('.')}.", advice=advice)
+from modelica_like.solve.recorder import Event
 
 
 class NativeModel:
@@ -78,6 +47,7 @@ class NativeModel:
         if not self.address:
             raise ModelicaLikeError(message.value.decode())
         weakref.finalize(self, self.library.close, self.address)
+        self.start: StartKind = twin.settings.get("start", "given")
         self.variables = {one.name: one for one in face.variables}
         self.name, self.sizes = model.name, (len(model.states), len(model.implicit), model.discrete_size)
 
@@ -115,14 +85,33 @@ class Instance:
         self.library = self.native.library
         self.address = self.library.new(self.native.address)
         if not self.address:
-            raise MemoryError(f"There is not enough memory for an instance of {model.name}.")
+            raise NotEnoughMemory(f"There is not enough memory for an instance of {model.name}.")
         # The model must outlive it.
         weakref.finalize(self, _free, self.library, self.address, self.native)
 
-    def check(self, code: int) -> None:
-        """Raise the error of a failed call."""
+    def check(self, code: int, events: Sequence[Event] = (), options: Options | None = None) -> None:
+        """Raise the error of a failed call.
+
+        Args:
+            code: what the call has returned.
+            events: of the run, if they are known.
+            options: of the run.
+        """
         if code != OK:
-            raise failure(self.library.message(self.address).decode())
+            raise error_of(self._failure(events, options or Options()))
+
+    def _failure(self, events: Sequence[Event], options: Options) -> Failure:
+        places, model = POINT(), as_asked(self.model)
+        told, nx, nd = self.library.failure(self.address, places).contents, len(model.states), model.discrete_size
+        sizes = nx + len(model.implicit), nd, nd, len(model.p), len(model.u)
+        x, d, before, p, u = (np.array(place[:size], float) for place, size in zip(places, sizes, strict=True))
+        reference = told.place if told.place >= 0 else None
+        return Failure(
+            model.twin(p=p, u=u), self.native.start, Code(told.code), int(told.place),
+            next((name for name, one in self.native.variables.items() if one.reference == reference), ""),
+            tuple(told.numbers), Point(self.library.time(self.address), x[:nx], x[nx:], d), before,
+            self.library.message(self.address).decode(), events, options,
+        )  # fmt: skip
 
     def reset(self, t0: float, end: float, rtol: float, atol: float) -> None:
         """Start again at a time in s, with the model's parameters and inputs; `end` may be infinite."""

@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import Chattering
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.model import Instance
 from modelica_like.options import Options
 from modelica_like.solve.dense import Dense
+from modelica_like.solve.endless import chattering
 from modelica_like.solve.events import Progress
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.initialize import Impact, Point
-from modelica_like.solve.instants import chattering, note_rest, note_sharing
-from modelica_like.solve.penetration import LET_IT_REST
+from modelica_like.solve.instants import note_rest, note_sharing
 from modelica_like.solve.recorder import Recorder, Segment
 
 _PARTS = 100
@@ -102,26 +101,16 @@ class NativeLoop:
         finally:
             self._read()
         if self._crowded:
-            raise self._chattering(f"There were more than {self.options.max_events} events")
+            why = f"There were more than {self.options.max_events} events"
+            raise chattering(self.model, self.record.events, why, self.options.on_chattering)
         if self._stuck:
             point = self.record.segments[-1].point(-1)
             what = f"The run-time gave up at about t = {point.t:.6g} s: it took more than {self.options.max_steps:,}"
             what += f" steps (max_steps) for {self._part:.3g} s."
             raise Integrator(self.model, self.options).failure(what, point)
-        try:
-            self._instance.check(code)
-        except Chattering as error:
-            if not self.record.events:
-                raise
-            if "stays true" in error.what:
-                source = next(one.source for one in self.record.events[::-1] if f" {one.mode} stays" in error.what)
-                raise Chattering(error.what, where=[source], advice=LET_IT_REST) from None
-            raise self._chattering(error.what.partition(" at t = ")[0]) from None
+        self._instance.check(code, self.record.events, self.options)
         note_rest(self.record, self.options, self._span)
         return self.record
-
-    def _chattering(self, why: str) -> Chattering:
-        return chattering(self.model, self.record.events, why, self.options.on_chattering)
 
     @property
     def _crowded(self) -> bool:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections import deque
-from collections.abc import Sequence
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.errors import Chattering, LimitPassed
 from modelica_like.language.transition import NAME_IN_NOTICE
-from modelica_like.options import OnChattering, Options
+from modelica_like.options import Options
+from modelica_like.solve.endless import SWITCHING, chattering, not_settled
 from modelica_like.solve.guards import Guards
 from modelica_like.solve.initialize import (
     Point,
@@ -28,9 +28,8 @@ from modelica_like.solve.initialize import (
     variable_slopes,
 )
 from modelica_like.solve.penetration import check_turned_back
-from modelica_like.solve.recorder import IMPACT, Event, Recorder
+from modelica_like.solve.recorder import IMPACT, Recorder
 
-_CHATTER_EVENTS = 50
 _CHATTER_INSTANTS = 25
 _TOGETHER = 6
 """Rounds at one instant in which all transitions fire together."""
@@ -39,22 +38,6 @@ _ALONE = 6
 _CHATTER_WINDOW = 1e-6
 _CONVERGES = 0.9
 """Length of a crowd of instants over the one before: rebounds come to their end, chattering does not."""
-_HINT = "Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it."
-_STICK = (
-    "If this is friction, take a class that can stick, such as BearingFriction, Brake, Clutch or SupportFriction; "
-    "otherwise give the switching a hysteresis, or smooth what drives it."
-)
-_GO_ON = (
-    ' Or go on: on_chattering = "slide" along the border of two modes, "rest" in contact after ever faster impacts.'
-)
-_CANNOT = {
-    "stop": "",
-    "slide": (
-        " It cannot slide: that takes two values of a mode that change into each other under opposite conditions, "
-        "without resets, and that decide how what is compared changes."
-    ),
-    "rest": " Nothing comes to rest: that takes impacts of a mode that holds a motion, with a restitution.",
-}
 _GIVEN_BACK = 1e-3
 """Current, over the largest one, that is none where modes return: it ends within the time resolution."""
 SAME_TIME = 1e-12
@@ -204,7 +187,7 @@ class Instants:
         for transition in chosen.values():
             self._note(now, transition.mode, transition.target, self._number(transition))
             if transition.fails:
-                raise self._passed(now, transition.notice)
+                raise limit_passed(self.model, now, transition)
             d[transition.mode] = transition.target
             for reset in transition.resets:
                 if reset.kind == "state":
@@ -217,22 +200,6 @@ class Instants:
         now.x, now.d = x, d
         if targets:
             self._project(now, targets)
-
-    def _passed(self, now: Point, notice: str) -> LimitPassed:
-        owner, dot, _ = self.record.events[-1].mode.rpartition(".")
-        told = NAME_IN_NOTICE.sub(lambda name: self._told(now, owner + dot + name[1]), notice)
-        return LimitPassed(f"At {now.t:.9g} s {owner or self.model.name} {told}.")
-
-    def _told(self, now: Point, path: str) -> str:
-        """Return a parameter, variable or discrete value as a number."""
-        model = self.model
-        if path in model.position:
-            return f"{call(model, model.variables, now)[model.position[path]]:g}"
-        if path in model.discrete_position:
-            return f"{now.d[model.discrete_position[path]]:g}"
-        if path in model.derived_position:
-            return f"{float(model.derived(model.p)[model.derived_position[path]]):g}"
-        return f"{model.p[model.parameter_position[path]]:g}"
 
     def _solve(self, now: Point) -> None:
         share(self.model, now)
@@ -266,18 +233,8 @@ class Instants:
 
     def _endless(self, now: Point, rounds: int, *, changes: bool) -> Chattering:
         """Return the error of an instant whose iteration does not end."""
-        values = call(self.model, self.model.updates, now) if changes else ()
-        rows = [row for row, value in zip(self.model.update_rows, values, strict=False)
-                if row.reset.kind == "discrete" and value != now.d[row.reset.index]]  # fmt: skip
-        if not rows:  # what changes follows the modes
-            return self._chattering(f"Modes still switch after {rounds} rounds at one instant")
-        names = ", ".join(self.model.flat_discretes[row.reset.index].path for row in rows)
-        change = "changes" if len(rows) == 1 else "change"
-        return Chattering(
-            f"Discrete variables do not settle at t = {now.t:.9g} s: {names} still {change} after {rounds} rounds.",
-            where=[row.source for row in rows if row.source.file][:3],
-            advice="An equation like n == pre(n) + 1 never equals its pre(…): count in a `when`.",
-        )
+        found = not_settled(self.model, now, rounds) if changes else None
+        return found or self._chattering(SWITCHING.format(rounds))
 
     def _stop_motions(self, now: Point, before: Vector) -> None:
         """Stop newly held motions; friction that breaks away in the impact takes the mode of a start."""
@@ -351,25 +308,22 @@ class Instants:
         return chattering(self.model, self.record.events, why, self.options.on_chattering)
 
 
-def chattering(model: CompiledDae, events: Sequence[Event], why: str, asked: OnChattering) -> Chattering:
-    """Return the error of a run whose last events switch without end, whatever was `asked` to prevent that."""
-    counts: dict[str, list[Event]] = {}
-    for event in events[-_CHATTER_EVENTS:]:
-        counts.setdefault(event.mode, []).append(event)
-    mode, those = max(counts.items(), key=lambda item: len(item[1]))
-    names = " ⇄ ".join(dict.fromkeys(name for event in those for name in (event.before, event.after)))
-    first, last = f"{those[0].time:.9g}", f"{those[-1].time:.9g}"
-    when = f"at t = {last} s" if first == last else f"in t = {first}…{last} s"
-    owner, _, own = mode.rpartition(".")
-    hint = _STICK if own.startswith("relation[") else _HINT
-    if hysteresis := model.flat_discretes[model.discrete_position[mode]].hysteresis:
-        hint = f"{owner or model.name}: set {hysteresis}, or smooth what drives it."
-    return Chattering(
-        f"{mode} switched {len(those)} times {when} ({names}).",
-        where=list(dict.fromkeys(event.source for event in those))[:3],
-        why=f"{why}.{_CANNOT[asked]}",
-        advice=hint + (_GO_ON if asked == "stop" else ""),
-    )  # fmt: skip
+def limit_passed(model: CompiledDae, now: Point, transition: CompiledTransition) -> LimitPassed:
+    """Return the error of a transition that ends the run; its notice tells values of the present point."""
+    owner, dot, _ = model.flat_discretes[transition.mode].path.rpartition(".")
+    told = NAME_IN_NOTICE.sub(lambda name: _told(model, now, owner + dot + name[1]), transition.notice)
+    return LimitPassed(f"At {now.t:.9g} s {owner or model.name} {told}.")
+
+
+def _told(model: CompiledDae, now: Point, path: str) -> str:
+    """Return a parameter, variable or discrete value as a number."""
+    if path in model.position:
+        return f"{call(model, model.variables, now)[model.position[path]]:g}"
+    if path in model.discrete_position:
+        return f"{now.d[model.discrete_position[path]]:g}"
+    if path in model.derived_position:
+        return f"{float(model.derived(model.p)[model.derived_position[path]]):g}"
+    return f"{model.p[model.parameter_position[path]]:g}"
 
 
 def note_rest(record: Recorder, options: Options, span: float) -> None:

@@ -11,7 +11,7 @@ from modelica_like.solve.initialize import Point, call
 
 _LATER = 1e3
 """Time for the difference of a rate, in time resolutions; what turns round in less time is at rest."""
-LET_IT_REST = (
+_LET_IT_REST = (
     "Let it rest: a mode that holds the motion, with a restitution (docs/language.md, what a mode holds), or a "
     "smallest speed below which `when` sets zero and a mode keeps it."
 )
@@ -51,9 +51,14 @@ def check_turned_back(model: CompiledDae, fired: Sequence[CompiledTransition], b
         acceleration, value = (r1 - r) / step, float(values[one.index])
         slow = max(abs(r0), abs(r)) < acceleration * step
         if slow and (r > -acceleration * step / _LATER or value > r * r / (2 * acceleration)):
-            raise Chattering(
-                f"At {now.t:.9g} s the condition of {model.flat_discretes[one.mode].path} stays true: what is set "
-                "there is at rest, and would pass without another event.",
-                where=[one.source],
-                advice=LET_IT_REST,
-            )
+            raise stays_true(model, now, one)
+
+
+def stays_true(model: CompiledDae, now: Point, transition: CompiledTransition) -> Chattering:
+    """Return the error of a relation that stays true."""
+    return Chattering(
+        f"At {now.t:.9g} s the condition of {model.flat_discretes[transition.mode].path} stays true: what is set there "
+        "is at rest, and would pass without another event.",
+        where=[transition.source],
+        advice=_LET_IT_REST,
+    )

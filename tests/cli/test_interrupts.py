@@ -208,7 +208,7 @@ def test_an_interrupted_cosimulation_ends_its_process(tmp_path: Path) -> None:
     system = split(DRIVE, "shaft", tmp_path, names=("motor", "wheel"), check=False).path
     with pytest.raises(KeyboardInterrupt) as told:
         cosim(system, "1000 s", step="0.1 ms", progress=press)
-    kept, whole = vars(told.value)["run"], cosim(system, "0.01 s", step="0.1 ms")
+    kept, whole = told.value.run, cosim(system, "0.01 s", step="0.1 ms")
     assert 0.01 < kept.time[-1] < 1000
     assert kept.time[-1] == pytest.approx(1e-4 * kept.steps)
     assert len(kept.time) == kept.steps + 1

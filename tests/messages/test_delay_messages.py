@@ -15,6 +15,7 @@ from modelica_like.errors import (
     LanguageError,
     ModelicaLikeError,
     NoGradient,
+    StepFailed,
     StructureError,
     UnitMismatch,
     ValueOutOfRange,
@@ -127,7 +128,7 @@ REFUSED: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = 
         "The time of delay[1] is -0.1 s: it must be positive.",
     ),
     "long": (
-        ValueOutOfRange,
+        StepFailed,
         lambda: simulate(Swinging(), 3.0, solver="native"),
         "Delays reach back over more than 8192 points of the past.\nShorten them, or simulate with IDAS.",
     ),

@@ -1,6 +1,7 @@
 """Ideal elements: combinations of modes that are impossible, and wrong declarations."""
 
 import pytest
+from components.electrical.analog.analog import SignalVoltage, TwoPins
 
 from components import (
     Capacitor,
@@ -14,7 +15,6 @@ from components import (
     Ramp,
     Resistor,
 )
-from components.electrical.analog import SignalVoltage, TwoPins
 from modelica_like import Assembly, simulate
 from modelica_like.errors import LanguageError, NoValidModes
 from modelica_like.flatten import flatten
@@ -98,9 +98,9 @@ def test_message(check_message, name):
     check_message(*CASES[name])
 
 
-def test_the_compiled_runtime_tells_the_same():
-    with pytest.raises(NoValidModes, match=r"At t = 0.001 s no combination of modes is valid: S would take 4.768"):
-        simulate(switched(0.0, Inductor(L=1e-3, i=0.0)), 0.01, solver="native")
+def test_the_compiled_runtime_tells_the_same(check_message):
+    _, _, text = CASES["a switch interrupts the current of an inductor"]
+    check_message(NoValidModes, lambda: simulate(switched(0.0, Inductor(L=1e-3, i=0.0)), 0.01, solver="native"), text)
 
 
 @pytest.mark.parametrize(

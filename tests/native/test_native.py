@@ -12,10 +12,8 @@ from components import Mass, MassWithStopAndFriction, TranslationalSpring
 from modelica_like import build, sensitivities, simulate
 from modelica_like.errors import (
     Chattering,
-    ContradictingStart,
     ExportError,
     ModelicaLikeError,
-    SingularAtStart,
     StepFailed,
     UnknownName,
     ValueOutOfRange,
@@ -218,15 +216,6 @@ def test_a_run_that_idas_gives_up_is_done_by_the_run_time(monkeypatch):
     assert caught.value.run.time[-1] > 1.0
 
 
-def test_messages_become_the_same_errors():
-    assert isinstance(
-        model.failure("The Jacobian is singular at t = 0 s in the equations for a. Do b."), SingularAtStart
-    )
-    error = model.failure("Two start values of x contradict each other: 1 and 2.")
-    assert isinstance(error, ContradictingStart)
-    assert error.what == "Two start values of x contradict each other: 1 and 2."
-
-
 def test_an_unknown_solver():
     with pytest.raises(UnknownName, match=r"There is no solver 'nativ'; did you mean 'native'\?"):
         simulate(STARTUP, solver="nativ")
@@ -241,7 +230,7 @@ def test_an_interrupt_keeps_what_was_done(monkeypatch):
 
     with pytest.raises(KeyboardInterrupt) as caught:
         simulate(STARTUP, solver="native", progress=stop)
-    run = vars(caught.value)["run"]
+    run = caught.value.run
     assert 0.3 < run.time[-1] < 0.6
     assert run.events[0].time < 0.3
 

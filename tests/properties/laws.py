@@ -234,9 +234,10 @@ def random_case(number: int, held: bool = True, tables: bool = True) -> tuple[di
 
 
 def clear(number: int, held: bool = True, tables: bool = True) -> tuple[Component, dict[str, float]] | None:
-    """Return a component and its end, or None where it has no clear one: it chatters, or hangs on its sixth digit or on a step.
+    """Return a component and its end, or None where it has no clear one: it chatters, or hangs on its sixth digit.
 
-    A law whose rate vanishes behind its jump rests there; small steps pass it, and leave it by how far they came.
+    Or on a step: a law whose rate vanishes behind its jump rests there; small steps pass it, and leave it by how far
+    they came.
     """
     laws, start = random_case(number, held, tables)
     near = {name: one + 1e-6 for name, one in start.items()}

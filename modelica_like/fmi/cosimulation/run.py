@@ -17,6 +17,7 @@ from modelica_like.errors import (
     FmuFailed,
     FmuRefused,
     FmuTimeout,
+    Interrupted,
     ModelicaLikeError,
     SolveError,
     StepFailed,
@@ -72,7 +73,7 @@ def cosim(
         NetlistError, UnknownName, ValueOutOfRange: the system or a value is wrong.
         FmuRefused: an FMU cannot be run this way.
         FmuFailed: an FMU reported an error; FmuCrashed: it crashed the process; FmuTimeout: the run did not finish.
-        KeyboardInterrupt: the run was interrupted. `run` of this and of a `SolveError` is the solution up to then.
+        Interrupted: the run was interrupted. `run` of this and of a `SolveError` is the solution up to then.
         OSError: a file cannot be read.
     """
     if not isinstance(system, System):
@@ -97,9 +98,11 @@ def _solution(system: System, job: dict[str, Any], timeout: float, progress: Pro
     with workplace(job, [unit.file for unit in system.units]) as folder:
         try:
             _run(system, folder, timeout, progress)
-        except (SolveError, KeyboardInterrupt) as error:
-            vars(error)["run"] = _so_far(system, folder, begin)
+        except SolveError as error:
+            error.run = _so_far(system, folder, begin)
             raise
+        except KeyboardInterrupt as interrupt:
+            raise Interrupted.after(_so_far(system, folder, begin)) from interrupt
         return CosimSolution(system, *_left(folder, "meta.json"), clock.perf_counter() - begin)
 
 

@@ -8,8 +8,12 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import InitializationError, UnknownName, did_you_mean
-from modelica_like.solve.initialize.equilibrium import MODE_ROUNDS, found, steady_start, unsettled
+from modelica_like.solve.initialize.contradictions import not_found as not_found
+from modelica_like.solve.initialize.contradictions import not_met as not_met
+from modelica_like.solve.initialize.contradictions import same_motion as same_motion
+from modelica_like.solve.initialize.equilibrium import MODE_ROUNDS, found, steady_start
 from modelica_like.solve.initialize.equilibrium import settled_guess as settled_guess
+from modelica_like.solve.initialize.equilibrium import unsettled as unsettled
 from modelica_like.solve.initialize.holds import INSTANT as INSTANT
 from modelica_like.solve.initialize.holds import Impact as Impact
 from modelica_like.solve.initialize.holds import Strike as Strike
@@ -19,7 +23,9 @@ from modelica_like.solve.initialize.holds import share as share
 from modelica_like.solve.initialize.holds import sharing as sharing
 from modelica_like.solve.initialize.homotopy import HOMOTOPY as HOMOTOPY
 from modelica_like.solve.initialize.homotopy import lead
+from modelica_like.solve.initialize.ideal import contradiction as contradiction
 from modelica_like.solve.initialize.ideal import meet as meet
+from modelica_like.solve.initialize.ideal import no_valid_modes as no_valid_modes
 from modelica_like.solve.initialize.ideal import refuse_contradiction as refuse_contradiction
 from modelica_like.solve.initialize.modes import chosen_modes as chosen_modes
 from modelica_like.solve.initialize.modes import complete, started
@@ -32,9 +38,15 @@ from modelica_like.solve.initialize.point import check_singular as check_singula
 from modelica_like.solve.initialize.point import implicit_at as implicit_at
 from modelica_like.solve.initialize.point import is_linear as is_linear
 from modelica_like.solve.initialize.point import newton_at as newton_at
+from modelica_like.solve.initialize.point import not_solved as not_solved
+from modelica_like.solve.initialize.point import rate_not_finite as rate_not_finite
 from modelica_like.solve.initialize.point import solve_implicit as solve_implicit
+from modelica_like.solve.initialize.singular import implicit_singular as implicit_singular
+from modelica_like.solve.initialize.singular import singular_block as singular_block
 from modelica_like.solve.initialize.slopes import variable_slopes as variable_slopes
 from modelica_like.solve.initialize.start import StartProblem
+from modelica_like.solve.initialize.steady import mode_not_steady as mode_not_steady
+from modelica_like.solve.initialize.steady import not_steady as not_steady
 
 
 def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") -> Point:

@@ -147,7 +147,7 @@ def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool
             rows[k, 1] = 0.0
             nodes.append(node)
         elif keep is None:
-            raise _no_valid(model, point, network, rows[k], float(values[node]), node)
+            raise no_valid_modes(model, point, k)
     point.d[network.entries] = rows.ravel()
     slopes = variable_slopes(model, point, nodes)
     point.x = point.x - np.linalg.lstsq(slopes, values[nodes], rcond=None)[0]
@@ -176,21 +176,36 @@ def refuse_contradiction(model: CompiledDae, point: Point) -> None:
         element = network.elements[k]
         node = _zero(element, point.d)
         if abs(values[node]) > _LOST * largest(model, np.abs(values), node):
-            mode = model.flat_discretes[element.mode].names[int(point.d[element.mode])]
-            unit = str(model.flat_variables[node].unit)
-            current = unit == "A"
-            raise NoValidModes(
-                f"At t = {point.t:.9g} s {element.component} contradicts the rest of the circuit: it is ideal and "
-                f"{mode}, so its {'current' if current else 'voltage'} is zero, but the rest makes it "
-                f"{values[node]:.4g} {unit}.",
-                advice=f"Put a resistance in {'parallel' if current else 'series'} with "
-                f"{element.component}, or take an element that is not ideal (Diode, Switch).",
-            )
+            raise contradiction(model, point, int(k))
 
 
-def _no_valid(
-    model: CompiledDae, point: Point, network: IdealNetwork, row: Vector, value: float, node: int
-) -> NoValidModes:
+def contradiction(model: CompiledDae, point: Point, number: int) -> NoValidModes:
+    """Return the error of an ideal element, given by its number, whose mode the rest of the circuit contradicts."""
+    element, node, value = _wrong(model, point, number)
+    mode = model.flat_discretes[element.mode].names[int(point.d[element.mode])]
+    unit = str(model.flat_variables[node].unit)
+    current = unit == "A"
+    return NoValidModes(
+        f"At t = {point.t:.9g} s {element.component} contradicts the rest of the circuit: it is ideal and {mode}, so "
+        f"its {'current' if current else 'voltage'} is zero, but the rest makes it {value:.4g} {unit}.",
+        advice=f"Put a resistance in {'parallel' if current else 'series'} with {element.component}, or take an "
+        "element that is not ideal (Diode, Switch).",
+    )
+
+
+def _wrong(model: CompiledDae, point: Point, number: int) -> tuple[IdealElement, int, float]:
+    """An element, and the node and value of what its mode makes zero."""
+    assert model.ideal is not None
+    element = model.ideal.elements[number]
+    node = _zero(element, point.d)
+    return element, node, float(call(model, model.variables, point)[node])
+
+
+def no_valid_modes(model: CompiledDae, point: Point, number: int) -> NoValidModes:
+    """Return the error of an ideal element, given by its number, whose impulse no mode ends."""
+    assert model.ideal is not None
+    network, (_, node, value) = model.ideal, _wrong(model, point, number)
+    row = point.d[network.entries].reshape(len(network.elements), network.width)[number]
     parts = [one for one in network.elements if row[HEAD + one.row]]
     modes = [f"{one.component} {model.flat_discretes[one.mode].names[int(point.d[one.mode])]}" for one in parts]
     unit = model.flat_variables[node].unit

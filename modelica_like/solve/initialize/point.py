@@ -83,10 +83,15 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
         if change < 1e-13 or farthest <= _ROUNDING * np.abs(new).max():
             return
     if not change <= 1e-9:
-        raise InitializationError(
-            f"The equations for {', '.join(model.implicit)} were not solved at t = {point.t:.9g} s.",
-            advice="Give guesses near the solution.",
-        )
+        raise not_solved(model, point)
+
+
+def not_solved(model: CompiledDae, point: Point) -> InitializationError:
+    """Return the error of implicit equations for which Newton's method does not converge."""
+    return InitializationError(
+        f"The equations for {', '.join(model.implicit)} were not solved at t = {point.t:.9g} s.",
+        advice="Give guesses near the solution.",
+    )
 
 
 def implicit_at(model: CompiledDae) -> ca.Function:
@@ -145,8 +150,13 @@ def check_singular(model: CompiledDae, point: Point) -> None:
     if not regular.all():
         raise singular_block(model, point, int(np.argmin(regular)))
     finite = np.isfinite(call(model, model.ode, point))
-    raise SingularAtStart(
-        f"The derivative of {model.states[int(np.argmin(finite))]} is not finite at t = {point.t:.9g} s.",
+    raise rate_not_finite(model, point, int(np.argmin(finite)))
+
+
+def rate_not_finite(model: CompiledDae, point: Point, state: int) -> SingularAtStart:
+    """Return the error of a state, given by its position, without a finite derivative."""
+    return SingularAtStart(
+        f"The derivative of {model.states[state]} is not finite at t = {point.t:.9g} s.",
         advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
     )
 

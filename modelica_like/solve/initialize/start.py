@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.compiled import CompiledDae, StartEntry, Vector
-from modelica_like.errors import ContradictingStart, InitializationError
-from modelica_like.flatten.model import INITIAL_EQUATION
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import InitializationError
+from modelica_like.solve.initialize.contradictions import not_met, not_together, same_motion
 from modelica_like.solve.initialize.plan import StartKind, StartPlan, direct_starts, is_near, start_name, start_plan
 from modelica_like.solve.initialize.point import Point, call, check_singular, solve_implicit
 
@@ -78,22 +78,11 @@ class StartProblem:
         for pair in self._sorted.again:
             self._compare(*pair)
 
-    def _told(self, number: int) -> str:
-        return self._valued(self.model.starts[number], self.given[number])
-
-    def _valued(self, entry: StartEntry, value: float) -> str:
-        """Tell a start value, or the initial equation that asks for it."""
-        told = self.model.flat_variables[entry.node].description
-        return told if told.startswith(INITIAL_EQUATION) else f"{start_name(self.model, entry)} = {value:g}"
-
     def _compare(self, number: int, earlier: int) -> None:
         """Compare a start value with the earlier one of the same motion."""
         value, other = (self.given[k] / self._sorted.factors[k] for k in (number, earlier))
         if abs(value - other) > _CONSISTENT * (1.0 + abs(other)):
-            raise ContradictingStart(
-                f"{self._told(earlier)} and {self._told(number)} contradict each other: they are the same motion.",
-                advice="Remove one of the two start values.",
-            )
+            raise same_motion(self.model, (earlier, self.given[earlier]), (number, self.given[number]))
 
     def fix(self, point: Point) -> None:
         """Give states their own start values."""
@@ -150,39 +139,12 @@ class StartProblem:
         # If the equations are singular, that is the reason.
         solve_implicit(self.model, point)
         check_singular(self.model, point)
-        given = [start_name(self.model, self.model.starts[k]) for k in plan.rows]
-        resting = [self.model.flat_variables[k].path for k in plan.resting if k < len(self.model.flat_variables)]
-        have = f"{', '.join(given[:6])} {'have' if len(given) > 1 else 'has'} the requested value" if given else ""
-        rest = f"{', '.join(resting[:6])} {'are' if len(resting) > 1 else 'is'} at rest" if resting else ""
-        return InitializationError(
-            f"No start was found at which {' and '.join(filter(None, (have, rest))) or 'the equations are met'}.",
-            advice="Give guesses near the solution, or start values of states.",
-        )
+        return not_together(self.model, plan)
 
     def _check_dependent(self, point: Point, number: int) -> None:
-        starts, present = self.model.starts, call(self.model, self.model.variables, point)
-        entry, value = starts[number], self.given[number]
-        actual = present[entry.node]
-        if abs(actual - value) <= _CONSISTENT * (1.0 + abs(value)):
-            return
-        fixed = [e for e in starts if e.strength == "fixed" and e is not entry and self._coupled(entry, e)]
-        partners = [self._valued(e, present[e.node]) for e in fixed[:2]]
-        wrong = "contradict each other" if partners else "cannot be met"
-        of_equation = self._told(number).startswith(INITIAL_EQUATION)
-        sides = f"left minus right{' of the last one' * bool(partners)}"
-        name = sides if of_equation else start_name(self.model, entry)
-        raise ContradictingStart(
-            f"{' and '.join([*partners, self._told(number)])} {wrong}: {name} would be {actual:g}.",
-            where=[o.source for o in self.model.differentiated if o.source.file][:3],
-            advice="Remove one of the start values, or make one a guess.",
-        )
-
-    def _coupled(self, first: StartEntry, second: StartEntry) -> bool:
-        """Return whether two variables depend on a common state."""
-        by_variable = self.model.variables.jac_sparsity(0, 1).T
-        starts, states = by_variable.colind(), by_variable.row()
-        columns = [set(states[starts[e.node] : starts[e.node + 1]]) for e in (first, second)]
-        return bool(columns[0] & columns[1])
+        value, node = self.given[number], self.model.starts[number].node
+        if not abs(call(self.model, self.model.variables, point)[node] - value) <= _CONSISTENT * (1.0 + abs(value)):
+            raise not_met(self.model, point, number, value)
 
 
 class _Evaluation:

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.errors import InitializationError
 from modelica_like.solve.initialize.kept import RANK, Matrix, find_kept, solve_kept
 from modelica_like.solve.initialize.point import Point, call
@@ -46,14 +46,24 @@ def solve_steady(model: CompiledDae, point: Point) -> None:
         point.z += step[len(moving) :]
         if np.abs(step).max(initial=0.0) <= 1e-13:
             break
+    if error := not_steady(model, point):
+        raise error
+
+
+def not_steady(model: CompiledDae, point: Point) -> InitializationError | None:
+    """Return the error of a state that is not steady, or None if all are."""
+    moving = moving_states(model)
+    if not moving and not model.implicit:
+        return None
     residual, _ = rates_and_slopes(model, point)
-    if not np.abs(residual).max(initial=0.0) <= _STEADY:
-        worst = int(np.argmax(np.abs(residual)))
-        name = model.states[moving[worst]] if worst < len(moving) else model.implicit[worst - len(moving)]
-        raise InitializationError(
-            f"No steady state was found at t = {point.t:g} s: {name} keeps changing.",
-            advice=f"Check that the drive has an equilibrium. {_NEAR}",
-        )
+    if np.abs(residual).max(initial=0.0) <= _STEADY:
+        return None
+    worst = int(np.argmax(np.abs(residual)))
+    name = model.states[moving[worst]] if worst < len(moving) else model.implicit[worst - len(moving)]
+    return InitializationError(
+        f"No steady state was found at t = {point.t:g} s: {name} keeps changing.",
+        advice=f"Check that the drive has an equilibrium. {_NEAR}",
+    )
 
 
 def _step(model: CompiledDae, point: Point, moving: list[int], right: Vector, jacobian: Matrix) -> Any:
@@ -122,13 +132,20 @@ def check_modes_hold(model: CompiledDae, point: Point) -> None:
     """
     guards = call(model, model.guards, point)
     for one in model.transitions:
-        mode, present = model.flat_discretes[one.mode], int(point.d[one.mode])
+        present = int(point.d[one.mode])
         if not one.timed and present in one.sources and one.target != present and guards[one.index] > 0:
-            raise InitializationError(
-                f"No steady state was found at t = {point.t:g} s: {mode.path} does not stay {mode.names[present]}.",
-                where=one.source,
-                advice=_NEAR,
-            )
+            raise mode_not_steady(model, point, one)
+
+
+def mode_not_steady(model: CompiledDae, point: Point, transition: CompiledTransition) -> InitializationError:
+    """Return the error of a mode that a transition would leave at once."""
+    mode = model.flat_discretes[transition.mode]
+    return InitializationError(
+        f"No steady state was found at t = {point.t:g} s: {mode.path} does not stay "
+        f"{mode.names[int(point.d[transition.mode])]}.",
+        where=transition.source,
+        advice=_NEAR,
+    )
 
 
 def steady_change(model: CompiledDae, point: Point, theta: Vector, guess: Vector | None = None) -> Vector:

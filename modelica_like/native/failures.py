@@ -1,0 +1,177 @@
+"""Errors of the run-time in C, written from its codes as the errors of the same name in Python are written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
+from modelica_like.errors import Chattering, InitializationError, ModelicaLikeError, NoGradient, SolveError
+from modelica_like.language.fields import out_of_range
+from modelica_like.native.codes import WORDED, Code
+from modelica_like.options import Options
+from modelica_like.solve.endless import SWITCHING, chattering, not_settled
+from modelica_like.solve.idas import Integrator
+from modelica_like.solve.initialize import (
+    Point,
+    StartKind,
+    contradiction,
+    implicit_singular,
+    mode_not_steady,
+    no_valid_modes,
+    not_found,
+    not_met,
+    not_solved,
+    not_steady,
+    rate_not_finite,
+    same_motion,
+    singular_block,
+    unsettled,
+)
+from modelica_like.solve.instants import limit_passed
+from modelica_like.solve.penetration import stays_true
+from modelica_like.solve.recorder import Event
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What has failed, and where.
+
+    Attributes:
+        model: with the present parameters and inputs.
+        start: kind of start of the run.
+        code: what.
+        place: number of the transition, state, …, by the letter in the sentence of codes.h; -1: none.
+        name: of the variable, if the place is its value reference.
+        numbers: of the sentence.
+        point: where the run stands.
+        before: d before the last change.
+        sentence: as C tells it.
+        events: of the run so far.
+        options: of the run.
+    """
+
+    model: CompiledDae
+    start: StartKind
+    code: Code
+    place: int
+    name: str
+    numbers: tuple[float, float]
+    point: Point
+    before: Vector
+    sentence: str
+    events: Sequence[Event]
+    options: Options
+
+    @property
+    def transition(self) -> CompiledTransition:
+        """The one at `place`."""
+        return self.model.transitions[self.place]
+
+    @property
+    def what(self) -> str:
+        """The sentence without its advice."""
+        return f"{self.sentence.partition('. ')[0].removesuffix('.')}."
+
+
+def error_of(failure: Failure) -> ModelicaLikeError:
+    """Return the error to be raised."""
+    if failure.code in WRITTEN:
+        return WRITTEN[failure.code](failure)
+    return WORDED[failure.code](failure.what, advice=failure.sentence.partition(". ")[2])
+
+
+def _starts_contradict(one: Failure) -> ModelicaLikeError:
+    starts = one.model.starts
+    position, factor = starts[one.place].state or (0, 1.0)
+    others = ((k, entry.state) for k, entry in enumerate(starts) if entry.strength == "fixed" and entry.state)
+    earlier, of_earlier = next((k, state[1]) for k, state in others if state[0] == position)
+    values = one.numbers[0] * of_earlier, one.numbers[1] * factor
+    return same_motion(one.model, (earlier, values[0]), (one.place, values[1]))
+
+
+def _start_not_met(one: Failure) -> ModelicaLikeError:
+    return not_met(one.model, one.point, one.place, one.numbers[0])
+
+
+def _start_not_found(one: Failure) -> ModelicaLikeError:
+    try:
+        return not_found(one.model, one.start, one.point)
+    except (SolveError, InitializationError) as error:  # singular equations are the reason
+        return error
+
+
+def _not_steady(one: Failure) -> ModelicaLikeError:
+    found = not_steady(one.model, one.point)
+    if found is not None:
+        return found
+    if (one.before != one.point.d).any():
+        return unsettled(one.model, one.before, one.point.d)
+    return InitializationError(one.what, advice="Check that the drive has an equilibrium near its guesses.")
+
+
+def _step_too_small(one: Failure) -> ModelicaLikeError:
+    return Integrator(one.model, one.options).failure(one.what, one.point)
+
+
+def _ever_faster(one: Failure) -> ModelicaLikeError:
+    return _endless(one, "Events follow each other ever faster")
+
+
+def _still_switching(one: Failure) -> ModelicaLikeError:
+    return _endless(one, SWITCHING.format(int(one.numbers[0])))
+
+
+def _endless(one: Failure, why: str) -> Chattering:
+    if one.events:
+        return chattering(one.model, one.events, why, one.options.on_chattering)
+    where = [one.transition.source] if one.place >= 0 else ()
+    return Chattering(one.what, where=where, advice=one.sentence.partition(". ")[2])
+
+
+def _not_settled(one: Failure) -> ModelicaLikeError:
+    rounds = int(one.numbers[1])
+    return not_settled(one.model, one.point, rounds) or _endless(one, SWITCHING.format(rounds))
+
+
+def _out_of_range(one: Failure) -> ModelicaLikeError:
+    parameter = one.model.flat_parameters[one.model.parameter_position[one.name]]
+    most = "least" if one.code is Code.BELOW_LEAST else "most"
+    return out_of_range(f"{one.numbers[0]:g}", one.name, str(parameter.unit), most, one.numbers[1])
+
+
+def _no_real(one: Failure) -> ModelicaLikeError:
+    what = "an array" if one.code is Code.OF_ARRAY else "no real number"
+    return NoGradient(f"{one.name} is {what}: it has no derivatives.")
+
+
+def _not_asked(_: Failure) -> ModelicaLikeError:
+    return NoGradient("No derivatives were asked for.", advice='Name parameters, inputs or start values: by=["J.J"].')
+
+
+WRITTEN: dict[Code, Callable[[Failure], ModelicaLikeError]] = {
+    Code.STARTS_CONTRADICT: _starts_contradict,
+    Code.START_NOT_MET: _start_not_met,
+    Code.START_NOT_FOUND: _start_not_found,
+    Code.START_NOT_SETTLED: lambda one: unsettled(one.model, one.before, one.point.d),
+    Code.NOT_STEADY: _not_steady,
+    Code.MODE_NOT_STEADY: lambda one: mode_not_steady(one.model, one.point, one.transition),
+    Code.UNKNOWN_SINGULAR: lambda one: implicit_singular(one.model, one.point),
+    Code.BLOCK_SINGULAR: lambda one: singular_block(one.model, one.point, one.place),
+    Code.IMPLICIT_SINGULAR: lambda one: implicit_singular(one.model, one.point),
+    Code.NOT_SOLVED: lambda one: not_solved(one.model, one.point),
+    Code.RATE_NOT_FINITE: lambda one: rate_not_finite(one.model, one.point, one.place),
+    Code.STEP_TOO_SMALL: _step_too_small,
+    Code.LIMIT_PASSED: lambda one: limit_passed(one.model, one.point, one.transition),
+    Code.EVER_FASTER: _ever_faster,
+    Code.NOT_SETTLED: _not_settled,
+    Code.STILL_SWITCHING: _still_switching,
+    Code.STAYS_TRUE: lambda one: stays_true(one.model, one.point, one.transition),
+    Code.NO_VALID_MODES: lambda one: no_valid_modes(one.model, one.point, one.place),
+    Code.CONTRADICTS: lambda one: contradiction(one.model, one.point, one.place),
+    Code.BELOW_LEAST: _out_of_range,
+    Code.ABOVE_MOST: _out_of_range,
+    Code.OF_ARRAY: _no_real,
+    Code.NOT_REAL: _no_real,
+    Code.NOT_ASKED: _not_asked,
+}
