@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from modelica_like.cli.declare import Argument, Option, WrongUse
-from modelica_like.errors import InitializationError, ModelicaLikeError, SolveError, Source
+from modelica_like.cli.declare import Argument, Option
+from modelica_like.errors import InitializationError, ModelicaLikeError, NetlistError, SolveError, Source
 from modelica_like.writing import check_writable
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ DEFECTS = (
     SyntaxError, TypeError, ValueError,
 )  # fmt: skip
 
-Netlist = Annotated[Path, Argument(metavar="NETLIST", help="Netlist, a TOML file.", show_default=False)]
+Netlist = Annotated[Path, Argument(metavar="NETLIST", help="Netlist, a TOML file.")]
 Debug = Annotated[bool, Option("--debug", help="Show where in the code errors are raised and events declared.")]
 Assignments = Annotated[
     list[str] | None, Option("--set", metavar="PATH=VALUE", help="Set a value, e.g. 'clutch.mu=0.3'.")
@@ -176,7 +176,8 @@ def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
     pairs = [one.partition("=") for one in assignments or ()]
     for before, equals, _ in pairs:
         if not equals:
-            raise WrongUse(f"'{before}' is not {'PATH=VALUE' if option == '--set' else 'WHAT=UNIT'}.", option)
+            form = "PATH=VALUE" if option == "--set" else "WHAT=UNIT"
+            raise NetlistError(f"Invalid value for {option}: '{before}' is not {form}.")
     return {before.strip(): after.strip() for before, _, after in pairs}
 
 

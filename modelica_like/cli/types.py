@@ -18,7 +18,7 @@ def _types() -> Iterable[str]:
 
 def describe(
     kind: Annotated[
-        str, Argument(metavar="TYPE", help="Component type, or a netlist.", show_default=False, choices=_types)
+        str, Argument(metavar="TYPE", help="Component type, or a netlist.", choices=_types)
     ],
     *, json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -38,7 +38,7 @@ def describe(
 
 def library(
     words: Annotated[
-        list[str] | None, Argument(metavar="WORD", help="Words that the type or its text has.", show_default=False)
+        list[str] | None, Argument(metavar="WORD", help="Words that the type or its text has.")
     ] = None,
     *, group: Annotated[str | None, Option(metavar="GROUP", help="Only this group, e.g. gears.")] = None,
     json: Json = False, debug: Debug = False,
@@ -78,7 +78,7 @@ def schema(
 def docs(
     output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Folder for the pages.")],
     types: Annotated[
-        list[str] | None, Argument(metavar="TYPE", help="Component types, as in a netlist.", show_default=False)
+        list[str] | None, Argument(metavar="TYPE", help="Component types, as in a netlist.")
     ] = None,
     *, examples: Annotated[Path | None, Option(metavar="FOLDER", help="Folder of netlists to link.")] = None,
     debug: Debug = False,
