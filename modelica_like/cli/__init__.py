@@ -48,8 +48,14 @@ def main() -> None:
 
             complete(words)
             return
-        with trusting(None if everything else decide()):
-            run(words)
+        try:
+            with trusting(None if everything else decide()):
+                run(words)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:  # the reader of the results has closed the pipe
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(1) from None
     except KeyboardInterrupt:  # while modules are loaded
         raise SystemExit(130) from None
 

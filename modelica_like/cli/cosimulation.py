@@ -67,9 +67,7 @@ def split(
 
 
 def cosim(
-    system: Annotated[
-        Path, Argument(metavar="SYSTEM", help="System or netlist with FMUs (TOML), or SSP.")
-    ],
+    system: Annotated[Path, Argument(metavar="SYSTEM", help="System or netlist with FMUs (TOML), or SSP.")],
     assignments: Annotated[
         list[str] | None, Option("--set", metavar="FMU.PATH=VALUE", help="Set a value in an FMU, in its units.")
     ] = None, *,

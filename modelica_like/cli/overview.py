@@ -104,8 +104,9 @@ def complete(words: Sequence[str]) -> None:
     Args:
         words: of the command line up to the cursor, without the program.
     """
-    now = "" if words[-1] == "=" else words[-1]  # Bash splits words there
-    found = _candidates([one for one in words[:-1] if one != "="], now)
+    *before, now = words or [""]
+    now = "" if now == "=" else now  # Bash splits words there
+    found = _candidates([one for one in before if one != "="], now)
     sys.stdout.writelines(f"{word}\t{meaning}".strip() + "\n" for word, meaning in found if word.startswith(now))
 
 

@@ -59,8 +59,7 @@ class Parameter:
         """Read one value."""
         if self.choices and text not in self.choices:
             known = ", ".join(f"'{one}'" for one in self.choices)
-            near = did_you_mean(text, self.choices)
-            raise argparse.ArgumentTypeError(f"'{text}' is not one of {known}{near or '.'}")
+            raise argparse.ArgumentTypeError(f"'{text}' is not one of {known}.")
         try:
             return text if self.choices else self.kind(text)
         except ValueError:
@@ -153,7 +152,7 @@ class Reader(argparse.ArgumentParser):
                 self.error(f"Option '{name}' requires a value.")
             else:
                 yield f"{known[name].option_strings[0]}={value}"
-        yield from ["--", *places] if places else []
+        yield from [*(["--"] if any(one.startswith("-") for one in places) else ()), *places]
 
     def error(self, message: str) -> NoReturn:
         """Tell what is wrong with the words, and how they should be."""

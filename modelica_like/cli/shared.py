@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -95,9 +94,7 @@ def told(
         finally:
             page.close()
     except BrokenPipeError:
-        # The reader of the results has closed the pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise SystemExit(SOLVE_FAILED) from None
+        raise  # ends the program
     except (KeyboardInterrupt, ModelicaLikeError, OSError, *DEFECTS) as error:
         if debug:
             raise

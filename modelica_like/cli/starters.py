@@ -37,9 +37,7 @@ def new(
 
 
 def trust(
-    folder: Annotated[
-        Path | None, Argument(metavar="FOLDER", help="Without one: list them.")
-    ] = None,
+    folder: Annotated[Path | None, Argument(metavar="FOLDER", help="Without one: list them.")] = None,
     *, remove: Annotated[bool, Option("--remove", help="Trust it no longer.")] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip

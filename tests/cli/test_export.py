@@ -45,8 +45,7 @@ def test_open_end(tmp_path: Path) -> None:
 def test_mistakes_are_told(tmp_path: Path) -> None:
     result = called(["export", NETLIST, "-o", str(tmp_path / "x.fmu"), "--fmi", "1.0"])
     assert result.exit_code == 2
-    assert "Invalid value for '--fmi'" in result.stderr
-    assert "'1.0' is not one of '2.0', '3.0'" in result.stderr
+    assert result.stderr.startswith("Invalid value for --fmi: '1.0' is not one of '2.0', '3.0'.\n")
 
 
 def test_a_model_that_is_compiled_in(tmp_path: Path) -> None:

@@ -56,12 +56,11 @@ WRONG = {
     "simulate a.toml --start never": (
         f"Invalid value for --start: 'never' is not one of 'given', 'rest', 'steady'.\n{SIMULATE}"
     ),
-    "simulate a.toml --start stedy": (
-        "Invalid value for --start: 'stedy' is not one of 'given', 'rest', 'steady'; did you mean 'steady'?\n"
-        f"{SIMULATE}"
-    ),
     "sweep a.toml --over a=1:2:3": (
         "Missing: --of.\nUsage: modelica-like sweep [OPTIONS] NETLIST\nMore about it: modelica-like sweep --help\n"
+    ),
+    "runtimes all": (
+        "Unexpected: all.\nUsage: modelica-like runtimes [OPTIONS]\nMore about it: modelica-like runtimes --help\n"
     ),
     "docs": (
         "Missing: --output/-o.\n"
