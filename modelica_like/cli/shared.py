@@ -94,7 +94,7 @@ def told(
         finally:
             page.close()
     except BrokenPipeError:
-        raise  # ends the program
+        raise  # main() ends the program
     except (KeyboardInterrupt, ModelicaLikeError, OSError, *DEFECTS) as error:
         if debug:
             raise

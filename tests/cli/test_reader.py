@@ -1,6 +1,7 @@
 """What words of the command line mean, what is told about wrong ones, and what a call loads."""
 
 import inspect
+import os
 import subprocess
 import sys
 import tomllib
@@ -108,3 +109,13 @@ def test_an_ordinary_run_loads_nothing_that_only_other_commands_need():
     loaded = set(done.stdout.rpartition("loaded: ")[2].split())
     assert {"casadi", "rich", "components"} <= loaded
     assert not loaded & {"pydantic", "pint", "fmpy", "lxml", "matplotlib", "scipy", "xarray", "pandas"}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="POSIX pipes")
+def test_a_closed_pipe_ends_a_command_quietly():
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    words = [sys.executable, "-m", "modelica_like", "schema"]
+    done = subprocess.run(words, stdout=write_end, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(write_end)
+    assert (done.returncode, done.stderr) == (1, "")
