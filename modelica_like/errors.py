@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -290,6 +289,8 @@ def extra_module(module: str, extra: str, package: str = "") -> Any:
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
     """Return `; did you mean 'sun'?` for the known name nearest to `name` (of any type), or an empty string."""
+    import difflib  # slow to import
+
     name, names = str(name), list(known)
     within = sorted((one for one in names if len(name) > _SHORT and name.lower() in one.lower()), key=len)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.58 if not within else 0.8)

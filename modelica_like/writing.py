@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
-import shutil
-import tempfile
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,13 +24,13 @@ def replacing(path: str | Path) -> Iterator[Path]:
     # A link keeps its target.
     target = Path(os.path.realpath(path))
     beside = target.is_file() or not target.exists()
-    draft = target.with_name(f".{secrets.token_hex(4)}{target.suffix}") if beside else target
+    draft = target.with_name(f".{os.urandom(4).hex()}{target.suffix}") if beside else target
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         yield draft
         if beside:
             if target.exists():
-                shutil.copymode(target, draft)
+                draft.chmod(stat.S_IMODE(target.stat().st_mode))
             draft.replace(target)
     except OSError as error:
         if error.filename is not None and os.fspath(error.filename) != os.fspath(draft):
@@ -79,6 +77,8 @@ def check_writable(path: str | Path) -> None:
     folder = next(one for one in given.parents if one.exists())
     if not folder.is_dir():
         raise _refused(folder, errno.ENOTDIR)
+    import tempfile  # with all archivers: slow to import
+
     try:
         tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 from pathlib import Path
 
 # Signals, limits on files, pipes of a browser, nm, sanitizers, an FMU that crashes: not on Windows.
@@ -11,6 +12,9 @@ _POSIX = [
     "netlist/test_trust.py", "messages/test_trust_messages.py", "report/test_writing.py",
 ]  # fmt: skip
 collect_ignore = _POSIX if os.name == "nt" else []
+
+
+sys.path.insert(0, str(Path(__file__).parent / "helpers"))
 
 
 def pytest_configure() -> None:

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    import typer
-
-    app: typer.Typer
 
 # Tasks with their commands and the modules of these, in the order in which the help lists them.
 TASKS = {
@@ -30,21 +25,14 @@ TASKS = {
         "cosim": "cosimulation", "from-modelica": "modelica", "to-modelica": "modelica",
     },
 }  # fmt: skip
-_HOME = {name: home for commands in TASKS.values() for name, home in commands.items()}
+HOMES = {name: home for commands in TASKS.values() for name, home in commands.items()}
+COMPLETE = "_MODELICA_LIKE_COMPLETE"
+"""Set where a shell asks how words can go on."""
 
 
 def command(name: str) -> Callable[..., None]:
     """Return the function of a command."""
-    return getattr(import_module(f"modelica_like.cli.{_HOME[name]}"), name.replace("-", "_"))
-
-
-def __getattr__(name: str) -> Any:
-    if name != "app":
-        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    from modelica_like.cli.complete import application
-
-    globals()["app"] = application({task: {one: command(one) for one in names} for task, names in TASKS.items()})
-    return globals()["app"]
+    return getattr(import_module(f"modelica_like.cli.{HOMES[name]}"), name.replace("-", "_"))
 
 
 def main() -> None:
@@ -54,28 +42,39 @@ def main() -> None:
 
     words = [word for word in sys.argv[1:] if word != "--trust"]
     everything = len(words) < len(sys.argv) - 1
-    sys.argv[1:] = words
     try:
-        with trusting(None if everything else decide()):
-            if not _ran(words):
-                __getattr__("app")()
+        if COMPLETE in os.environ:
+            from modelica_like.cli.overview import complete
+
+            complete(words)
+            return
+        try:
+            with trusting(None if everything else decide()):
+                run(words)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:  # the reader of the results has closed the pipe
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(1) from None
     except KeyboardInterrupt:  # while modules are loaded
         raise SystemExit(130) from None
 
 
-def _ran(words: list[str]) -> bool:
-    """Run an ordinary call of a command; leave anything else to the complete application, which starts slower."""
-    from modelica_like.cli.declare import WrongUse
-    from modelica_like.cli.quick import read
+def run(words: Sequence[str]) -> None:
+    """Run a command.
 
-    if not words or words[0] not in _HOME:
-        return False
-    function = command(words[0])
-    values = read(function, words[1:])
-    if values is None:
-        return False
-    try:
-        function(**values)
-    except WrongUse:
-        return False
-    return True
+    Args:
+        words: its name, and what follows.
+
+    Raises:
+        SystemExit: it failed, or help is shown.
+    """
+    if not words or words[0] not in HOMES:
+        from modelica_like.cli.overview import overview
+
+        overview(words)
+    else:
+        from modelica_like.cli.reader import reader
+
+        function = command(words[0])
+        function(**reader(words[0], function).read(words[1:]))

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from rich.markup import escape
-
 from modelica_like.cli.declare import Option
 from modelica_like.cli.models import Start
 from modelica_like.cli.shared import TABLE, Assignments, Debug, Json, Netlist, Plot, Until, load_netlist, told
@@ -32,6 +30,8 @@ def modes(
     """Linearize a netlist at a point: eigenvalues, damping, energy shares of each mode."""
     with told(debug, json=json, pictures=[shapes, bode, nyquist]) as page:
         assembly = load_netlist(netlist, assignments)
+        from rich.markup import escape
+
         from modelica_like.analyse.linear.linearize import linearize, when
         from modelica_like.analyse.linear.loop import open_loop
         from modelica_like.show.draw import check_format, save_schematic

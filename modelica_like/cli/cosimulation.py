@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from modelica_like.cli.declare import Argument, Option, WrongUse
+from modelica_like.cli.declare import Argument, Option
 from modelica_like.cli.export import Fmi
 from modelica_like.cli.shared import (
     Assignments,
@@ -22,6 +22,7 @@ from modelica_like.cli.shared import (
     say,
     told,
 )
+from modelica_like.errors import NetlistError
 
 Master = Literal["jacobi", "gauss-seidel"]
 """Order in which FMUs step."""
@@ -66,9 +67,7 @@ def split(
 
 
 def cosim(
-    system: Annotated[
-        Path, Argument(metavar="SYSTEM", help="System or netlist with FMUs (TOML), or SSP.", show_default=False)
-    ],
+    system: Annotated[Path, Argument(metavar="SYSTEM", help="System or netlist with FMUs (TOML), or SSP.")],
     assignments: Annotated[
         list[str] | None, Option("--set", metavar="FMU.PATH=VALUE", help="Set a value in an FMU, in its units.")
     ] = None, *,
@@ -116,5 +115,5 @@ def _numbers(assignments: list[str] | tuple[str, ...]) -> dict[str, float]:
         try:
             values[path.strip()] = float(text)
         except ValueError:
-            raise WrongUse(f"'{assignment}' is not FMU.PATH=NUMBER.", "--set") from None
+            raise NetlistError(f"Invalid value for --set: '{assignment}' is not FMU.PATH=NUMBER.") from None
     return values

@@ -11,7 +11,7 @@ from modelica_like.writing import write_text
 
 
 def from_modelica(
-    text: Annotated[Path, Argument(metavar="FILE", help="Modelica text (.mo).", show_default=False)],
+    text: Annotated[Path, Argument(metavar="FILE", help="Modelica text (.mo).")],
     output: Annotated[
         Path | None, Option("--output", "-o", metavar="FILE", help="Netlist; by default FILE.toml.")
     ] = None,

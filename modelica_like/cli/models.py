@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from modelica_like.cli.declare import Option, WrongUse
+from modelica_like.cli.declare import Option
 from modelica_like.cli.shared import (
     Assignments,
     Csv,
@@ -24,6 +24,7 @@ from modelica_like.cli.shared import (
     note,
     told,
 )
+from modelica_like.errors import NetlistError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -134,7 +135,7 @@ def _beside(texts: Sequence[str], plot: Path | None) -> tuple[list[tuple[str, Se
     from modelica_like.analyse.sweeps.ranges import read_range
 
     if texts and plot is None:
-        raise WrongUse("it is drawn into the picture of --plot, which is missing.", "--compare")
+        raise NetlistError("Invalid value for --compare: it is drawn into the picture of --plot, which is missing.")
     files = [Path(text) for text in texts if "=" not in text]
     for file in files:
         file.stat()

@@ -34,7 +34,7 @@ def draw(
 
 
 def report(
-    source: Annotated[Path, Argument(metavar="NETLIST", help="Netlist, FMU, system or CSV file.", show_default=False)],
+    source: Annotated[Path, Argument(metavar="NETLIST", help="Netlist, FMU, system or CSV file.")],
     assignments: Assignments = None, *,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="By default DRIVE.html.")] = None,
     until: Until = None, show: Curves = None, debug: Debug = False,

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from modelica_like.cli.declare import Argument, Option, WrongUse
-from modelica_like.errors import InitializationError, ModelicaLikeError, SolveError, Source
+from modelica_like.cli.declare import Argument, Option
+from modelica_like.errors import InitializationError, ModelicaLikeError, NetlistError, SolveError, Source
 from modelica_like.writing import check_writable
 
 if TYPE_CHECKING:
@@ -27,7 +26,7 @@ DEFECTS = (
     SyntaxError, TypeError, ValueError,
 )  # fmt: skip
 
-Netlist = Annotated[Path, Argument(metavar="NETLIST", help="Netlist, a TOML file.", show_default=False)]
+Netlist = Annotated[Path, Argument(metavar="NETLIST", help="Netlist, a TOML file.")]
 Debug = Annotated[bool, Option("--debug", help="Show where in the code errors are raised and events declared.")]
 Assignments = Annotated[
     list[str] | None, Option("--set", metavar="PATH=VALUE", help="Set a value, e.g. 'clutch.mu=0.3'.")
@@ -95,9 +94,7 @@ def told(
         finally:
             page.close()
     except BrokenPipeError:
-        # The reader of the results has closed the pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise SystemExit(SOLVE_FAILED) from None
+        raise  # main() ends the program
     except (KeyboardInterrupt, ModelicaLikeError, OSError, *DEFECTS) as error:
         if debug:
             raise
@@ -176,7 +173,8 @@ def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
     pairs = [one.partition("=") for one in assignments or ()]
     for before, equals, _ in pairs:
         if not equals:
-            raise WrongUse(f"'{before}' is not {'PATH=VALUE' if option == '--set' else 'WHAT=UNIT'}.", option)
+            form = "PATH=VALUE" if option == "--set" else "WHAT=UNIT"
+            raise NetlistError(f"Invalid value for {option}: '{before}' is not {form}.")
     return {before.strip(): after.strip() for before, _, after in pairs}
 
 

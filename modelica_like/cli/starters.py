@@ -15,7 +15,7 @@ _FILES = {"servo": "servo_axis"}
 
 
 def new(
-    drive: Annotated[Drive, Argument(help="Worked drive, or blank: a motor and a load.", show_default=False)],
+    drive: Annotated[Drive, Argument(help="Worked drive, or blank: a motor and a load.")],
     output: Annotated[
         Path | None, Option("--output", "-o", metavar="FILE", help="The netlist; by default DRIVE.toml.")
     ] = None,
@@ -37,9 +37,7 @@ def new(
 
 
 def trust(
-    folder: Annotated[
-        Path | None, Argument(metavar="FOLDER", help="Without one: list them.", show_default=False)
-    ] = None,
+    folder: Annotated[Path | None, Argument(metavar="FOLDER", help="Without one: list them.")] = None,
     *, remove: Annotated[bool, Option("--remove", help="Trust it no longer.")] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip

@@ -17,9 +17,7 @@ def _types() -> Iterable[str]:
 
 
 def describe(
-    kind: Annotated[
-        str, Argument(metavar="TYPE", help="Component type, or a netlist.", show_default=False, choices=_types)
-    ],
+    kind: Annotated[str, Argument(metavar="TYPE", help="Component type, or a netlist.", choices=_types)],
     *, json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Describe a component type: parameters, units, connectors, modes, parts, equations and events.
@@ -37,9 +35,7 @@ def describe(
 
 
 def library(
-    words: Annotated[
-        list[str] | None, Argument(metavar="WORD", help="Words that the type or its text has.", show_default=False)
-    ] = None,
+    words: Annotated[list[str] | None, Argument(metavar="WORD", help="Words that the type or its text has.")] = None,
     *, group: Annotated[str | None, Option(metavar="GROUP", help="Only this group, e.g. gears.")] = None,
     json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -66,7 +62,8 @@ def schema(
 
         from modelica_like.writing import write_text
 
-        generate = import_module(f"modelica_like.{of}.json_schema").schema
+        package = {"netlist": "netlist", "sizing": "analyse.sizing"}[of]
+        generate = import_module(f"modelica_like.{package}.json_schema").schema
         text = json.dumps(generate(), indent=1, ensure_ascii=False) + "\n"
         if output is None:
             sys.stdout.write(text)
@@ -77,9 +74,7 @@ def schema(
 
 def docs(
     output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Folder for the pages.")],
-    types: Annotated[
-        list[str] | None, Argument(metavar="TYPE", help="Component types, as in a netlist.", show_default=False)
-    ] = None,
+    types: Annotated[list[str] | None, Argument(metavar="TYPE", help="Component types, as in a netlist.")] = None,
     *, examples: Annotated[Path | None, Option(metavar="FOLDER", help="Folder of netlists to link.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip

@@ -60,7 +60,7 @@ def demo(
 
 
 def validate(
-    fmu: Annotated[Path, Argument(metavar="FMU", help="FMU of FMI 2.0 or 3.0.", show_default=False)],
+    fmu: Annotated[Path, Argument(metavar="FMU", help="FMU of FMI 2.0 or 3.0.")],
     *, timeout: Timeout = "60s", json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Check an FMU against the standard, and run it with several importers; exit code 1 if a check fails.
@@ -81,8 +81,8 @@ def validate(
 
 
 def compare(
-    a: Annotated[Path, Argument(metavar="A", help="Netlist, FMU, system of FMUs, or CSV file.", show_default=False)],
-    b: Annotated[Path, Argument(metavar="B", help="What to compare with.", show_default=False)],
+    a: Annotated[Path, Argument(metavar="A", help="Netlist, FMU, system of FMUs, or CSV file.")],
+    b: Annotated[Path, Argument(metavar="B", help="What to compare with.")],
     signals: Annotated[
         list[str] | None, Option("--signal", metavar="PATTERN", help="Signals to compare, e.g. '*.w'; default: all.")
     ] = None,

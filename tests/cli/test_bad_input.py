@@ -6,9 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
-
-from modelica_like.cli import app
+from calls import called
 
 DRIVE = """
 [parts]
@@ -101,7 +99,7 @@ def test_check_finds_what_a_run_refuses_at_its_start(
 ) -> None:
     """`check` said "can be simulated" first."""
     (tmp_path / "bad.toml").write_text(text)
-    result = CliRunner().invoke(app, [command, str(tmp_path / "bad.toml")])
+    result = called([command, str(tmp_path / "bad.toml")])
     assert result.exit_code == code
     assert "can be simulated" not in result.stdout
     assert result.stderr.startswith(message)

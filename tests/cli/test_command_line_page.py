@@ -5,8 +5,10 @@ import runpy
 import shlex
 from pathlib import Path
 
+import pytest
+
 from modelica_like.cli import command
-from modelica_like.cli.quick import read
+from modelica_like.cli.reader import reader
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -27,6 +29,9 @@ def test_commands_in_all_pages_are_commands() -> None:
         for block in re.findall(r"```(?:sh|bash)?\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
             for line in re.findall(r"^modelica-like (.*)$", block, re.MULTILINE):
                 name, *words = (word for word in shlex.split(line, comments=True) if word != "--trust")
-                assert read(command(name), words) is not None, f"{page.name}: {line}"
+                try:
+                    reader(name, command(name)).read(words)
+                except SystemExit:
+                    pytest.fail(f"{page.name}: {line}")
                 count += 1
     assert count > 50

@@ -5,8 +5,8 @@ import json
 from pathlib import Path
 
 import pytest
+from calls import called
 from rich.console import Group
-from typer.testing import CliRunner
 
 from modelica_like import cli, simulate
 from modelica_like.show.report.tables import Shown, as_data, table
@@ -31,13 +31,13 @@ SLOW = {"validate", "cosim", "demo"}
 
 
 def said(*words: str) -> dict:
-    result = CliRunner().invoke(cli.app, [*words, "--json"])
+    result = called([*words, "--json"])
     assert result.exit_code == 0, result.stderr
     return json.loads(result.stdout)
 
 
 def test_all_commands_with_the_option_are_here():
-    known = {name for name in cli._HOME if "json" in inspect.signature(cli.command(name)).parameters}
+    known = {name for name in cli.HOMES if "json" in inspect.signature(cli.command(name)).parameters}
     assert known == {*TABLES, *SLOW}
 
 
@@ -79,6 +79,6 @@ def test_what_json_does_not_know_is_null():
 def test_a_check_that_fails_says_it_too(tmp_path):
     wrong = tmp_path / "drive.toml"
     wrong.write_text('[parts]\na = { is = "Inertja" }\n', encoding="utf-8")
-    result = CliRunner().invoke(cli.app, ["simulate", str(wrong), "--json"])
+    result = called(["simulate", str(wrong), "--json"])
     assert (result.exit_code, result.stdout) == (2, "")
     assert "Inertia" in result.stderr

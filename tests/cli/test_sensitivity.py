@@ -3,21 +3,14 @@
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
-
-from modelica_like.cli import app
+from calls import called
 
 DIRECT = str(Path(__file__).parents[2] / "examples" / "machine_table_direct.toml")
 
 
-@pytest.fixture
-def run() -> CliRunner:
-    return CliRunner()
-
-
-def test_a_ranking_table(run: CliRunner) -> None:
+def test_a_ranking_table() -> None:
     arguments = ["sensitivity", DIRECT, "--of", "clutch.lock_time", "--to", "load_torque", "--to", "acceleration_time"]
-    result = run.invoke(app, arguments)
+    result = called(arguments)
     assert result.exit_code == 0
     rows = {line.split()[0]: line.split() for line in result.stdout.splitlines() if line.strip()}
     # The clutch torque is sized for the acceleration time, whatever the load.
@@ -26,15 +19,15 @@ def test_a_ranking_table(run: CliRunner) -> None:
     assert result.stderr == ""
 
 
-def test_a_tornado_plot(run: CliRunner, tmp_path: Path) -> None:
+def test_a_tornado_plot(tmp_path: Path) -> None:
     picture = tmp_path / "tornado.png"
-    result = run.invoke(app, ["sensitivity", DIRECT, "--of", "clutch.loss_energy", "--tornado", str(picture)])
+    result = called(["sensitivity", DIRECT, "--of", "clutch.loss_energy", "--tornado", str(picture)])
     assert result.exit_code == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("wrong", [["--of", "clutch.lok_time"], ["--of", "table.s", "--to", "mu"]])
-def test_a_wrong_name_is_told(run: CliRunner, wrong: list[str]) -> None:
-    result = run.invoke(app, ["sensitivity", DIRECT, *wrong])
+def test_a_wrong_name_is_told(wrong: list[str]) -> None:
+    result = called(["sensitivity", DIRECT, *wrong])
     assert result.exit_code == 2
     assert result.stderr.startswith("machine_table_direct has no")

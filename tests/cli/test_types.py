@@ -8,10 +8,9 @@ from typing import Any
 
 import jsonschema
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from modelica_like.analyse.sizing.json_schema import schema as sizing_schema
-from modelica_like.cli import app
 from modelica_like.errors import UnitError
 from modelica_like.language import (
     Component,
@@ -34,19 +33,14 @@ from modelica_like.show.report.component_pages.source import Source
 from modelica_like.show.report.statements import statements
 
 
-@pytest.fixture
-def run() -> CliRunner:
-    return CliRunner()
-
-
 @pytest.fixture(scope="module")
 def netlists() -> jsonschema.Draft7Validator:
     """Validator of netlists by the schema, which is made once."""
     return jsonschema.Draft7Validator(json.loads(json.dumps(schema())))
 
 
-def test_library_lists_every_type_with_a_sentence(run: CliRunner) -> None:
-    result = run.invoke(app, ["library"])
+def test_library_lists_every_type_with_a_sentence() -> None:
+    result = called(["library"])
     assert result.exit_code == 0
     lines = {line.split()[0]: line for line in result.stdout.splitlines()[2:]}
     assert lines.keys() == library_types().keys()
@@ -55,8 +49,8 @@ def test_library_lists_every_type_with_a_sentence(run: CliRunner) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(library_types()))
-def test_every_type_can_be_described(run: CliRunner, name: str) -> None:
-    result = run.invoke(app, ["describe", name])
+def test_every_type_can_be_described(name: str) -> None:
+    result = called(["describe", name])
     assert result.exit_code == 0
     for field in library_types()[name]._class_fields.values():
         assert field.name in result.stdout
@@ -65,15 +59,15 @@ def test_every_type_can_be_described(run: CliRunner, name: str) -> None:
     assert "--" not in result.stdout
 
 
-def test_a_description_has_declarations_equations_and_events(run: CliRunner) -> None:
-    text = " ".join(run.invoke(app, ["describe", "Clutch"]).stdout.split())
+def test_a_description_has_declarations_equations_and_events() -> None:
+    text = " ".join(called(["describe", "Clutch"]).stdout.split())
     for expected in ("capacity N.m 0 …", "phi [rad], tau [N.m]", "der(phi_rel) == w_rel", "mode.go("):
         assert expected in text
     assert "self." not in text
 
 
-def test_equations_of_several_lines_are_told_in_one(run: CliRunner) -> None:
-    text = run.invoke(app, ["describe", "PermanentMagnetDCMachine"]).stdout
+def test_equations_of_several_lines_are_told_in_one() -> None:
+    text = called(["describe", "PermanentMagnetDCMachine"]).stdout
     lines = [line.strip() for line in text.splitlines()]
     assert "v == resistance(Ra) * ia + brush_voltage(ia) + v_core + series_voltage()" in lines
 
@@ -91,9 +85,9 @@ def test_nothing_in_equations_is_left_undefined(name: str) -> None:
         assert not re.search(r"\bself\.|\bsuper\(|\byield\b", line)
 
 
-def test_conditions_parts_and_codes_are_told(run: CliRunner) -> None:
+def test_conditions_parts_and_codes_are_told() -> None:
     def lines(name: str) -> list[str]:
-        return [line.rstrip() for line in run.invoke(app, ["describe", name]).stdout.splitlines()]
+        return [line.rstrip() for line in called(["describe", name]).stdout.splitlines()]
 
     clutch = lines("Clutch")
     assert "    heat_port.Q_flow == -heat()" in clutch
@@ -106,9 +100,9 @@ def test_conditions_parts_and_codes_are_told(run: CliRunner) -> None:
     assert told == {name: type(part).__name__ for name, part in servo._class_parts.items()}
 
 
-def test_a_netlist_is_described_with_the_parts_of_its_assemblies(run: CliRunner) -> None:
+def test_a_netlist_is_described_with_the_parts_of_its_assemblies() -> None:
     file = Path(__file__).parents[2] / "examples" / "lepelletier.toml"
-    tables = json.loads(run.invoke(app, ["describe", str(file), "--json"]).stdout)["tables"]
+    tables = json.loads(called(["describe", str(file), "--json"]).stdout)["tables"]
     drive = load(file)
     assert [(row["name"], row["type"]) for row in tables["parts"]] == [
         (part.path, type(part).__name__) for part in drive.walk() if part is not drive
@@ -116,7 +110,7 @@ def test_a_netlist_is_described_with_the_parts_of_its_assemblies(run: CliRunner)
     (clutch,) = (row for row in tables["parts"] if row["name"] == "box.clutch_a")
     assert clutch["values"] == "capacity = 500 N.m"
     assert "clutch_a: selector.a = box.pressure_a" in tables["connections"]
-    startup = run.invoke(app, ["describe", str(file.with_name("machine_tool_startup.toml"))]).stdout
+    startup = called(["describe", str(file.with_name("machine_tool_startup.toml"))]).stdout
     assert re.search(r"^h1 +10 N.m.s/rad *$", startup, re.MULTILINE)
 
 
@@ -149,8 +143,8 @@ def test_equations_of_the_start_and_at_instants_are_told() -> None:
 
 
 @pytest.mark.parametrize("words", [["worm"], ["gear", "--group", "gears"], ["FRICTION", "clutch"]])
-def test_the_library_is_filtered(run: CliRunner, words: list[str]) -> None:
-    found = {line.split()[0] for line in run.invoke(app, ["library", *words]).stdout.splitlines()[2:]}
+def test_the_library_is_filtered(words: list[str]) -> None:
+    found = {line.split()[0] for line in called(["library", *words]).stdout.splitlines()[2:]}
     asked = [one.lower() for one in words if one not in ("--group", "gears")]
     for name, kind in library_types().items():
         wanted = all(one in f"{name} {kind.__module__.partition('.')[2]} {kind.__doc__}".lower() for one in asked)
@@ -158,13 +152,13 @@ def test_the_library_is_filtered(run: CliRunner, words: list[str]) -> None:
     assert found
 
 
-def test_a_group_or_a_word_that_is_not_there_is_told(run: CliRunner) -> None:
-    assert "There is no group 'gear'; did you mean 'gears'?" in run.invoke(app, ["library", "--group", "gear"]).stderr
-    assert "No component type has 'gearz' in its name or text." in run.invoke(app, ["library", "gearz"]).stderr
+def test_a_group_or_a_word_that_is_not_there_is_told() -> None:
+    assert "There is no group 'gear'; did you mean 'gears'?" in called(["library", "--group", "gear"]).stderr
+    assert "No component type has 'gearz' in its name or text." in called(["library", "gearz"]).stderr
 
 
-def test_the_schema_is_a_schema(run: CliRunner) -> None:
-    result = run.invoke(app, ["schema"])
+def test_the_schema_is_a_schema() -> None:
+    result = called(["schema"])
     assert result.exit_code == 0
     known = json.loads(result.stdout)
     jsonschema.Draft7Validator.check_schema(known)
@@ -238,10 +232,10 @@ def test_every_entry_is_explained() -> None:
                 assert properties[field.name]["description"] == field.description + unit
 
 
-def test_a_schema_is_written_to_a_file(run: CliRunner, tmp_path: Path) -> None:
+def test_a_schema_is_written_to_a_file(tmp_path: Path) -> None:
     for of, generate in (("netlist", schema), ("sizing", sizing_schema)):
         file = tmp_path / f"{of}.json"
-        result = run.invoke(app, ["schema", of, "-o", str(file)])
+        result = called(["schema", of, "-o", str(file)])
         assert f"#:schema ./{of}.json" in result.stdout
         assert json.loads(file.read_text(encoding="utf-8")) == json.loads(json.dumps(generate()))
 
@@ -263,13 +257,13 @@ def test_a_sizing_file_with_a_wrong_unit_does_not_fit() -> None:
     assert not validator.is_valid({"checks": {"heat": heat | {"capacity": 3}}})
 
 
-def test_unknown_types_are_told_on_stderr(run: CliRunner) -> None:
-    result = run.invoke(app, ["describe", "Cluch"])
+def test_unknown_types_are_told_on_stderr() -> None:
+    result = called(["describe", "Cluch"])
     assert result.exit_code == 2
     assert result.stdout == ""
     assert result.stderr.startswith("There is no component type 'Cluch'; did you mean 'Clutch'?\n")
 
 
-def test_debug_shows_where_an_error_was_raised(run: CliRunner) -> None:
-    result = run.invoke(app, ["describe", "Cluch", "--debug"])
+def test_debug_shows_where_an_error_was_raised() -> None:
+    result = called(["describe", "Cluch", "--debug"])
     assert type(result.exception).__name__ == "UnknownName"

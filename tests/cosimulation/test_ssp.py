@@ -11,11 +11,10 @@ from pathlib import Path
 import lxml.etree as etree
 import numpy as np
 import pytest
+from calls import called
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd
-from typer.testing import CliRunner
 
-from modelica_like.cli import app
 from modelica_like.fmi.cosimulation.described import DescribedFmu, FmuVariable, UnitDefinition
 from modelica_like.fmi.cosimulation.run import cosim
 from modelica_like.fmi.cosimulation.split import Split
@@ -90,8 +89,8 @@ def test_an_fmu_that_is_used_twice_is_packed_once(oscillator: Split, tmp_path: P
 def test_split_writes_an_ssp_on_the_command_line(tmp_path: Path) -> None:
     path = tmp_path / "parts.ssp"
     options = ["--at", "shaft", "--name", "motor", "--name", "wheel", "--ssp", "2.0", "--no-check"]
-    result = CliRunner().invoke(app, ["split", str(NETLIST), *options, "-o", str(path)])
-    assert result.exit_code == 0, result.output
+    result = called(["split", str(NETLIST), *options, "-o", str(path)])
+    assert result.exit_code == 0, result.stdout + result.stderr
     assert result.stdout.startswith(f"{path}: motor.fmu, wheel.fmu\n")
     with zipfile.ZipFile(path) as archive:
         assert etree.fromstring(archive.read("SystemStructure.ssd")).get("version") == "2.0"

@@ -4,10 +4,9 @@ from itertools import combinations
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from modelica_like import load, schematic, simulate
-from modelica_like.cli import app
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.show.draw import layout
 from modelica_like.show.draw.labels import meet
@@ -105,9 +104,7 @@ def test_what_cannot_be_shown_is_told(tmp_path: Path) -> None:
     drive = load(EXAMPLES / "machine_tool_startup.toml")
     with pytest.raises(ValueOutOfRange, match=r"There is nothing at 7 s: the run goes from 0 s to 1 s\."):
         schematic(drive, run=simulate(drive), at=7.0)
-    told = CliRunner().invoke(
-        app, ["draw", str(EXAMPLES / "lepelletier.toml"), "--animate", "-o", str(tmp_path / "a.png")]
-    )
+    told = called(["draw", str(EXAMPLES / "lepelletier.toml"), "--animate", "-o", str(tmp_path / "a.png")])
     assert told.exit_code == 2
     assert "'a.png': only SVG moves." in told.stderr
 
@@ -115,7 +112,7 @@ def test_what_cannot_be_shown_is_told(tmp_path: Path) -> None:
 def test_the_command_runs_the_drive(tmp_path: Path) -> None:
     for words in (["--at", "0.3s"], ["--flow"], ["--animate"]):
         path = tmp_path / "drive.svg"
-        told = CliRunner().invoke(app, ["draw", str(EXAMPLES / "machine_tool_startup.toml"), *words, "-o", str(path)])
+        told = called(["draw", str(EXAMPLES / "machine_tool_startup.toml"), *words, "-o", str(path)])
         assert told.exit_code == 0, told.stderr
         text = path.read_text("utf-8")
         assert "stuck" in text

@@ -5,11 +5,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from components import BallScrew, IdealGear, Inertia, Mass, Spring
 from modelica_like import linearize, schematic
-from modelica_like.cli import app
 from modelica_like.language import Assembly
 from modelica_like.show.draw import layout
 from modelica_like.show.draw.shapes import Shape, shapes
@@ -62,8 +61,8 @@ def test_what_does_not_move_has_no_shape() -> None:
 
 def test_the_command_draws_them(tmp_path: Path) -> None:
     file = tmp_path / "launch.svg"
-    result = CliRunner().invoke(app, ["modes", str(EXAMPLES / "launch.toml"), "--draw", str(file)])
-    assert result.exit_code == 0, result.output
+    result = called(["modes", str(EXAMPLES / "launch.toml"), "--draw", str(file)])
+    assert result.exit_code == 0, result.stdout + result.stderr
     assert "mode 1: " in file.read_text("utf-8")
-    result = CliRunner().invoke(app, ["modes", str(EXAMPLES / "launch.toml"), "--draw", str(tmp_path / "launch.gif")])
-    assert "can be pdf, png, svg" in result.output
+    result = called(["modes", str(EXAMPLES / "launch.toml"), "--draw", str(tmp_path / "launch.gif")])
+    assert "can be pdf, png, svg" in result.stdout + result.stderr

@@ -3,43 +3,35 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-import pytest
-from typer.testing import CliRunner
-
-from modelica_like.cli import app
+from calls import called
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 Built = Mapping[tuple[str, str], Path]
 
 
-@pytest.fixture
-def run() -> CliRunner:
-    return CliRunner()
-
-
-def test_validate_prints_every_check(run: CliRunner, reference_fmus: Built) -> None:
-    result = run.invoke(app, ["validate", str(reference_fmus["machine_table", "2.0"])])
+def test_validate_prints_every_check(reference_fmus: Built) -> None:
+    result = called(["validate", str(reference_fmus["machine_table", "2.0"])])
     assert result.exit_code == 0
     assert "libcosim CS                    passed   It runs to 0.4 s and ends with the same values." in result.stdout
 
 
-def test_validate_of_a_broken_file_fails(run: CliRunner, tmp_path: Path) -> None:
+def test_validate_of_a_broken_file_fails(tmp_path: Path) -> None:
     (tmp_path / "drive.fmu").write_text("nothing")
-    result = run.invoke(app, ["validate", str(tmp_path / "drive.fmu")])
+    result = called(["validate", str(tmp_path / "drive.fmu")])
     assert result.exit_code == 1
     assert "archive  failed   drive.fmu is not an FMU: it is not a valid zip archive." in result.stdout
 
 
-def test_validate_of_no_file(run: CliRunner, tmp_path: Path) -> None:
-    result = run.invoke(app, ["validate", str(tmp_path / "drive.fmu")])
+def test_validate_of_no_file(tmp_path: Path) -> None:
+    result = called(["validate", str(tmp_path / "drive.fmu")])
     assert result.exit_code == 2
     assert "No such file or directory." in result.stderr
 
 
-def test_compare_prints_deviations_and_draws(run: CliRunner, reference_fmus: Built, tmp_path: Path) -> None:
+def test_compare_prints_deviations_and_draws(reference_fmus: Built, tmp_path: Path) -> None:
     netlist, picture = str(EXAMPLES / "machine_table_direct.toml"), tmp_path / "both.png"
     fmu = str(reference_fmus["machine_table", "3.0"])
-    result = run.invoke(app, ["compare", netlist, fmu, "--signal", "table.*", "--plot", str(picture)])
+    result = called(["compare", netlist, fmu, "--signal", "table.*", "--plot", str(picture)])
     assert result.exit_code == 0
     rows = {line.split()[0]: line.split() for line in result.stdout.splitlines() if line}
     assert rows["table.v"][2] == "m/s"
@@ -48,8 +40,8 @@ def test_compare_prints_deviations_and_draws(run: CliRunner, reference_fmus: Bui
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_compare_of_strangers_is_told(run: CliRunner, reference_fmus: Built) -> None:
+def test_compare_of_strangers_is_told(reference_fmus: Built) -> None:
     fmus = [str(reference_fmus[name, "2.0"]) for name in ("two_mass", "stick_slip")]
-    result = run.invoke(app, ["compare", *fmus])
+    result = called(["compare", *fmus])
     assert result.exit_code == 2
     assert result.stderr.startswith("two_mass_fmi2.fmu and stick_slip_fmi2.fmu have no signal in common.")

@@ -7,7 +7,6 @@ Run with `python tests/fuzz/fuzzer.py COUNT [FIRST [KIND]]`; input number k is t
 from __future__ import annotations
 
 import contextlib
-import inspect
 import io
 import os
 import random
@@ -20,7 +19,7 @@ from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 from drives import crossing, drive, examples
 from files import archive, fmu, folder, sizing, ssp, system, table
@@ -30,9 +29,9 @@ from modelica import modelica
 from components import Inertia
 from modelica_like import build, simulate
 from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
-from modelica_like.cli import TASKS, __getattr__, _ran, command
-from modelica_like.cli.declare import WrongUse
-from modelica_like.cli.quick import _Parameter
+from modelica_like.cli import TASKS, command
+from modelica_like.cli import run as call
+from modelica_like.cli.reader import parameters
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.language.units import parse_unit, read_quantity, to_si
 from modelica_like.netlist import library_types, loads
@@ -149,7 +148,7 @@ def option(chance: random.Random) -> tuple[str, Callable[[], object]]:
         told = io.StringIO()
         try:
             with contextlib.redirect_stderr(told), contextlib.redirect_stdout(io.StringIO()):
-                _ran([*words, "--debug"])
+                call([*words, "--debug"])
         except SystemExit:
             pass
 
@@ -160,8 +159,7 @@ def words(chance: random.Random) -> tuple[str, Callable[[], object]]:
     """Give any command any of its options, right and wrong words, and files of any kind."""
     name = chance.choice([one for names in TASKS.values() for one in names if one not in NOT_HERE])
     options = [
-        word for key, one in inspect.signature(command(name)).parameters.items()
-        for word in _Parameter(key, get_type_hints(command(name), include_extras=True)[key], one.default).words()
+        word for one in parameters(command(name)) for word in one.words()
         if not word.startswith("--no-") or word == "--no-such"
     ]  # fmt: skip
     files = [str(folder() / "drive.toml"), str(folder() / "motor.fmu"), str(folder() / "system.ssp"), "no.toml", "."]
@@ -180,8 +178,7 @@ def _called(line: list[str]) -> None:
     os.chdir(folder() / "here")
     try:
         with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            if not _ran([*line, "--debug"]):
-                __getattr__("app")(args=line)
+            call([*line, "--debug"])
     except SystemExit:
         pass
     finally:
@@ -206,7 +203,7 @@ def attempt(number: int, kind: str = "") -> Crash | None:
         signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
         run()
-    except (ModelicaLikeError, WrongUse):
+    except ModelicaLikeError:
         return None
     except OSError as error:
         # The command line names the file and the reason, if the file is one that was asked for.

@@ -4,11 +4,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from components import Inertia, Pin, Torque
 from modelica_like import build, simulate
-from modelica_like.cli import app
 from modelica_like.errors import (
     ComponentUnbalanced,
     FreeFlange,
@@ -252,19 +251,19 @@ def grip(tmp_path: Path) -> str:
     ],
 )
 def test_what_is_set_on_the_command_line_is_named_there(grip: str, given: str, what: str) -> None:
-    result = CliRunner().invoke(app, ["check", grip, "--set", given])
+    result = called(["check", grip, "--set", given])
     assert result.exit_code == 2
     assert result.stderr.splitlines()[:2] == [what, f"  in --set `{given}`"]
 
 
 def test_events_are_told_in_words_and_their_lines_with_debug(grip: str) -> None:
-    plain = CliRunner().invoke(app, ["simulate", grip, "--no-energy"]).stdout
+    plain = called(["simulate", grip, "--no-energy"]).stdout
     table = [line.split(maxsplit=4) for line in plain.splitlines()]
     assert [[*row[1:4], row[4].strip()] for row in table if "grip.mode" in row] == [
         ["grip.mode", "forward", "stuck", "slip reached zero"]
     ]
     assert "friction.py" not in plain
-    debug = CliRunner().invoke(app, ["simulate", grip, "--no-energy", "--debug"]).stdout
+    debug = called(["simulate", grip, "--no-energy", "--debug"]).stdout
     assert "slip reached zero" in debug
     assert "friction.py:" in debug
 
@@ -321,12 +320,12 @@ def test_a_reason_names_parameters_only() -> None:
 
 def test_brackets_in_paths_are_no_markup(grip: str, tmp_path: Path) -> None:
     picture = tmp_path / "[bold]grip[/x].svg".replace("/", "_")
-    result = CliRunner().invoke(app, ["draw", grip, "-o", str(picture)])
+    result = called(["draw", grip, "-o", str(picture)])
     assert (result.exit_code, result.stdout) == (0, f"{picture}\n")
-    result = CliRunner().invoke(app, ["check", str(tmp_path / "[red]none.toml")])
+    result = called(["check", str(tmp_path / "[red]none.toml")])
     assert "[red]none.toml' does not exist" in result.stderr
 
 
 def test_brackets_in_help_are_no_markup() -> None:
-    text = " ".join(CliRunner().invoke(app, ["split", "--help"]).stdout.replace("│", " ").split())
+    text = " ".join(called(["split", "--help"]).stdout.replace("│", " ").split())
     assert "or a name in [connect]." in text

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from modelica_like import load, simulate
-from modelica_like.cli import app
 from modelica_like.errors import ModelicaTextError
 from modelica_like.netlist import library_types, loads
 from modelica_like.netlist.modelica.library import known_classes
@@ -170,8 +169,8 @@ def test_the_commands(tmp_path: Path) -> None:
         ["check", str(tmp_path / "drive.mo")],
     ]
     for words in calls:
-        result = CliRunner().invoke(app, words)
-        assert result.exit_code == 0, result.output
+        result = called(words)
+        assert result.exit_code == 0, result.stdout + result.stderr
     assert "model Drive" in (tmp_path / "drive.mo").read_text()
 
 

@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from modelica_like import build, export_html, simulate
-from modelica_like.cli import app
 from modelica_like.errors import ExportError, UnitError, UnknownName, ValueOutOfRange
 from modelica_like.language.units import parse_unit
 from modelica_like.show.browser.page import _span, _spelled
@@ -81,13 +80,13 @@ def test_a_page_is_small_and_asks_for_nothing(pages: dict[str, Path], name: str)
 def test_the_command_writes_a_page_alone_or_with_an_fmu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     command = ["export", str(EXAMPLES / "two_mass.toml"), "--html", "two.html", "--show", "J?.w", "--set", "J1.J=2"]
-    result = CliRunner().invoke(app, command)
+    result = called(command)
     assert re.fullmatch(r"two\.html: \d+ sliders, 2 curves, \d+ kB, \d+\.\d s\n", result.stdout)
     assert [one.name for one in tmp_path.iterdir()] == ["two.html"]
     page = content(tmp_path / "two.html")
     assert [one["name"] for one in page["variables"] if one["shown"]] == ["J1.w", "J2.w"]
     assert next(one["value"] for one in page["sliders"] if one["name"] == "J1.J") == 2.0
-    result = CliRunner().invoke(app, [*command, "-o", "two.fmu", "--platform", "none"])
+    result = called([*command, "-o", "two.fmu", "--platform", "none"])
     assert [line.partition(":")[0] for line in result.stdout.splitlines()[:2]] == ["two.html", "two.fmu"]
 
 

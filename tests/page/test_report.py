@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from components import ConstantTorque, Inertia
 from modelica_like import export_fmu, load, sensitivities, simulate
-from modelica_like.cli import app
 from modelica_like.errors import UnknownName
 from modelica_like.language import (
     Assembly,
@@ -240,8 +239,8 @@ def test_an_unknown_pattern_is_told() -> None:
 
 def test_the_command_writes_it(tmp_path: Path) -> None:
     file = tmp_path / "table.html"
-    result = CliRunner().invoke(app, ["report", str(EXAMPLES / "machine_table_direct.toml"), "-o", str(file)])
-    assert result.exit_code == 0, result.output
+    result = called(["report", str(EXAMPLES / "machine_table_direct.toml"), "-o", str(file)])
+    assert result.exit_code == 0, result.stdout + result.stderr
     assert file.read_text("utf-8").startswith("<!DOCTYPE html>")
 
 
@@ -305,12 +304,12 @@ def test_results_without_equations_have_a_report(tmp_path: Path) -> None:
     write_solution(simulate(drive), tmp_path / "table.csv")
     for source, curve in (("table.fmu", "clutch.tau"), ("table.csv", "table.v")):
         words = ["report", str(tmp_path / source), "-o", str(tmp_path / "page.html"), "--show", curve]
-        result = CliRunner().invoke(app, words)
-        assert result.exit_code == 0, result.output
+        result = called(words)
+        assert result.exit_code == 0, result.stdout + result.stderr
         text = (tmp_path / "page.html").read_text("utf-8")
         assert re.findall(r"<h2>(.*?)</h2>", text) == ["What happens", "Curves"]
         assert f'"name":"{curve}"' in text
-    result = CliRunner().invoke(app, ["report", str(tmp_path / "table.csv"), "--set", "k=1"])
+    result = called(["report", str(tmp_path / "table.csv"), "--set", "k=1"])
     assert (result.exit_code, result.stderr) == (2, "--set changes netlists; 'table.csv' is none.\n")
 
 

@@ -6,11 +6,10 @@ from collections import Counter
 from pathlib import Path as File
 
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from components import PI, Clutch, OneWayClutch
 from components.interfaces import Flange
-from modelica_like.cli import app
 from modelica_like.language import (
     Component,
     Equations,
@@ -328,7 +327,7 @@ def test_bases_are_read_in_their_order(pages: dict[File, str]) -> None:
 def test_the_command_writes_pages_and_leaves_other_files_alone(tmp_path: File) -> None:
     mine = tmp_path / "mine.md"
     mine.write_text("mine")
-    result = CliRunner().invoke(app, ["docs", "-o", str(tmp_path), "Clutch", "Inertia"])
+    result = called(["docs", "-o", str(tmp_path), "Clutch", "Inertia"])
     assert (result.exit_code, result.stdout) == (0, f"2 pages in {tmp_path}\n")
     assert {file.relative_to(tmp_path).as_posix() for file in tmp_path.rglob("*.md")} == {
         "mine.md",
@@ -361,6 +360,6 @@ def test_what_the_command_refuses(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     File("drive.toml").write_text("[parts]\na is b\n")
-    result = CliRunner().invoke(app, ["docs", *arguments])
+    result = called(["docs", *arguments])
     assert (result.exit_code, result.stderr) == (2, message)
     assert not File("new").exists()

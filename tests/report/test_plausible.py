@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from components import (
     Brake,
@@ -23,7 +23,6 @@ from components import (
     Torque,
 )
 from modelica_like import load, simulate
-from modelica_like.cli import app
 from modelica_like.language import Assembly, Equations, Variable, var
 from modelica_like.show.report.plausible import drive_notes, run_notes
 
@@ -155,8 +154,8 @@ def test_a_bound_exceeded_between_the_results_is_noticed() -> None:
 
 
 def test_commands_tell_them_and_go_on() -> None:
-    told = CliRunner().invoke(app, ["simulate", str(EXAMPLES / "ravigneaux.toml")])
+    told = called(["simulate", str(EXAMPLES / "ravigneaux.toml")])
     assert told.exit_code == 0
     assert "clutch_large, clutch_carrier and brake_carrier never engage: their inputs are 0" in told.stderr
-    told = CliRunner().invoke(app, ["check", str(EXAMPLES / "components" / "position_cascade.toml")])
+    told = called(["check", str(EXAMPLES / "components" / "position_cascade.toml")])
     assert "Nothing reads total.y" in told.stderr

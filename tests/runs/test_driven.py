@@ -6,10 +6,9 @@ from typing import Any, get_args
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from modelica_like import simulate
-from modelica_like.cli import app
 from modelica_like.netlist import loads
 from modelica_like.show.report.run import notices
 from modelica_like.simulation import Solver
@@ -62,9 +61,9 @@ def test_from_a_file_of_a_spreadsheet(tmp_path: Path) -> None:
     run = simulate(tmp_path / "drive.toml", 2, inputs=tmp_path / "force.csv")
     assert run.final["mass.v"] == pytest.approx(4.5, rel=1e-7)
     words = ["simulate", str(tmp_path / "drive.toml"), "--until", "2s", "--inputs", str(tmp_path / "force.csv")]
-    result = CliRunner().invoke(app, [*words, "--csv", str(tmp_path / "run.csv")])
+    result = called([*words, "--csv", str(tmp_path / "run.csv")])
     assert result.exit_code == 0
-    assert "push_f_over_time has no more rows" in result.output
+    assert "push_f_over_time has no more rows" in result.stdout + result.stderr
     names, *rows = (line.split(",") for line in (tmp_path / "run.csv").read_text().splitlines())
     assert float(rows[-1][names.index("mass.v")]) == pytest.approx(4.5, rel=1e-6)
 

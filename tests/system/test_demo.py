@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from calls import called
 from rich.console import Console
-from typer.testing import CliRunner
 
-from modelica_like.cli import app, validation
+from modelica_like.cli import validation
 
 ROOT = Path(__file__).parents[2]
 
@@ -64,7 +64,7 @@ def test_pages_tell_everything_and_pictures_are_written(tmp_path: Path) -> None:
 
 def test_without_the_examples_it_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(validation, "DEMO", tmp_path / "nothing")
-    result = CliRunner().invoke(app, ["demo", "--pictures", str(tmp_path)])
+    result = called(["demo", "--pictures", str(tmp_path)])
     assert result.exit_code == 2
     assert result.stderr == "The demo needs the folder of examples.\nRun it from a copy of the source.\n"
 
@@ -74,5 +74,5 @@ def test_the_command_runs_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
         "def run_demo(console, pictures):\n    console.print(f'pages and {pictures.name}')\n"
     )
     monkeypatch.setattr(validation, "DEMO", tmp_path / "demo.py")
-    result = CliRunner().invoke(app, ["demo", "--pictures", str(tmp_path / "pictures")])
+    result = called(["demo", "--pictures", str(tmp_path / "pictures")])
     assert (result.exit_code, result.stdout) == (0, "pages and pictures\n")

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
-from modelica_like.cli import app
 from modelica_like.netlist import library_types
 from modelica_like.show.explorer import Explorer
 
@@ -31,7 +30,7 @@ def command(line: str) -> None:
         with Explorer(words[1]) as explorer:
             assert explorer.address.startswith("http://127.0.0.1")
         return
-    result = CliRunner().invoke(app, words)
+    result = called(words)
     assert result.exit_code == 0, f"{line}: {result.stderr}"
 
 

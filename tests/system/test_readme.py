@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from calls import called
 
 from modelica_like import Solution, simulate
-from modelica_like.cli import app
 from modelica_like.netlist import loads
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
@@ -46,7 +45,7 @@ def test_what_follows_follows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     lines = re.findall(r"^modelica-like (.*spindle_drive.*)$", README, re.MULTILINE)
     assert len(lines) == 8
     for line in lines:
-        result = CliRunner().invoke(app, shlex.split(line, comments=True))
+        result = called(shlex.split(line, comments=True))
         assert result.exit_code == 0, f"{line}: {result.stderr}"
     assert (tmp_path / "parts" / "system.toml").exists()
 

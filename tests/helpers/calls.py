@@ -1,0 +1,33 @@
+"""Commands called in this process."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from modelica_like.cli import run
+
+
+@dataclass(frozen=True)
+class Called:
+    """How a command ended, with what it printed; `exception` is what `--debug` lets through."""
+
+    exit_code: int
+    stdout: str
+    stderr: str
+    exception: Exception | None = None
+
+
+def called(words: Sequence[str]) -> Called:
+    """Call `modelica-like` with words."""
+    code, exception = 0, None
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as told:
+        try:
+            run(words)
+        except SystemExit as end:
+            code = int(end.code or 0)
+        except Exception as error:  # noqa: BLE001 - as the interpreter does
+            code, exception = 1, error
+    return Called(code, out.getvalue(), told.getvalue(), exception)
