@@ -1,4 +1,4 @@
-"""Tutorial, cookbook, how-to pages and theory are run from top to bottom; what they print stands there."""
+"""The first page, tutorial, cookbook, how-to pages and theory are run from top to bottom; what they print stands there."""
 
 import contextlib
 import io
@@ -16,6 +16,7 @@ from modelica_like.netlist import library_types
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [
+    DOCS / "README.md",
     DOCS / "tutorial.md",
     DOCS / "cookbook.md",
     DOCS / "modelica_text.md",
