@@ -1,4 +1,4 @@
-"""The first page, tutorial, cookbook, how-to pages and theory are run from top to bottom; what they print stands there."""
+"""First page, tutorial, cookbook, how-to pages and theory are run from top to bottom; what they print stands there."""
 
 import contextlib
 import io
