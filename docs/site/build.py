@@ -24,6 +24,9 @@ HERE = Path(__file__).resolve().parent
 DOCS = HERE.parent
 ROOT = DOCS.parent
 LINK = re.compile(r"\]\(([^)\s#]+)(#[^)\s]*)?\)")
+WIDE = ("README.md", "components/README.md")
+"""Pages without a list of their headings."""
+_WIDE = "---\nhide:\n  - toc\n---\n\n"
 KINDS = {".c": "c", ".h": "c", ".py": "python", ".toml": "toml"}
 """Endings of files that become pages, and their languages."""
 
@@ -42,7 +45,8 @@ def main() -> None:
     for file in pages.glob("notebooks/*.ipynb"):
         _write_notebook(file)
     for page in pages.rglob("*.md"):
-        page.write_text(_inside(page, pages, outside), encoding="utf-8")
+        wide = _WIDE if page.relative_to(pages).as_posix() in WIDE else ""
+        page.write_text(wide + _inside(page, pages, outside), encoding="utf-8")
     for file in outside:
         _write_source(file, pages)
     paths = os.pathsep.join(filter(None, [str(HERE), os.environ.get("PYTHONPATH", "")]))

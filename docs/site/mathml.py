@@ -18,8 +18,8 @@ _INLINE = r"(?<![\\$\w])\$(?![\s$])([^$\n]*?[^$\s\\])\$(?![\w$])"
 
 def mathml(latex: str, display: str) -> str:
     """Return LaTeX as MathML; `display` is block or inline."""
-    # A row of equations ends with \\cr where Markdown would eat a double backslash.
-    return convert(latex.replace("\\cr", "\\\\"), display=display)
+    # A row of equations ends with \\cr where Markdown would eat a double backslash; the converter knows `split` only.
+    return convert(latex.replace("\\cr", "\\\\").replace("{aligned}", "{split}"), display=display)
 
 
 class _Inline(InlineProcessor):

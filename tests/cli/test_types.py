@@ -78,11 +78,25 @@ def test_nothing_in_equations_is_left_undefined(name: str) -> None:
     source = Source(library_types()[name])
     lines = [line.strip() for some in statements(source.kind).values() for line in some]
     defined = {re.split(r"[(:= ]", line)[0] for line in lines}
+    fields = {*source.kind._class_fields, *source.kind._class_modes, *source.kind._structural}
     for line in lines:
         words = set(re.findall(r"(?<![\w.'])[A-Za-z_]\w*\b(?!=[^=])", line))
-        methods = {word for word in words if source.method(word)} - set(source.kind._class_fields)
+        methods = {word for word in words if source.method(word) or source.method(f"_{word}")} - fields
         assert methods <= defined, line
+        assert not re.search(r"(?<![\w'])_\w|\._\w", line), line
         assert not re.search(r"\bself\.|\bsuper\(|\byield\b", line)
+
+
+def test_private_names_have_no_underscore_and_meet_no_other() -> None:
+    text = called(["describe", "Clutch"]).stdout
+    assert re.search(r"^ +soon\(\) = slip \+ creep_time \* der\(slip\) *$", text, re.MULTILINE)
+    assert re.search(r"^ +FAINT = 1e-10 *$", text, re.MULTILINE)
+    for kind in library_types().values():
+        source = Source(kind)
+        public = {*kind._class_fields, *kind._class_modes, *kind._structural, *kind._class_connectors}
+        private = {name for base in kind.__mro__ for name in vars(base) if re.match("_[a-z]", name)}
+        assert [name for name in private if source.method(name) and name.lstrip("_") in public] == []
+        assert [name for name in private if source.method(name) and source.method(name.lstrip("_"))] == []
 
 
 def test_conditions_parts_and_codes_are_told() -> None:

@@ -4,18 +4,21 @@ import ast
 import re
 from collections import Counter
 from pathlib import Path as File
+from xml.etree import ElementTree
 
 import pytest
 from calls import called
 
-from components import PI, Clutch, OneWayClutch
+from components import PI, Clutch, OneWayClutch, SeriesDCMachine, ThermalMass
 from components.interfaces import Flange
 from modelica_like.language import (
     Component,
     Equations,
     Events,
     Expr,
+    Input,
     Mode,
+    Output,
     Parameter,
     Variable,
     column,
@@ -25,8 +28,9 @@ from modelica_like.language import (
     var,
 )
 from modelica_like.language import rows as table_rows
-from modelica_like.netlist import library_types
+from modelica_like.netlist import library_types, loads
 from modelica_like.show.report.component_pages import latex_names
+from modelica_like.show.report.component_pages.index import domain
 from modelica_like.show.report.component_pages.latex import Path, Unwritable
 from modelica_like.show.report.component_pages.library import component_pages, examples_by_type
 from modelica_like.show.report.component_pages.page import page
@@ -48,10 +52,47 @@ def test_every_type_occurs_in_an_example() -> None:
 
 def test_every_page_says_everything(pages: dict[File, str]) -> None:
     for name, kind in library_types().items():
-        text = next(page for file, page in pages.items() if file.stem == name)
+        text = next(page for file, page in pages.items() if file.name == f"{name}.md")
         declared = [*kind._class_fields, *kind._class_connectors, *kind._class_modes, *kind._structural]
         assert [one for one in declared if f"| `{one}` |" not in text] == []
-        assert "## Equations" in text or "## Parts" in text
+        assert "<summary>Equations</summary>" in text or "## Parts" in text
+
+
+def test_a_page_begins_with_symbol_example_and_parameters(pages: dict[File, str]) -> None:
+    for name, kind in library_types().items():
+        text = next(page for file, page in pages.items() if file.name == f"{name}.md")
+        symbol, example, first = text.index("![symbol of"), text.index("```toml"), text.index("\n## ")
+        assert symbol < example < first
+        if any(isinstance(field, Parameter) for field in kind._class_fields.values()):
+            assert text[first:].startswith("\n## Parameters\n")
+        (line,) = re.findall(r"```toml\n(.*)\n```", text)
+        assert isinstance(next(iter(loads(f"[parts]\n{line}\n").parts.values())), kind)
+
+
+def test_every_page_has_its_symbol_with_all_leads(pages: dict[File, str]) -> None:
+    for name, kind in library_types().items():
+        drawing = ElementTree.fromstring(next(text for file, text in pages.items() if file.name == f"{name}.svg"))
+        signals = [one for one in kind._class_fields.values() if isinstance(one, Input | Output)]
+        ends = [one for one in kind._class_connectors.values() if not one.optional]
+        leads = [one for one in drawing.iter() if one.get("class", "").startswith("on-") and one.get("stroke")]
+        assert len(leads) == len(signals) + len(ends), name
+        assert (float(drawing.get("width", 0)) < 400, float(drawing.get("height", 0)) < 200) == (True, True)
+
+
+def test_the_index_has_every_type_once_by_what_it_connects(pages: dict[File, str]) -> None:
+    text = pages[FOLDER / "README.md"]
+    tiles = re.findall(r"^- !\[\]\(([^)]+)\.svg\) \[(\w+)\]\(([^)]+)\.md\) \S", text, re.MULTILINE)
+    assert sorted(name for _, name, _ in tiles) == sorted(library_types())
+    assert all(picture == page for picture, _, page in tiles)
+    assert (domain(Clutch), domain(PI), domain(ThermalMass)) == ("shaft", "signals", "heat")
+    assert domain(SeriesDCMachine) == "circuit and shaft"
+
+
+def test_what_is_long_is_closed_at_first(pages: dict[File, str]) -> None:
+    clutch, inertia = (next(text for file, text in pages.items() if file.name == f"{name}.md")
+                       for name in ("Clutch", "Inertia"))  # fmt: skip
+    assert '<details id="equations" markdown="1">' in clutch
+    assert '<details id="equations" markdown="1" open>' in inertia
 
 
 def test_links_of_the_pages_lead_somewhere(pages: dict[File, str]) -> None:
@@ -67,7 +108,7 @@ def test_links_of_the_pages_lead_somewhere(pages: dict[File, str]) -> None:
 
 def test_source_links_name_the_line_of_the_class(pages: dict[File, str]) -> None:
     for name, kind in library_types().items():
-        file, text = next((file, page) for file, page in pages.items() if file.stem == name)
+        file, text = next((file, page) for file, page in pages.items() if file.name == f"{name}.md")
         link, line = re.findall(r"\(([^)#]+)#L(\d+)\)", text)[0]
         source = (file.parent / link).resolve().read_text(encoding="utf-8").splitlines()
         assert source[int(line) - 1].startswith(f"class {kind.__name__}(")

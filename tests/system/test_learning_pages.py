@@ -1,4 +1,4 @@
-"""Tutorial, cookbook, how-to pages and theory are run from top to bottom; what they print stands there."""
+"""First page, tutorial, cookbook, how-to pages and theory are run from top to bottom; what they print stands there."""
 
 import contextlib
 import io
@@ -15,6 +15,7 @@ from modelica_like.show.explorer import Explorer
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [
+    DOCS / "README.md",
     DOCS / "tutorial.md",
     DOCS / "cookbook.md",
     DOCS / "modelica_text.md",

@@ -11,7 +11,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.equation import Connection
 from modelica_like.language.expr import Symbol
-from modelica_like.language.fields import Output
+from modelica_like.language.fields import Input, Output
 from modelica_like.language.icon import PLAIN, SIGNAL, Icon, Side, Stroke
 
 _USUAL: dict[str, Side] = {
@@ -140,6 +140,24 @@ def diagram(component: Component, depth: int, notes: Notes | None = None) -> Dia
         (port,) = node.ports.values()
         node.border = _OPPOSITE[port.side]
     return made
+
+
+def alone(kind: type[Component]) -> Node:
+    """Return a component type as a node, with the connectors that it always has and its signals as ports."""
+    node = Node("", None, kind.icon)
+    for name, connector in kind._class_connectors.items():
+        if not connector.optional:
+            side, along = _place(kind.icon, name, 0)
+            node.ports[name] = Port(name, node, side, along, connector.stroke or PLAIN)
+    for name, one in kind._class_fields.items():
+        if isinstance(one, Input | Output):
+            drives = 1 if isinstance(one, Output) else -1
+            side, along = _place(kind.icon, name, drives)
+            node.ports[name] = Port(name, node, side, along, SIGNAL, drives)
+    if node.icon is None:
+        _box(node)
+    _spread(node)
+    return node
 
 
 def _opens(part: Component, depth: int) -> bool:

@@ -50,8 +50,8 @@ def text_width(text: str, size: float) -> float:
 
 
 def labels(node: Node) -> list[tuple[str, float]]:
-    """Return the texts below a symbol: its name, and one value or its notes."""
-    written = [(_shortened(node.name), NAME)]
+    """Return the texts below a symbol: its name if it has one, and one value or its notes."""
+    written = [(_shortened(node.name), NAME)] if node.name else []
     if node.notes is not None:
         return written + [(note, VALUE) for note in node.notes]
     if node.icon and node.component:

@@ -178,7 +178,7 @@ def _measure(node: Node) -> Placed:
     elif node.icon:
         half = node.icon.width / 2, node.icon.height / 2
     else:
-        half = _box_size(node)
+        half = box_size(node)
     exits, north, south = dict[Port, float](), half[1], half[1]
     west = east = half[0]
     for port in node.ports.values():
@@ -207,8 +207,8 @@ def _measure(node: Node) -> Placed:
     return Placed(node, half, (-max(west, wide) - 2, -north, max(east, wide) + 2, south), exits, inner, above)
 
 
-def _box_size(node: Node) -> Point:
-    """Half the size of a box with the names of its ports inside."""
+def box_size(node: Node) -> Point:
+    """Return half the size of a box with the names of its ports inside."""
     wide = {
         side: max((text_width(port.name, VALUE) for port in node.ports.values() if port.side == side), default=0.0)
         for side in ("W", "E")

@@ -1,7 +1,7 @@
 """Equations, events and energies of a component type as lines of text, read from its source: nothing is left out.
 
 Methods of the base classes stand in the place of their calls, conditions and loops keep their form, and the methods
-that occur in formulas are defined below them.
+that occur in formulas are defined below them. Names that are private to a class or a module lose their underscore.
 """
 
 from __future__ import annotations
@@ -36,22 +36,28 @@ def statements(kind: type[Component]) -> dict[str, list[str]]:
         for name in missing:
             done.add(name)
             where += reader.defined(reader.found[name], name)
-    where += [f"{name} = {value:g}" for name, value in reader.numbers.items()]
+    where += [f"{shown(name)} = {value}" for name, value in reader.constants.items()]
     return {title.replace("_", " "): lines for title, lines in {**made, "where": where}.items() if lines}
 
 
+def shown(name: str) -> str:
+    """Return a name, or the last one of a path, without the underscore that makes it private."""
+    owner, dot, last = name.rpartition(".")
+    return f"{owner}{dot}{last.lstrip('_') or last}"
+
+
 class _Reader:
-    """Reads the methods of a class; `found` are methods and functions in formulas, `numbers` are constants."""
+    """Reads the methods of a class; `found` are methods and functions in formulas, `constants` those of modules."""
 
     def __init__(self, kind: type[Component]) -> None:
         self.source = Source(kind)
         self.found: dict[str, Function] = {}
-        self.numbers: dict[str, float] = {}
+        self.constants: dict[str, str] = {}
 
     def defined(self, of: Function, name: str = "") -> list[str]:
         """Return the definition of a method or a function."""
         arguments = ", ".join(one.arg for one in of.code.args.args if one.arg != "self")
-        head = name or of.name
+        head = shown(name or of.name)
         head += "" if isinstance(vars(of.owner or object).get(of.name), property) else f"({arguments})"
         lines = list(self.body(of, of.code.body, {}))
         if len(lines) == 1 and lines[0].startswith("return "):
@@ -161,21 +167,30 @@ class _Replace(ast.NodeTransformer):
         if _is_own(meant):
             self._reader.found.setdefault(node.id, plain_function(node.id, meant))
         elif isinstance(meant, float):
-            self._reader.numbers[node.id] = meant
-        return node
+            self._reader.constants[node.id] = f"{meant:g}"
+        elif node.id.startswith("_") and isinstance(meant, int | str | tuple):
+            self._reader.constants[node.id] = repr(meant)
+        return ast.Name(shown(node.id)) if node.id in self._of.constants else node
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        match node:
+            case ast.Call(func=ast.Name(id="getattr"), args=[ast.Name(id="self"), ast.Constant(value=str(name))]):
+                return ast.Name(name)
+            case _:
+                return self.generic_visit(node)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         match node.value:
             case ast.Name(id="self"):
                 if (found := self._reader.source.method(node.attr)) is not None:
                     self._reader.found.setdefault(node.attr, found)
-                return ast.Name(node.attr)
+                return ast.Name(shown(node.attr))
             case ast.Call(func=ast.Name(id="super")):
                 found = self._reader.source.method(node.attr, self._of.owner)
                 name = f"{found.owner.__name__}.{node.attr}" if found and found.owner else node.attr
                 if found is not None:
                     self._reader.found.setdefault(name, found)
-                return ast.Name(name)
+                return ast.Name(shown(name))
             case _:
                 return self.generic_visit(node)  # type: ignore[return-value]
 

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from importlib import import_module
-from inspect import cleandoc
 from pathlib import Path
 from typing import Any, cast
 
 from modelica_like.errors import NetlistError
-from modelica_like.language import Component
 from modelica_like.netlist.document import parse, read_text
 from modelica_like.netlist.registry import find_type, library_types
-from modelica_like.show.report.component_pages.markdown import module_title, place, table
-from modelica_like.show.report.component_pages.page import Example, page
-from modelica_like.show.report.types import summary
+from modelica_like.show.draw.symbol import symbol
+from modelica_like.show.report.component_pages.index import index
+from modelica_like.show.report.component_pages.markdown import place
+from modelica_like.show.report.component_pages.page import Example, page, simplicity, symbol_file
 from modelica_like.writing import write_text
 
 INDEX = "README.md"
 
 
 def component_pages(folder: Path, examples: Path | None = None, types: Sequence[str] | None = None) -> dict[Path, str]:
-    """Return pages about component types by file.
+    """Return pages about component types by file, with their symbols.
 
     Args:
         folder: of the pages.
@@ -35,12 +35,16 @@ def component_pages(folder: Path, examples: Path | None = None, types: Sequence[
     kinds = {name: find_type(name) for name in types} if types else library_types()
     occurrences = examples_by_type(examples) if examples else {}
     pages = {folder / place(kind): (name, kind) for name, kind in kinds.items()}
-    index = {} if types else {folder / INDEX: _index(kinds)}
-    return index | {file: page(kind, file, occurrences.get(name, ())) for file, (name, kind) in pages.items()}
+    made = {} if types else {folder / INDEX: index(kinds)}
+    made |= {file: page(kind, file, occurrences.get(name, ())) for file, (name, kind) in pages.items()}
+    return made | {symbol_file(file): symbol(kind) for file, (_, kind) in pages.items()}
 
 
 def write_component_pages(folder: Path, examples: Path | None = None, types: Sequence[str] | None = None) -> list[Path]:
     """Write pages about component types, see `component_pages`; other files in the folder are not touched.
+
+    Returns:
+        The files of the pages, without those of their symbols.
 
     Raises:
         OSError: a file cannot be written.
@@ -48,7 +52,7 @@ def write_component_pages(folder: Path, examples: Path | None = None, types: Seq
     pages = component_pages(folder, examples, types)
     for file, content in pages.items():
         write_text(file, content)
-    return list(pages)
+    return [file for file in pages if file.suffix == ".md"]
 
 
 def examples_by_type(folder: Path) -> dict[str, list[Example]]:
@@ -58,47 +62,47 @@ def examples_by_type(folder: Path) -> dict[str, list[Example]]:
     """
     if not folder.is_dir():
         raise NetlistError(f"There is no folder '{folder}' with examples.", advice="Name a folder of netlists.")
-    found: dict[str, dict[Path, Example]] = {}
+    found: dict[str, list[Example]] = {}
     contents = {file: read_text(file) for file in folder.rglob("*.toml")}
     for file in sorted(contents, key=lambda file: (len(contents[file]), file)):
         if "[parts" in contents[file]:
             netlist = parse(contents[file], str(file))
-            for part in _parts(netlist.parts):
-                example = Example(file, netlist.description or netlist.name)
-                found.setdefault(part["is"], {}).setdefault(file, example)
-    return {name: list(examples.values()) for name, examples in found.items()}
+            for name, part in _parts("", netlist.parts):
+                example = Example(file, netlist.description or netlist.name, f"{name} = {_inline(part)}")
+                found.setdefault(part["is"], []).append(example)
+    return {name: _once(examples) for name, examples in found.items()}
 
 
-def _parts(table: Any) -> Iterator[Mapping[str, Any]]:
-    """Yield all tables that are parts, at any depth."""
+def _once(examples: Sequence[Example]) -> list[Example]:
+    """Return one example per file, with its simplest line."""
+    files: dict[Path, list[Example]] = {}
+    for one in examples:
+        files.setdefault(one.path, []).append(one)
+    return [min(of, key=lambda one: simplicity(one.line)) for of in files.values()]
+
+
+def _parts(name: str, table: Any) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield all tables that are parts, at any depth, with their names."""
     if isinstance(table, dict):
         inner = cast("dict[str, Any]", table)
         if isinstance(inner.get("is"), str):
-            yield inner
-        for value in inner.values():
-            yield from _parts(value)
+            yield name, inner
+        for key, value in inner.items():
+            yield from _parts(key, value)
     elif isinstance(table, list):
         for value in cast("list[Any]", table):
-            yield from _parts(value)
+            yield from _parts(name, value)
 
 
-def _index(types: Mapping[str, type[Component]]) -> str:
-    modules: dict[str, list[str]] = {}
-    for name, kind in types.items():
-        modules.setdefault(kind.__module__, []).append(name)
-    sections = [
-        "# Components",
-        f"{len(types)} component types, by machine element. These pages are generated from the declarations.",
-        " · ".join(
-            f"[{module_title(module)}](#{module_title(module).replace(' ', '-')})" for module in sorted(modules)
-        ),
-    ]
-    for module, members in sorted(modules.items()):
-        text = cleandoc(import_module(module).__doc__ or "").partition("\n\n")[0]
-        sections += [f"## {module_title(module)}", text, _rows(types, members)]
-    return "\n\n".join(sections) + "\n"
+def _inline(value: Any) -> str:
+    """Return a value as TOML in one line."""
+    if isinstance(value, dict):
+        entries = cast("dict[str, Any]", value).items()
+        return "{ " + ", ".join(f"{_key(key)} = {_inline(one)}" for key, one in entries) + " }"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_inline, cast('list[Any]', value)))}]"
+    return json.dumps(value, ensure_ascii=False)
 
 
-def _rows(types: Mapping[str, type[Component]], members: Sequence[str]) -> str:
-    rows = ((f"[{name}]({place(types[name]).as_posix()})", summary(types[name])) for name in members)
-    return table("", ("type", "what it is"), rows)
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[\w-]+", key, re.ASCII) else json.dumps(key)

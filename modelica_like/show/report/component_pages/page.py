@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -27,33 +28,79 @@ _WIDE = 110
 """Characters of LaTeX beyond which a sum gets a line per term."""
 
 
+_WITH_A_VALUE = 3
+"""Equals signs in a line that gives a value: one for the part, one for its type, one for the value."""
+_LONG = 700
+"""Characters of Markdown beyond which a section is closed at first."""
+_FEW = 5
+"""Netlists that are listed at once."""
+_FIRST = ("parameters", "inputs", "structure")
+"""Listings of what is given to a part; they come first."""
+
+
 class Example(NamedTuple):
-    """A netlist in which a type occurs, and its description."""
+    """A netlist in which a type occurs, its description, and the line of the part."""
 
     path: Path
     title: str
+    line: str = ""
 
 
 def page(kind: type[Component], file: Path, examples: Sequence[Example] = ()) -> str:
-    """Return the page of a component type with the netlists in which it occurs; links are relative to its file."""
+    """Return the page of a component type: symbol, an example line, what is given to it, then all the rest.
+
+    Args:
+        kind: the type.
+        file: of the page; links are relative to it. Its symbol is beside it, see `symbol_file`.
+        examples: netlists in which the type occurs.
+    """
     source = Source(kind)
     equations, events = (written(source.says(name)) for name in ("equations", "events"))
     energy = written(source.energy())
     definitions = written(source.definitions())
+    listings = {title: table("", head, rows) for title, head, rows in declared(kind, _notation(_optional(source)))}
+    first = {title: listings.pop(title) for title in _FIRST if title in listings}
     sections = [
         f"# {kind.__name__}",
         f"[All components](../README.md) · {module_title(kind.__module__)} · {source_link(kind, file)}",
+        f"![symbol of {kind.__name__}]({symbol_file(file).name})",
         markdown(inspect.cleandoc(kind.__doc__ or "")),
-        *(table(title.capitalize(), head, rows) for title, head, rows in declared(kind, _notation(_optional(source)))),
+        *_example_line(examples),
+        *(f"## {title.capitalize()}\n\n{text}" for title, text in {**first, **listings}.items()),
         *_parts(kind),
-        equations and f"## Equations\n\n{equations}",
-        definitions and f"where\n\n{definitions}",
-        events and f"## Events\n\n{events}",
-        energy and f"## Energy\n\n{energy}",
+        _folded("Equations", equations and (f"{equations}\n\nwhere\n\n{definitions}" if definitions else equations)),
+        _folded("Events", events),
+        _folded("Energy", energy),
         *_example_links(examples, file),
         *_bases(kind, file),
     ]
     return "\n\n".join(section for section in sections if section) + "\n"
+
+
+def symbol_file(file: Path) -> Path:
+    """Return the file of a page's symbol."""
+    return file.with_suffix(".svg")
+
+
+def _folded(title: str, text: str) -> str:
+    """Return a section that can be closed, and is at first where it is long."""
+    if not text:
+        return ""
+    opened = "" if len(text) > _LONG else " open"
+    name = title.lower().replace(" ", "-")
+    return f'<details id="{name}" markdown="1"{opened}>\n<summary>{title}</summary>\n\n{text}\n\n</details>'
+
+
+def _example_line(examples: Sequence[Example]) -> list[str]:
+    """Return the shortest part that shows values of its own."""
+    lines = [one.line for one in examples if one.line]
+    return [f"```toml\n{min(lines, key=simplicity)}\n```"] if lines else []
+
+
+def simplicity(line: str) -> tuple[bool, bool, int]:
+    """Plain values come before formulas, some values before none, and few before many."""
+    formula = any(text and text[0].isalpha() for text in re.findall(r'= "([^"]*)"', line)[1:])
+    return formula, line.count("=") < _WITH_A_VALUE, len(line)
 
 
 def _notation(optional: Mapping[str, str]) -> Notation:
@@ -94,17 +141,18 @@ def _bases(kind: type[Component], file: Path) -> list[str]:
     """Return the docstrings of the bases, with the physics common to several types."""
     bases = [base for base in kind.__mro__[1:] if issubclass(base, Component) and base is not Component]
     texts = [
-        f"### {base.__name__}\n\n{source_link(base, file)}\n\n{markdown(inspect.cleandoc(base.__doc__ or ''))}"
+        f"**{base.__name__}** · {source_link(base, file)}\n\n{markdown(inspect.cleandoc(base.__doc__ or ''))}"
         for base in bases
     ]
-    return ["## What it extends", *texts] if texts else []
+    return [_folded("What it extends", "\n\n".join(texts))]
 
 
 def _example_links(examples: Sequence[Example], file: Path) -> list[str]:
     if not examples:
         return []
-    links = (f"- [{one.path.name}]({relative(one.path, file)}): {cell(one.title)}" for one in examples)
-    return ["## In netlists\n\n" + "\n".join(links)]
+    links = [f"- [{one.path.name}]({relative(one.path, file)}): {cell(one.title)}" for one in examples]
+    more = _folded(f"{len(links) - _FEW} more netlists", "\n".join(links[_FEW:]))
+    return ["## In netlists", "\n".join(links[:_FEW]), more]
 
 
 # -- content of a class
