@@ -10,6 +10,7 @@ import os
 import re
 import sys
 from pathlib import Path
+from shutil import which
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
@@ -27,9 +28,10 @@ class RuntimeHook(BuildHookInterface):  # pyright: ignore[reportMissingTypeArgum
     """Compiles the run-time before a wheel, or an editable install, is made."""
 
     def dependencies(self) -> list[str]:
-        """FMPy has the headers of the standard, zig compiles for other platforms."""
+        """FMPy has the headers of the standard; zig compiles for other platforms, and where there is no compiler."""
         release = os.environ.get("MODELICA_LIKE_PLATFORMS", "none") != "none"
-        return ["fmpy>=0.3.20", *(["ziglang>=0.13"] if release else [])]
+        compiler = os.environ.get("CC") or any(map(which, ("cc", "gcc", "clang")))
+        return ["fmpy>=0.3.20", *(["ziglang>=0.13"] if release or not compiler else [])]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile, and tell hatch what to take along. Frontends that ask for the metadata first call this twice."""

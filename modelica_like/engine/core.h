@@ -277,6 +277,7 @@ size_t piece_size(const Model *m);
 void piece_at(const Model *m, const Piece *piece, double t, double *point);
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
+Result pass_instant(Instance *c, unsigned char *wanting, int located);
 Result handle_event(Instance *c);
 Result finish(Instance *c);
 Result check_whole(Instance *c, double size);

@@ -6,8 +6,8 @@
 #define ALONE 6    /* further rounds per motion that may be held, in which only one fires */
 #define BALANCED 1e-3
 #define SAME_TIME 1e-12
-#define LATER 1e3     /* as in penetration.py: time resolutions, for the difference of a rate */
-#define CONVERGES 0.9 /* as in instants.py: length of a crowd over the one before */
+#define LATER 1e3     /* time resolutions, for the difference of a rate: what turns round in less is at rest */
+#define CONVERGES 0.9 /* length of a crowd over the one before: rebounds come to their end, chattering does not */
 #define CROWDED 1e-6  /* of the run: in less time, CROWD further instants follow each other ever faster */
 
 /* A guard that is not a number is false; what is nothing but rounding is zero. */
@@ -269,8 +269,10 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     return fail(c, STILL_SWITCHING, rounds, c->state.t, last);
 }
 
-/* An error if a relation became true and stays true, because what it sets is at rest and is turned back too late: as in
-   penetration.py. `before`: guards and rates before the instant; its modes are in d_begun. */
+/* An error if a relation became true and stays true, because what it sets is at rest and is turned back too late: a
+   ball rebounds ever more slowly, until the acceleration a of the guard turns it back within few time resolutions. With
+   value g and rate r < 0 after that, g - r^2 / 2a is the least value that comes; above zero the relation fires no more,
+   and the ball falls through the floor. `before`: guards and rates before the instant; its modes are in d_begun. */
 Result check_turned_back(Instance *c, const double *before) {
     const Model *m = c->model;
     double step = LATER * TIME_RESOLUTION * fmax(1, fabs(c->state.t)), *now = c->guards_before;

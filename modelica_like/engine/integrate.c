@@ -246,13 +246,23 @@ Result take_changes(Instance *c) {
     return leave_instant(c, 1);
 }
 
+/* Fires what wants to fire at this instant, and what follows; its states before are left in `first`. */
+Result pass_instant(Instance *c, unsigned char *wanting, int located) {
+    int whens = c->model->n_updates > 0 && c->model->n_guards > 0;
+    size_t size = (size_t)c->model->n_x * sizeof(double);
+    if (whens) evaluate_now(c, &c->model->tapes.guards, c->looks);
+    memcpy(c->first, c->x, size);
+    memcpy(c->d_begun, c->d, (size_t)c->model->n_d * sizeof(double));
+    if (!iterate_events(c, wanting, located)) return RESULT_ERROR;
+    return whens && memcmp(c->first, c->x, size) != 0 ? check_turned_back(c, c->looks) : RESULT_OK;
+}
+
 static Result pass_event(Instance *c) {
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
-    int whens = c->model->n_updates > 0 && c->model->n_guards > 0;
     int located = s->event_pending, ticks = !located && (c->model->n_moments > 0 || delays_due(c));
     size_t size = (size_t)c->model->n_x * sizeof(double);
-    double *x = c->first, *rates = c->first_rates, step = s->step, events = s->n_events;
+    double *rates = c->first_rates, step = s->step, events = s->n_events;
     if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
@@ -260,14 +270,10 @@ static Result pass_event(Instance *c) {
     s->z_valid = 0;
     if (!settle(c) || !reach_instant(c)) return RESULT_ERROR;
     if (ticks) evaluate_now(c, &c->model->tapes.rates, rates);
-    if (whens) evaluate_now(c, &c->model->tapes.guards, c->looks);
-    memcpy(x, c->x, size);
-    memcpy(c->d_begun, c->d, (size_t)c->model->n_d * sizeof(double));
-    if (!iterate_events(c, wanting, located)) return RESULT_ERROR;
-    if (whens && memcmp(x, c->x, size) != 0 && !check_turned_back(c, c->looks)) return RESULT_ERROR;
+    if (!pass_instant(c, wanting, located)) return RESULT_ERROR;
     s->z_valid = 1;
     if (!leave_instant(c, s->n_events != events)) return RESULT_ERROR;
-    if (!ticks || memcmp(x, c->x, size) != 0) return RESULT_OK;
+    if (!ticks || memcmp(c->first, c->x, size) != 0) return RESULT_OK;
     evaluate_now(c, &c->model->tapes.rates, c->rhs);
     if (memcmp(rates, c->rhs, size) == 0) s->step = step; /* a tick without effect on what moves */
     return RESULT_OK;

@@ -147,15 +147,18 @@ Result instance_begin(Instance *c) {
 /* Finds the start from the model's start values and from those that were set. */
 EXPORTED int native_begin(Native *n) { return code(!start_solve(n->c) ? RESULT_ERROR : instance_begin(n->c)); }
 
-/* Begins at states, implicit unknowns and d that are given; events there have not happened yet. */
-EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const double *d) {
-    Instance *c = n->c;
+static void go_to(Instance *c, const double *x, const double *z, const double *d) {
     memcpy(c->x, x, (size_t)c->model->n_x * sizeof(double));
     memcpy(c->z, z, (size_t)c->model->n_z * sizeof(double));
     memcpy(c->d, d, (size_t)c->model->n_d * sizeof(double));
     c->state.solved = 1;
     c->state.z_valid = c->variables_valid = 0;
-    return code(instance_begin(c));
+}
+
+/* Begins at states, implicit unknowns and d that are given; events there have not happened yet. */
+EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const double *d) {
+    go_to(n->c, x, z, d);
+    return code(instance_begin(n->c));
 }
 
 /* The states after the events that come first; with other ones, if these are `given`. Those may move what modes hold:
@@ -255,6 +258,30 @@ static int instant(Native *n, NativeRun *r, double width) {
     r->first = r->n_points;
     r->n_segments++;
     return write_point(n, r);
+}
+
+/* An instant for a program that integrates by itself: `located` transitions fire, and what follows. The point becomes
+ * the one after it; `run` gets the events and impacts, all or, where they have no room, none. */
+EXPORTED int native_instant(
+    Native *n, double t, const unsigned char *located, double *x, double *z, double *d, NativeRun *run) {
+    Instance *c = n->c;
+    const Model *m = c->model;
+    run->n_events = run->n_impacts = n->strikes = 0;
+    n->run = run;
+    c->noted = note_event;
+    c->struck = note_impact;
+    c->state.phase = PHASE_STEP;
+    if (!state_copy_out(c, &n->before)) return NATIVE_FAILED;
+    c->state.t = t;
+    go_to(c, x, z, d);
+    Result result = settle(c) && pass_instant(c, memcpy(c->wishes, located, m->n_transitions), 1);
+    n->run = NULL;
+    if (run->n_events > run->room_events || run->n_impacts > run->room_impacts)
+        return code(state_copy_in(c, n->before)) == NATIVE_OK ? NATIVE_MORE : NATIVE_FAILED;
+    memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
+    memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
+    memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
+    return code(result);
 }
 
 /* Notes the step that has just been taken. */

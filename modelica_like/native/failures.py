@@ -10,7 +10,7 @@ from modelica_like.errors import Chattering, InitializationError, ModelicaLikeEr
 from modelica_like.language.fields import out_of_range
 from modelica_like.native.codes import WORDED, Code
 from modelica_like.options import Options
-from modelica_like.solve.endless import SWITCHING, chattering, not_settled
+from modelica_like.solve.endless import SWITCHING, chattering, not_settled, stays_true
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.initialize import (
     Point,
@@ -29,7 +29,6 @@ from modelica_like.solve.initialize import (
     unsettled,
 )
 from modelica_like.solve.instants import limit_passed
-from modelica_like.solve.penetration import stays_true
 from modelica_like.solve.recorder import Event
 
 

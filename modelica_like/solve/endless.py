@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modelica_like.compile.compiled import CompiledDae
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import Chattering
 from modelica_like.options import OnChattering
 from modelica_like.solve.initialize import Point, call
@@ -27,6 +27,10 @@ _CANNOT = {
     ),
     "rest": " Nothing comes to rest: that takes impacts of a mode that holds a motion, with a restitution.",
 }
+_LET_IT_REST = (
+    "Let it rest: a mode that holds the motion, with a restitution (docs/language.md, what a mode holds), or a "
+    "smallest speed below which `when` sets zero and a mode keeps it."
+)
 SWITCHING = "Modes still switch after {} rounds at one instant"
 """Why modes are told to chatter."""
 
@@ -65,4 +69,14 @@ def not_settled(model: CompiledDae, now: Point, rounds: int) -> Chattering | Non
         f"Discrete variables do not settle at t = {now.t:.9g} s: {names} still {change} after {rounds} rounds.",
         where=[row.source for row in rows if row.source.file][:3],
         advice="An equation like n == pre(n) + 1 never equals its pre(…): count in a `when`.",
+    )
+
+
+def stays_true(model: CompiledDae, now: Point, transition: CompiledTransition) -> Chattering:
+    """Return the error of a relation that stays true."""
+    return Chattering(
+        f"At {now.t:.9g} s the condition of {model.flat_discretes[transition.mode].path} stays true: what is set there "
+        "is at rest, and would pass without another event.",
+        where=[transition.source],
+        advice=_LET_IT_REST,
     )

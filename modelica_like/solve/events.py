@@ -70,7 +70,7 @@ class EventLoop:
         self.integrator = Integrator(model, options, whole=self.pace.on_grid)
         self.passing = Passing(model, self.integrator)
         self.between = Between(self.integrator, self._closer)
-        self.instants = Instants(model, options, self.guards, self.record, end - start.t)
+        self.instants = Instants(model, options, self.record, start.t, end)
         self.ticks = Ticks(model, self.instants)
         self.delays = Delays(model, options, start, self.between)
 
