@@ -15,6 +15,7 @@ from modelica_like.solve.idas import Integrator
 from modelica_like.solve.initialize import (
     Point,
     StartKind,
+    call,
     contradiction,
     implicit_singular,
     mode_not_steady,
@@ -90,7 +91,7 @@ def _starts_contradict(one: Failure) -> ModelicaLikeError:
 
 
 def _start_not_met(one: Failure) -> ModelicaLikeError:
-    return not_met(one.model, one.point, one.place, one.numbers[0])
+    return not_met(one.model, call(one.model, one.model.variables, one.point), one.place, one.numbers[0])
 
 
 def _start_not_found(one: Failure) -> ModelicaLikeError:

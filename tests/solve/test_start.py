@@ -13,6 +13,7 @@ from modelica_like.compile.start_system import StartSystem
 from modelica_like.errors import ContradictingStart, InitializationError
 from modelica_like.flatten.model import INITIAL_EQUATION
 from modelica_like.solve.initialize import start as module
+from modelica_like.solve.initialize.contradictions import _coupled
 from modelica_like.solve.initialize.plan import StartPlan
 from modelica_like.solve.initialize.point import Point
 from modelica_like.solve.initialize.start import StartProblem, _Evaluation, _is_free_of_modes, _sizes, _solve, _Sorted
@@ -280,7 +281,7 @@ def test_a_start_value_that_others_determine_agrees(
     told = f"{INITIAL_EQUATION} x = y" if equation else f"z5 = {given:g}"
     would = "left minus right of the last one" if equation else "z5"
     assert caught.value.what == f"b = 8.5 and {told} contradict each other: {would} would be {actual:g}."
-    coupled = [k for k in range(10) if found._coupled(ENTRIES[5], StartEntry(k, None, "fixed"))]
+    coupled = [k for k in range(10) if _coupled(found.model, ENTRIES[5], StartEntry(k, None, "fixed"))]
     assert coupled == [1, 5, 6]
     found.model.starts = (*ENTRIES[:6], StartEntry(6, None, "fixed"), StartEntry(5, None, "fixed"))
     with pytest.raises(ContradictingStart, match=r"^b = 8\.5 and z6 = 7 and "):  # two of three are enough

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from modelica_like.compile.compiled import CompiledDae, StartEntry
+from modelica_like.compile.compiled import CompiledDae, StartEntry, Vector
 from modelica_like.errors import ContradictingStart, InitializationError
 from modelica_like.flatten.model import INITIAL_EQUATION
 from modelica_like.solve.initialize.plan import StartKind, StartPlan, start_name, start_plan
-from modelica_like.solve.initialize.point import Point, call, check_singular, solve_implicit
+from modelica_like.solve.initialize.point import Point, check_singular, solve_implicit
 
 
 def _valued(model: CompiledDae, entry: StartEntry, value: float) -> str:
@@ -47,16 +47,16 @@ def not_together(model: CompiledDae, plan: StartPlan) -> InitializationError:
     )
 
 
-def not_met(model: CompiledDae, point: Point, number: int, value: float) -> ContradictingStart:
+def not_met(model: CompiledDae, present: Vector, number: int, value: float) -> ContradictingStart:
     """Return the error of a start value that must follow from others but does not.
 
     Args:
         model: the compiled model.
-        point: the start with the others.
+        present: all variables at the start with the others.
         number: of the start value in `CompiledDae.starts`.
         value: what it should be.
     """
-    starts, present = model.starts, call(model, model.variables, point)
+    starts = model.starts
     entry = starts[number]
     fixed = [e for e in starts if e.strength == "fixed" and e is not entry and _coupled(model, entry, e)]
     partners, told = [_valued(model, e, present[e.node]) for e in fixed[:2]], _valued(model, entry, value)

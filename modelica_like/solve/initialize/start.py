@@ -142,9 +142,9 @@ class StartProblem:
         return not_together(self.model, plan)
 
     def _check_dependent(self, point: Point, number: int) -> None:
-        value, node = self.given[number], self.model.starts[number].node
-        if not abs(call(self.model, self.model.variables, point)[node] - value) <= _CONSISTENT * (1.0 + abs(value)):
-            raise not_met(self.model, point, number, value)
+        value, present = self.given[number], call(self.model, self.model.variables, point)
+        if not abs(present[self.model.starts[number].node] - value) <= _CONSISTENT * (1.0 + abs(value)):
+            raise not_met(self.model, present, number, value)
 
 
 class _Evaluation:
