@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from modelica_like import build, load, simulation_function
-from modelica_like.errors import ExportError, LanguageError, NoGradient
+from modelica_like.errors import LanguageError, NoGradient
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 INPUTS = ("clutch_torque", "load_torque")
@@ -61,14 +61,6 @@ def test_values_alone_need_no_replay_and_are_those_of_it() -> None:
     replayed = [one.value for one in function.at(point).outputs]
     assert (function.runs, differentiated) == (1, [1])
     assert alone == pytest.approx(replayed, rel=1e-7)
-
-
-def test_without_a_library_functions_take_idas(monkeypatch: pytest.MonkeyPatch) -> None:
-    def none() -> None:
-        raise ExportError("There is no C compiler.")
-
-    monkeypatch.setattr("modelica_like.native.model.library", none)
-    assert np.array(table()([90.0, 14.0])).ravel() == pytest.approx([J * w / 76, 90 * J * w**2 / 76 / 2], rel=1e-9)
 
 
 def test_adjoint_and_forward_products() -> None:

@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from modelica_like import Options, simulate
-from modelica_like.errors import ModelicaLikeError, StepFailed, ValueOutOfRange
-from modelica_like.language import Component, Equations, Variable, der, var
-from modelica_like.solve import options
+from modelica_like import Options, options, simulate
+from modelica_like.errors import ExportError, ModelicaLikeError, NotEnoughMemory, StepFailed, ValueOutOfRange
+from modelica_like.language import Component, Equations, Variable, der, var, where
+from modelica_like.native import model
 
 Check = Callable[[type[ModelicaLikeError], Callable[[], object], str], None]
 
@@ -23,6 +23,16 @@ class Swing(Component):
     def equations(self) -> Equations:
         yield der(self.x) == self.v
         yield der(self.v) == -1e14 * self.x
+
+
+class Stopping(Component):
+    """It stops after a second."""
+
+    units_checked = False
+    x: Variable = var("1", "position", state="always", default=0.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == where(self.time < 1, 1.0, 0.0)
 
 
 def test_steps_of_a_native_run_are_limited(check_message: Check) -> None:
@@ -51,3 +61,24 @@ def test_results_that_do_not_fit_are_told_before_the_run(
         "Take fewer points; `readings` are read off every step, whatever is written."
     )
     check_message(ValueOutOfRange, lambda: simulate(Swing(), 1e-6, points=10_000_000, solver=solver), text)
+
+
+def test_an_instance_without_memory(check_message: Check, monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = model.library()
+
+    class Full:
+        def __getattr__(self, name: str) -> Any:
+            return (lambda _: None) if name == "new" else getattr(loaded, name)
+
+    monkeypatch.setattr(model, "library", Full)
+    text = "There is not enough memory for an instance of Swing."
+    check_message(NotEnoughMemory, lambda: simulate(Swing(), 1e-6, solver="native"), text)
+
+
+def test_without_a_library_nothing_happens_at_an_instant(check_message: Check, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none() -> None:
+        raise ExportError("There is no C compiler.", advice="Install cc.")
+
+    monkeypatch.setattr(model, "library", none)
+    check_message(ExportError, lambda: simulate(Stopping(), 2.0), "There is no C compiler.\nInstall cc.")
+    assert simulate(Swing(), 1e-7).time[-1] == pytest.approx(1e-7)

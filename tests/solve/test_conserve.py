@@ -7,7 +7,7 @@ from components import Inertia
 from modelica_like import Options, build, simulate
 from modelica_like.errors import UnknownName, ValueOutOfRange
 from modelica_like.language import Component, Equations
-from modelica_like.solve import conserve
+from modelica_like.runs import conserve
 from modelica_like.solve.recorder import Segment
 
 STEPPED_OVER = """

@@ -11,8 +11,8 @@ import pytest
 
 from modelica_like.errors import StepFailed
 from modelica_like.options import Options
+from modelica_like.runs import powers
 from modelica_like.runs.powers import _BESIDE, Powers, Results, _mixing, _together
-from modelica_like.solve import powers
 from modelica_like.solve.initialize import Point
 from modelica_like.solve.recorder import Segment
 
