@@ -346,7 +346,9 @@ class EventLoop:
         for g in sorted({one.guard for one in group}):
             (g0, g1), (r0, r1) = values[g, k : k + 2].tolist(), rates[g, k : k + 2].tolist()
             ends[g] = g0, g1, r0 * width, r1 * width
-        sure, fresh = depth >= _DEEPEST or width <= time_resolution(float(looks.times[k])), depth > 0
+        # Closer looks have to differ in time.
+        t = float(looks.times[k])
+        sure, fresh = depth >= _DEEPEST or t + width / _CLOSER <= t, depth > 0
         cell = next((one for one in looks.cells(k, k + 1) if sure or looks.is_sharp(one, ends, fresh=fresh)), None)
         if cell is None:
             return None, None

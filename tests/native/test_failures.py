@@ -52,7 +52,7 @@ from modelica_like.native import model
 from modelica_like.native.codes import WORDED, Code
 from modelica_like.native.failures import WRITTEN, Failure, error_of
 
-HEADER = Path(__file__).parents[2] / "modelica_like" / "fmi" / "templates" / "codes.h"
+HEADER = Path(__file__).parents[2] / "modelica_like/engine/codes.h"
 IMPORTERS = {
     Code.MISUSED, Code.START_SINGULAR, Code.TUNED_OUTSIDE_EVENTS, Code.NO_INPUT, Code.INPUT_RATE_NOT_FINITE,
     Code.NO_VARIABLE, Code.NOT_ENUMERATION,
@@ -243,7 +243,7 @@ def test_both_solvers_tell_the_same(code, codes):
         other()
     with pytest.raises(ModelicaLikeError) as found:
         make()
-    assert codes == [code]
+    assert set(codes) == {code}
     assert str(found.value) == str(expected.value)
     assert type(found.value) is type(expected.value)
 
@@ -253,7 +253,7 @@ def test_what_only_this_solver_tells(code, codes):
     kind, make, text = ALONE[code]
     with pytest.raises(ModelicaLikeError) as found:
         make()
-    assert codes == [code]
+    assert set(codes) == {code}
     assert type(found.value) is kind
     assert re.fullmatch(text, str(found.value)), str(found.value)
 
