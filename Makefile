@@ -14,9 +14,9 @@ BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 C := $(wildcard modelica_like/engine/*.[ch] fmus/*/*.[ch] tests/fmi/*.c tests/fmus/*/*.c)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-# Without a C compiler everything but the export of FMUs works; zig of the extra `dev` compiles for the tests.
-COMPILED := ls modelica_like/fmi/runtimes/* >/dev/null 2>&1 || echo "No C compiler was found: the run-time of FMUs is \
-compiled at first use. Install cc, gcc or clang, or zig by $(BIN)/pip install 'modelica-like[cross]'."
+# Without a C compiler zig compiles, which the build asks for; the extra `dev` has it for the tests.
+COMPILED := ls modelica_like/fmi/runtimes/* >/dev/null 2>&1 || echo "The run-time is not compiled: this is done at \
+first use. Install cc, gcc or clang, or zig by $(BIN)/pip install 'modelica-like[cross]'."
 
 .PHONY: demo test lint types layers pytest slow browser benchmark release try fmus format clean site
 
