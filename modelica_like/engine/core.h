@@ -100,7 +100,8 @@ typedef struct {
 /* Those of single functions are named after them; a function that calls another one does not share with it. Tapes have
  * `slots` (values) and `dots` (derivatives in either direction, or three Taylor coefficients), the integrator 8 stages
  * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
- * steady state began; `impact_x` and `impact_d` are states before the first impact at an instant. */
+ * steady state began; `impact_x` and `impact_d` are states before the first impact at an instant, `trials` points
+ * without and with it, whose powers differ by what sources give in its duration. */
 #define WORK_NUMBERS(A)                                                                                                \
     A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),           \
         A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),    \
@@ -114,7 +115,7 @@ typedef struct {
         A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(impact_d, n_d),         \
         A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), \
         A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n),      \
-        A(edge_guards, 2 * guards)
+        A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant */
 #define WORK_INDICES(A)                                                                                          \

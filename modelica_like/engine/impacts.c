@@ -21,6 +21,9 @@ static Result ask(Instance *c, const Strike *strike, int approaching, int unsolv
     if (unsolved && !solve_now(c, 0)) return RESULT_ERROR;
     evaluate_now(c, &m->tapes.rates, rates);
     if (!strike->hard) return RESULT_OK;
+    double *trial = c->trials + (size_t)approaching * (size_t)(m->n_unknowns + m->n_d);
+    memcpy(trial, c->x, (size_t)m->n_unknowns * sizeof(double));
+    memcpy(trial + m->n_unknowns, c->d, (size_t)m->n_d * sizeof(double));
     const double *values = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) reactions[k] = strike->held[k] ? values[m->holds[k].reaction] : 0;
     return RESULT_OK;

@@ -14,7 +14,7 @@ typedef struct {
     double *times, *states, *outputs; /* by point: time; states and implicit unknowns; outputs */
     double *modes, *firsts;           /* by segment: d (modes, discrete values, what holds need); its first point */
     double *events;             /* time, transition (-1: an impact's), mode, from, to, round, segment that follows */
-    double *impacts;            /* time, motion that is held, energy in J */
+    double *impacts;            /* time, motion that is held, energy in J, `trials` */
     double *steps_taken;        /* segment, begin, end, and `piece_at`'s points: states and implicit unknowns */
     const uint32_t *references; /* of the outputs */
     int64_t n_outputs, steps;
@@ -218,8 +218,12 @@ static void note_impact(Instance *c, int held, double energy, int first) {
     if (r == NULL || r->impacts == NULL) return;
     if (first) n->strikes = r->n_impacts;
     if (held >= 0 && r->n_impacts < r->room_impacts) {
-        double row[] = {c->state.t, held, energy};
-        memcpy(r->impacts + 3 * r->n_impacts, row, sizeof row);
+        size_t size = 2 * (size_t)(c->model->n_unknowns + c->model->n_d);
+        double *row = r->impacts + (3 + size) * (size_t)r->n_impacts;
+        row[0] = c->state.t;
+        row[1] = held;
+        row[2] = energy;
+        memcpy(row + 3, c->trials, size * sizeof(double));
     }
     r->n_impacts = held < 0 ? n->strikes : r->n_impacts + 1;
 }

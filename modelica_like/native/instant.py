@@ -12,9 +12,9 @@ from modelica_like.native.library import MORE, Run
 from modelica_like.native.model import Instance
 from modelica_like.options import Options
 from modelica_like.solve.initialize import Point
+from modelica_like.solve.instants import impact_size
 from modelica_like.solve.recorder import Event
 
-_WIDTHS = {"events": 7, "impacts": 3}
 _LEAST = 64
 Rows = list[list[float]]
 
@@ -33,6 +33,7 @@ class InstantEngine:
         self._instance, self._options = Instance(model), options
         self._instance.reset(start, end, options.rtol, options.atol)
         self._transitions = len(model.transitions)
+        self._widths = {"events": 7, "impacts": impact_size(model)}
         self._run, self._rows = Run(), dict[str, Vector]()
         self._make_room(_LEAST)
 
@@ -53,7 +54,7 @@ class InstantEngine:
         while (code := settle(self._instance.address, now.t, *places, ctypes.byref(self._run))) == MORE:
             self._make_room(2 * len(self._rows["events"]))
         now.x, now.z, now.d = point
-        events, impacts = (self._rows[name][: getattr(self._run, f"n_{name}")].tolist() for name in _WIDTHS)
+        events, impacts = (self._rows[name][: getattr(self._run, f"n_{name}")].tolist() for name in self._widths)
         return code, events, impacts
 
     def check(self, code: int, events: Sequence[Event]) -> None:
@@ -61,7 +62,7 @@ class InstantEngine:
         self._instance.check(code, events, self._options)
 
     def _make_room(self, rows: int) -> None:
-        for name, width in _WIDTHS.items():
+        for name, width in self._widths.items():
             self._rows[name] = np.zeros((rows, width))
             setattr(self._run, name, self._rows[name].ctypes.data)
             setattr(self._run, f"room_{name}", rows)

@@ -16,8 +16,8 @@ from modelica_like.solve.dense import Dense
 from modelica_like.solve.endless import chattering
 from modelica_like.solve.events import Progress
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.initialize import Impact, Point
-from modelica_like.solve.instants import note_rest, note_sharing
+from modelica_like.solve.initialize import Point
+from modelica_like.solve.instants import impact_size, impacts_of, note_rest, note_sharing
 from modelica_like.solve.recorder import Recorder, Segment
 
 _PARTS = 100
@@ -71,9 +71,10 @@ class NativeLoop:
         if options.max_step < end - start.t:
             self._instance.limit(options.max_step)
         self._instance.begin_at(start)
+        unknowns = len(model.states) + len(model.implicit)
         widths = {
-            "times": 1, "states": len(model.states) + len(model.implicit), "modes": model.discrete_size, "firsts": 1,
-            "events": 7, "impacts": 3, "steps_taken": 3 + 5 * (len(model.states) + len(model.implicit)),
+            "times": 1, "states": unknowns, "modes": model.discrete_size, "firsts": 1, "events": 7,
+            "impacts": impact_size(model), "steps_taken": 3 + 5 * unknowns,
         }  # fmt: skip
         self._buffers = Buffers(self._instance, end, options.points, widths)
         self._buffers.emptied = self.record.keeper.forget
@@ -142,8 +143,7 @@ class NativeLoop:
             if model.circuits:
                 note_sharing(record, model, record.segments[-1].start)
         self._note(before[-1])
-        for time, held, energy in written["impacts"].tolist():
-            record.impacts.append(Impact(time, model.holds[int(held)].component, energy))
+        record.impacts += impacts_of(model, written["impacts"].tolist())
 
     def _note(self, events: Vector) -> None:
         for row in events.tolist():

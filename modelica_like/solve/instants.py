@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -89,19 +89,30 @@ class Instants:
         if self._engine is None:
             self._engine = upper.InstantEngine(self.model, self._start, self._start + self.span, self.options)
         code, events, impacts = self._engine.settle(now, located)
-        self._note(events, impacts)
+        for time, *numbers in events:
+            transition, mode, before, after, number = (int(one) for one in numbers[:5])
+            self.record.note(self.model, time, mode, (before, after), transition, number)
+        self.record.impacts += impacts_of(self.model, impacts)
         self._engine.check(code, self.record.events)
         note_sharing(self.record, self.model, now)
         if len(self.record.events) > self.options.max_events:
             why = f"There were more than {self.options.max_events} events"
             raise chattering(self.model, self.record.events, why, self.options.on_chattering)
 
-    def _note(self, events: Sequence[Sequence[float]], impacts: Sequence[Sequence[float]]) -> None:
-        for time, *numbers in events:
-            transition, mode, before, after, number = (int(one) for one in numbers[:5])
-            self.record.note(self.model, time, mode, (before, after), transition, number)
-        for time, held, energy in impacts:
-            self.record.impacts.append(Impact(time, self.model.holds[int(held)].component, energy))
+
+def impact_size(model: CompiledDae) -> int:
+    """Return the number of columns that an impact takes in `NativeRun` in native.c."""
+    return 3 + 2 * (len(model.states) + len(model.implicit) + model.discrete_size)
+
+
+def impacts_of(model: CompiledDae, rows: Sequence[Sequence[float]]) -> Iterator[Impact]:
+    """Yield impacts from what the run-time has written; the first one of an instant has the trials of all."""
+    last, (nx, nd) = np.nan, (len(model.states), model.discrete_size)
+    for time, held, energy, *numbers in rows:
+        parts = np.split(np.array(numbers), 2) if time != last else ()
+        points = [Point(time, part[:nx], part[nx : len(part) - nd], part[len(part) - nd :]) for part in parts]
+        yield Impact(time, model.holds[int(held)].component, energy, (points[0], points[1]) if points else None)
+        last = time
 
 
 def limit_passed(model: CompiledDae, now: Point, transition: CompiledTransition) -> LimitPassed:
