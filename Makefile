@@ -5,6 +5,7 @@
 # make release   the wheel for all platforms and the sdist, in dist/, tried in a new environment
 # make try   the wheel in dist/, in a new environment
 # make browser   Chromium for the tests of pages, by the system's package manager, where no browser is
+# make shells   fish, for the tests of completion, likewise
 # make fmus   the reference FMUs, from their C sources, to build/fmus
 # make benchmark   times as ratios to hand-written baselines of the same run
 
@@ -18,7 +19,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constr
 COMPILED := ls modelica_like/fmi/runtimes/* >/dev/null 2>&1 || echo "The run-time is not compiled: this is done at \
 first use. Install cc, gcc or clang, or zig by $(BIN)/pip install 'modelica-like[cross]'."
 
-.PHONY: demo test lint types layers pytest slow browser benchmark release try fmus format clean site
+.PHONY: demo test lint types layers pytest slow browser shells benchmark release try fmus format clean site
 
 demo: .venv/installed
 	$(BIN)/modelica-like demo
@@ -50,6 +51,12 @@ browser:
 	$$AS apt-get update --quiet --quiet && \
 	$$AS apt-get install --yes --quiet --quiet --no-install-recommends chromium || \
 	{ echo "No browser was found, and Chromium could not be installed by apt-get: install one, or name one by \$$BROWSER_FOR_TESTS." >&2; exit 1; }
+
+shells:
+	@command -v fish >/dev/null && exit; \
+	AS=$$(test "$$(id -u)" = 0 || echo sudo); \
+	$$AS apt-get update --quiet --quiet && $$AS apt-get install --yes --quiet --quiet --no-install-recommends fish || \
+	{ echo "fish could not be installed by apt-get: install it." >&2; exit 1; }
 
 # Times are those of the CPU: threads of BLAS that wait would count.
 benchmark: export OPENBLAS_NUM_THREADS = 1
