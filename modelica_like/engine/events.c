@@ -247,7 +247,9 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         memcpy(c->d_earlier, before, (size_t)m->n_d * sizeof(double));
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
         if (any && !fire(c, wanting)) return RESULT_ERROR;
-        if (any && (!share_and_solve(c) || !stop_motions(c, before) || !check_singular(c))) return RESULT_ERROR;
+        if (any && (!share_and_solve(c) || !check_singular(c)))
+            return RESULT_ERROR; /* nothing stops what is prescribed */
+        if (any && (!stop_motions(c, before) || !check_singular(c))) return RESULT_ERROR;
         if (any && m->n_ideals > 0) {
             int same = round > 0; /* modes return */
             for (int k = 0; k < m->n_ideals; k++) same &= c->d[m->ideals[k].mode] == c->d_earlier[m->ideals[k].mode];

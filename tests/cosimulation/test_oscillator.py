@@ -1,6 +1,7 @@
 """The two-mass oscillator in two FMUs against its closed form: orders of the masters, variable steps, energies."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -203,7 +204,8 @@ start = "rest"
     parts = split(tmp_path / "drive.toml", "shaft", tmp_path / "parts", check=False)
     with pytest.raises(FmuFailed, match=r"^push \(push.fmu\) failed") as told:
         cosim(parts.system, step=1e-4)
-    assert "It reported: t = 0.010000001 s: push has no more rows" in str(told.value)  # a run may end with its table
+    # A run may end with its table.
+    assert re.search(r"It reported: t = 0\.01000000\d* s: push has no more rows", str(told.value))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="processes are found and killed as in POSIX")

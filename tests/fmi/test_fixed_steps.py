@@ -184,7 +184,7 @@ def test_a_handle_of_fixed_steps_refuses_what_is_no_whole_number_of_them(exporte
     for wrong in (1.5 * STEP, STEP, 0.0):
         with pytest.raises(ValueOutOfRange, match=r"is not a whole number of fixed steps of 0\.001 s"):
             handle.step(wrong)
-    with pytest.raises(ValueOutOfRange, match=r"The step of 0\.00333333333 s is not a whole number"):
+    with pytest.raises(ValueOutOfRange, match=r"The step of 0\.003333333333 s is not a whole number"):
         handle.run(STEP + 0.01, 3)
     assert handle.step(2 * STEP)[0] == pytest.approx(np.cos(4 * STEP), abs=1e-12)
     for wrong in (0.0, -1.0, float("inf")):

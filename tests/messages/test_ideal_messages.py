@@ -1,7 +1,7 @@
 """Ideal elements: combinations of modes that are impossible, and wrong declarations."""
 
 import pytest
-from components.electrical.analog.analog import SignalVoltage, TwoPins
+from components.electrical.analog import SignalVoltage, TwoPins
 
 from components import (
     Capacitor,
