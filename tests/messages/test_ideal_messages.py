@@ -1,7 +1,6 @@
 """Ideal elements: combinations of modes that are impossible, and wrong declarations."""
 
 import pytest
-from components.electrical.analog import SignalVoltage, TwoPins
 
 from components import (
     Capacitor,
@@ -15,6 +14,7 @@ from components import (
     Ramp,
     Resistor,
 )
+from components.electrical.analog import SignalVoltage, TwoPins
 from modelica_like import Assembly, simulate
 from modelica_like.errors import LanguageError, NoValidModes
 from modelica_like.flatten import flatten

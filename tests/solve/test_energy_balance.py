@@ -13,8 +13,8 @@ from components import ConstantTorque, Damper, Fixed, Inertia, RigidBacklash, Sp
 from modelica_like import Assembly, Component, build, load, simulate
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.language import Equations, Events, Expr, Mode, Parameter, Variable, der, param, sin, var
-from modelica_like.runs.energy import _SAME_TIME, _is_rounding, _unexplained
 from modelica_like.runs import energy, powers
+from modelica_like.runs.energy import _SAME_TIME, _is_rounding, _unexplained
 from modelica_like.solve.initialize import Point
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -8,8 +8,8 @@ import pytest
 from components import Clutch, Inertia
 from modelica_like import Assembly, build, simulate
 from modelica_like.language import Component
-from modelica_like.runs.reading import blocks, energy_term, variables
 from modelica_like.runs import reading, solution
+from modelica_like.runs.reading import blocks, energy_term, variables
 from modelica_like.solve.initialize import call
 from modelica_like.solve.recorder import Segment
 
