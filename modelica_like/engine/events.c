@@ -85,8 +85,9 @@ void drop_balanced(Instance *c, double *soon) {
         if (number_or_false(now[k]) < 0 && soon[k] > 0 && soon[k] <= BALANCED * fabs(now[k])) soon[k] = now[k];
 }
 
-/* At the same edge a mode that was left in this round is not wanted back where that soon is no longer so: what settles
- * within few time resolutions moves so much within one that both modes want the other. `soon` as above. */
+/* At the same edge a mode that was left in this round is not wanted back where that soon is no longer
+ * so: what settles within few time resolutions moves so much within one that both modes want the other. `soon` as
+ * above. */
 static void drop_returning(Instance *c, const double *modes, double *soon) {
     const Model *m = c->model;
     double *now = c->guards_before;
@@ -179,14 +180,19 @@ static Result update_once(Instance *c, int *changes) {
     return share_and_solve(c) && check_singular(c);
 }
 
-/* Notes an instant. Where the last ones came ever faster, impacts end in contact if the model asks for it, and what is
-   not held goes on as long as it converges; an error otherwise. */
+/* Forgets a crowd of instants that has ended. */
+static void leave_crowd(State *s) {
+    double span = s->stop_time_defined ? s->stop_time - s->start_time : 1;
+    double last = s->n_instants > 0 ? s->instants[(s->n_instants - 1) % CROWD] : s->t;
+    if (s->t - last >= CROWDED * span) s->resting = 0;
+}
+
+/* Notes an instant at which modes have changed. Where the last ones came ever faster, impacts end in contact if the
+   model asks for it, and what is not held goes on as long as it converges; an error otherwise. */
 static Result crowded(Instance *c) {
     State *s = &c->state;
     double span = s->stop_time_defined ? s->stop_time - s->start_time : 1;
     double first = s->instants[s->n_instants % CROWD]; /* CROWD instants ago, once there were so many */
-    double last = s->n_instants > 0 ? s->instants[(s->n_instants - 1) % CROWD] : s->t;
-    if (s->t - last >= CROWDED * span) s->resting = 0;
     s->instants[s->n_instants % CROWD] = s->t;
     if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
     if (c->model->settings->rests && (s->resting == 0 || s->t - first < CONVERGES * s->resting)) {
@@ -206,7 +212,10 @@ static void keep_wanting(Instance *c, const double *soon, unsigned char *wanting
 /* Before one of several that hold a motion gives way, let the others take more. */
 static Result share_anew(Instance *c, unsigned char *wanting) {
     if (!anything_shared(c)) return RESULT_OK;
+    size_t size = (size_t)c->model->n_d * sizeof(double);
+    memcpy(c->d_earlier, c->d, size);
     if (!share_and_solve(c)) return RESULT_ERROR;
+    if (memcmp(c->d_earlier, c->d, size) == 0) return RESULT_OK; /* only rounding could say that nothing gives way */
     evaluate_now(c, &c->model->tapes.guards_soon, c->guards);
     keep_wanting(c, c->guards, wanting);
     return RESULT_OK;
@@ -224,11 +233,13 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     const Model *m = c->model;
     double *before = c->d_before, *jumped = c->edge_guards;
     int changes = m->n_updates > 0, rounds = ROUNDS + ALONE * (m->n_holds + m->n_ideals), met;
+    double events = c->state.n_events;
     c->stopped = 0;
     memset(c->entered, 0, (size_t)m->n_holds);
+    leave_crowd(&c->state);
     if (find_wanting(c, wanting, !located)) {
         if (m->n_ideals > 0 && !pushed(c) && !meet(c, -1, &met)) return RESULT_ERROR;
-        if (!crowded(c) || !share_anew(c, wanting)) return RESULT_ERROR;
+        if (!share_anew(c, wanting)) return RESULT_ERROR;
     }
     for (int round = 0; round < rounds; round++) {
         int any = 0;
@@ -237,7 +248,8 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             if (met) find_wanting(c, wanting, 1);
         }
         for (int k = 0; k < m->n_transitions; k++) any |= wanting[k] = wanting[k] && (!any || round < TOGETHER);
-        if (!gradient_round(c, round, wanting, any | changes)) return refuse_contradiction(c);
+        if (!gradient_round(c, round, wanting, any | changes))
+            return refuse_contradiction(c) && (c->state.n_events == events || crowded(c));
         any = any_of(wanting, m->n_transitions); /* it may have told others to fire */
         if (c->bounded && --c->budget < 1) {
             c->state.at_event = 1; /* the rest comes at the beginning of the next step */
