@@ -83,19 +83,11 @@ class Guards:
         doubt, rough, moved = near(t, base, data.ravel(), two.ravel(), *tolerances, z, model.p, model.u, d)
         return float(doubt[0]), rough.tolist(), moved.tolist()
 
-    def wanting(self, point: Point, before: Vector | None = None) -> list[CompiledTransition]:
-        """State events that fire now: positive within the time resolution.
-
-        Args:
-            point: now.
-            before: guards before states jumped, shape (guards,): those that have become positive fire, too, however
-                soon they will fall again. A rebound may be that short.
-        """
+    def wanting(self, point: Point) -> list[CompiledTransition]:
+        """State events that fire now: positive within the time resolution."""
         if not self.count:
             return []
-        values, _, soon = self.at(point)
-        wants = soon > 0 if before is None else (soon > 0) | ((before < 0) & (values > 0))
-        return [self.state_events[k] for k in wants.nonzero()[0]]
+        return [self.state_events[k] for k in (self.at(point)[2] > 0).nonzero()[0]]
 
     def along(self, times: Vector, x: Vector, z: Vector, d: Vector) -> tuple[Vector, Vector, Vector]:
         """Guards, rates and derivatives of the states at many times with the same modes.

@@ -16,10 +16,9 @@ from components import (
     Resistor,
 )
 from modelica_like import build
-from modelica_like.errors import NoValidModes
 from modelica_like.solve.initialize import Point, call, initialize, solve_implicit
 from modelica_like.solve.initialize import ideal as module
-from modelica_like.solve.initialize.ideal import _dependences, meet, replace_dependent
+from modelica_like.solve.initialize.ideal import _dependences, replace_dependent
 from modelica_like.structure.ideal import HEAD, IdealElement, IdealNetwork
 
 
@@ -190,62 +189,6 @@ def test_impulses_are_those_of_the_solution(monkeypatch: pytest.MonkeyPatch, mis
     table[1, 1] = -29e12 if missed else 0.0
     assert point.d[ideal.entries].tolist() == table.ravel().tolist()
     assert not point.z.any()
-
-
-@pytest.mark.parametrize(
-    ("value", "keep", "far"),
-    [
-        (0.99e-3, None, False), (-0.99e-3, None, False), (1.01e-3, None, True), (-1.01e-3, None, True),
-        (0.9e-5, 1e-8, False), (1.1e-5, 1e-8, True), (-1.1e-5, 1e-8, True), (1.1e-3, 1e-2, False),
-    ],
-)  # fmt: skip
-def test_states_meet_the_conditions_of_the_modes(
-    monkeypatch: pytest.MonkeyPatch, value: float, keep: float | None, far: bool
-) -> None:
-    """The largest variable in the unit is -1e3: a millionth of it, or a given part, is missed at most.
-
-    e0 is not replaced, e1 not by a derivative, e2 is met without an impulse, e3 has one.
-    """
-    model, ideal = elements(3, 2, 1, 0)
-    rows = np.zeros((4, ideal.width))
-    rows[1:, 0], rows[1, HEAD - 1], rows[1, 1], rows[3, 1] = 1.0, 1.0, 5.0, -7.0
-    rows[3, [HEAD + 1, HEAD]] = -2.0, 1.0
-    point = Point(0.0, np.array([1.0, 2.0, 3.0]), np.zeros(5), np.array([0.0, 0.0, 1.0, 0.0, *rows.ravel()]))
-    values = np.zeros(30)
-    values[[0, 22, 13]] = -1e3, 5.0, value
-    slopes, solved = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0]]), []
-    units = [SimpleNamespace(unit="A", nominal=1.0)] * 30
-    model.flat_variables, model.flat_discretes = units, [SimpleNamespace(names=("off", "on"))] * 4
-
-    def call(*given: Any) -> np.ndarray:
-        assert given == (model, model.variables, point)
-        return values
-
-    def variable_slopes(owner: Any, at: Any, nodes: list[int]) -> np.ndarray:
-        assert (owner, at) == (model, point)
-        return slopes[[(22, 13).index(one) for one in nodes]]
-
-    monkeypatch.setattr(module, "call", call)
-    monkeypatch.setattr(module, "variable_slopes", variable_slopes)
-    monkeypatch.setattr(module, "solve_implicit", lambda *given: solved.append(given))
-    if far and keep is None:
-        with pytest.raises(NoValidModes, match=r" is valid: with e2 on, e3 off, 0\.00101 A are left over"):
-            meet(model, point, keep=keep)
-        return
-    assert meet(model, point, keep=keep)
-    rows[3, 1] = -7.0 if far else 0.0
-    assert point.d[ideal.entries].tolist() == rows.ravel().tolist()
-    np.testing.assert_allclose(point.x, [-1.5, -0.5, 3.0 - (0.0 if far else value / 2)], rtol=1e-12)
-    assert solved == [(model, point)]
-
-
-def test_without_conditions_states_stay() -> None:
-    model, ideal = elements(0, 1)
-    d = np.zeros(2 + 2 * ideal.width)
-    d[[2, 2 + HEAD - 1]] = 1.0
-    assert meet(model, Point(0.0, np.zeros(1), np.zeros(5), d)) is False
-    model.ideal = None
-    assert meet(model, Point(0.0, np.zeros(1), np.zeros(5), d)) is False
 
 
 @pytest.mark.parametrize(("i", "kept"), [(1.01e-3, True), (0.99e-3, False)])

@@ -24,10 +24,8 @@ from modelica_like.solve.initialize.holds import sharing as sharing
 from modelica_like.solve.initialize.homotopy import HOMOTOPY as HOMOTOPY
 from modelica_like.solve.initialize.homotopy import lead
 from modelica_like.solve.initialize.ideal import contradiction as contradiction
-from modelica_like.solve.initialize.ideal import meet as meet
 from modelica_like.solve.initialize.ideal import no_valid_modes as no_valid_modes
 from modelica_like.solve.initialize.ideal import refuse_contradiction as refuse_contradiction
-from modelica_like.solve.initialize.modes import chosen_modes as chosen_modes
 from modelica_like.solve.initialize.modes import complete, started
 from modelica_like.solve.initialize.plan import StartKind as StartKind
 from modelica_like.solve.initialize.plan import StartPlan as StartPlan

@@ -10,7 +10,6 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import NoValidModes
 from modelica_like.solve.initialize.point import Point, call, largest, solve_implicit
-from modelica_like.solve.initialize.slopes import variable_slopes
 from modelica_like.structure.ideal import HEAD, IdealElement, IdealNetwork
 
 _DEPENDENT = 1e-9
@@ -115,44 +114,6 @@ def _moved(rows: Vector) -> list[int]:
 
 def _zero(element: IdealElement, d: Vector) -> int:
     return element.zeros[int(d[element.mode])]
-
-
-def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool:
-    """Move the states so that they meet the conditions of the modes exactly, and end impulses.
-
-    Args:
-        model: the compiled model.
-        point: with the present modes.
-        keep: currents and voltages that are missed by more, over the largest one, keep their impulses; without it they
-            are an error.
-
-    Returns:
-        Whether there are such conditions.
-
-    Raises:
-        NoValidModes: the states are far from meeting them.
-    """
-    network = model.ideal
-    if network is None:
-        return False
-    rows = point.d[network.entries].reshape(len(network.elements), network.width).copy()
-    moved = _moved(rows)
-    if not moved:
-        return False
-    values, nodes = call(model, model.variables, point), list[int]()
-    limit = _LOST if keep is None else keep
-    for k in moved:
-        node = _zero(network.elements[k], point.d)
-        if not rows[k, 1] or abs(values[node]) <= limit * largest(model, np.abs(values), node):
-            rows[k, 1] = 0.0
-            nodes.append(node)
-        elif keep is None:
-            raise no_valid_modes(model, point, k)
-    point.d[network.entries] = rows.ravel()
-    slopes = variable_slopes(model, point, nodes)
-    point.x = point.x - np.linalg.lstsq(slopes, values[nodes], rcond=None)[0]
-    solve_implicit(model, point)
-    return True
 
 
 def refuse_contradiction(model: CompiledDae, point: Point) -> None:
