@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -39,9 +40,9 @@ from modelica_like.runs.conserve import conserving
 from modelica_like.runs.driven import driven
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Statistics, Trajectories, needs_equations
-from modelica_like.solve.events import EventLoop, Progress
 from modelica_like.solve.initialize import StartKind, initialize
 from modelica_like.solve.initialize.ideal import refuse_contradiction
+from modelica_like.solve.panels import Progress
 from modelica_like.structure import reduce
 
 _SECOND = parse_unit("s")
@@ -170,7 +171,7 @@ def simulate(
         loop = make(model, options, initialize(model, t0, kind), end, progress)
         asked = collector(model, readings, options.atol)
         if readings:
-            loop.record.keeper.read = lambda stretches: asked.feed(loop.dense(stretches))
+            loop.record.keeper.read = lambda steps: asked.feed(loop.dense(steps))
         try:
             loop.run()
         except SolveError as error:
@@ -183,7 +184,7 @@ def simulate(
         run = _solution(loop, begin, kind)
         if not readings:
             return run
-        asked.feed(loop.dense(loop.record.keeper.stretches))
+        asked.feed(loop.dense(loop.record.keeper.steps))
         return replace(run, readings=dict(zip(readings, asked.finish(run), strict=True)))
 
     try:
@@ -245,10 +246,8 @@ def plan(
 
 def _loop(solver: str) -> Any:
     """Return the loop that runs a model."""
-    if solver == "idas":
-        return EventLoop
-    if solver == "native":
-        return upper.NativeLoop
+    if solver in get_args(Solver):
+        return partial(upper.EngineLoop, idas=solver == "idas")
     raise UnknownName(
         f"There is no solver '{solver}'{did_you_mean(solver, get_args(Solver)) or '.'}",
         advice="There are idas (the reference) and native (the compiled run-time of FMUs).",

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from modelica_like.analyse.sensitivity.function import simulation_function as simulation_function
     from modelica_like.native.handle import Native as Native
-    from modelica_like.native.instant import InstantEngine as InstantEngine
-    from modelica_like.native.run import NativeLoop as NativeLoop
+    from modelica_like.native.run import EngineLoop as EngineLoop
     from modelica_like.show.draw import icon as icon
     from modelica_like.show.draw import schematic as schematic
     from modelica_like.show.plot import plot as plot
@@ -23,9 +22,8 @@ if TYPE_CHECKING:
     from modelica_like.show.sankey import sankey as sankey
 
 _HOME = {
-    "InstantEngine": "native.instant",
     "Native": "native.handle",
-    "NativeLoop": "native.run",
+    "EngineLoop": "native.run",
     "html": "show.report.notebook",
     "icon": "show.draw",
     "mathematics": "show.report.mathematics",

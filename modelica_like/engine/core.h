@@ -53,6 +53,7 @@ typedef struct { /* what changes; arrays of the model's sizes stand behind it, s
     double t, u_time;
     int phase, solved, z_valid, inputs_changed, piece_valid, event_pending, at_event;
     int looked;                                        /* the guards are known from the end of the last fixed step */
+    int panel_valid;                                   /* the present point lies in the panel of another integrator */
     double tolerance, absolute, start_time, stop_time; /* absolute: in nominal values */
     double delayed_until;                              /* when series of delayed values end */
     int stop_time_defined, n_past, past_lost;          /* rows of the past; there were too many */
@@ -74,6 +75,15 @@ typedef enum { LOG_ERROR = 1, LOG_WARNING = 2, LOG_EVENTS = 4, LOG_INTEGRATOR = 
 typedef struct {
     double gain, forward, backward, restitution;
 } Terms; /* of a motion that modes hold */
+
+typedef struct { /* of another integrator: four parts of equal width for each piece, and a row of unknowns per knot */
+    double begin, width;
+    int64_t parts;
+    const double *knots;
+} Panel;
+
+/* Integrates from the present point up to a time at most; returns 0 where it cannot. */
+typedef int (*Integrator)(double limit, Panel *panel);
 
 typedef struct { /* a tape for the present modes, see tape.c */
     Tape tape;
@@ -117,14 +127,16 @@ typedef struct {
         A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n),      \
         A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
- * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant */
+ * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; idle:
+ * time events that changed nothing of d that is felt by what moves when they came last */
 #define WORK_INDICES(A)                                                                                          \
     A(order, n_z), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), A(member, members), \
         A(pivots, members), A(same, slots), A(places_of_slots, slots)
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
-        A(tuned, m->n_p), A(entered, holds), A(positive, guards)
+        A(tuned, m->n_p), A(entered, holds), A(positive, guards), A(idle, m->n_transitions),  \
+        A(ticking, m->n_transitions), A(felt, n_d)
 
 typedef struct Gradient Gradient; /* see gradient.c */
 
@@ -163,6 +175,8 @@ typedef struct Instance {
     int WORK_INDICES(FIELD);
     unsigned char WORK_MARKS(FIELD);
     Piece *whole;
+    Integrator integrator; /* gives the panels; NULL: steps of the run-time */
+    Panel panel;
     Terms *terms, *strike_terms;
     Strike strike;
     int stopped; /* something has been stopped at the present instant */
@@ -258,7 +272,7 @@ Result leave_instant(Instance *c, int happened);
 /* events.c */
 double just_after(const State *s);
 int guard_active(const Instance *c, int guard);
-double next_moment(Instance *c);
+double next_moment(Instance *c, int idle_too);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 void drop_balanced(Instance *c, double *soon);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
@@ -274,6 +288,7 @@ double *last_of(const Model *m, Piece *piece);
 double error_norm(const Instance *c, const double *first, const double *last, const double *error);
 double step_diagonal(double h);
 int factor_step(Instance *c, double diagonal);
+int factor_at(Instance *c, double t, const double *first, double h);
 size_t piece_size(const Model *m);
 void piece_at(const Model *m, const Piece *piece, double t, double *point);
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
@@ -286,6 +301,9 @@ Result check_step(Instance *c, double point, double size, double *target);
 Result move_to(Instance *c, double t);
 Result take_changes(Instance *c);
 int is_due(Instance *c);
+/* panels.c */
+void piece_between(Instance *c, const Piece *whole, double begin, double end, Piece *piece);
+int next_piece(Instance *c, double limit, double far);
 /* locate.c */
 #define MOST_LOOKS 9 /* at guards, that there is room for */
 double cubic_guess(double g0, double r0, double g1, double r1);

@@ -175,6 +175,7 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
     double begin = c->piece->begin, h = c->piece->end - begin, landing = h, *now = c->edges_middle;
     double resolved = begin + TIME_RESOLUTION * fmax(1, fabs(begin));
     int unseen = 0;
+    if (of_slopes && c->integrator != NULL && !factor_at(c, begin, c->piece->points, h)) return INFINITY;
     memcpy(now, c->edges, (size_t)c->model->tapes.edges.n_outputs * sizeof(double));
     for (double before = begin, edge = begin; edge < c->piece->end && !(unseen && landing < h); before = edge) {
         edge = fmin(next_edge(c, before, now, precisely), c->piece->end);

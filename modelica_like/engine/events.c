@@ -30,13 +30,14 @@ unsigned char *nothing_wanting(Instance *c) { return memset(c->wishes, 0, (size_
 
 double just_after(const State *s) { return s->t + SAME_TIME * fmax(1, fabs(s->t)); }
 
-double next_moment(Instance *c) {
+/* Of the time events that are not idle, or of all. */
+double next_moment(Instance *c, int idle_too) {
     double *moments = c->guards, next = c->model->n_delays > 0 ? c->state.delayed_until : INFINITY;
     if (c->model->n_moments == 0) return next;
     evaluate_now(c, &c->model->tapes.moments, moments);
     for (int k = 0; k < c->model->n_transitions; k++) {
         const Transition *one = &c->model->transitions[k];
-        if (one->timed && is_source(c, one) && moments[one->index] > just_after(&c->state))
+        if (one->timed && (idle_too || !c->idle[k]) && is_source(c, one) && moments[one->index] > just_after(&c->state))
             next = fmin(next, moments[one->index]);
     }
     return next;
@@ -317,6 +318,6 @@ Result update_discrete(Instance *c, int *restart, double *next) {
     c->state.inputs_changed = 0;
     if (!handle_event(c) || (changed && !leave_instant(c, 1))) return RESULT_ERROR;
     *restart |= c->state.n_events != before;
-    *next = next_moment(c);
+    *next = next_moment(c, 1);
     return RESULT_OK;
 }

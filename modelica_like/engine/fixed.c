@@ -102,7 +102,7 @@ static Result one_step(Instance *c, double end) {
     c->budget = BUDGET;
     if (!take_changes(c) || (s->at_event && !fire_here(c, &fired))) return RESULT_ERROR;
     while (s->t < end && !s->ended) {
-        double moment = c->budget >= 2 ? next_moment(c) : INFINITY;
+        double moment = c->budget >= 2 ? next_moment(c, 1) : INFINITY;
         if (!go_on(c, fmin(end, moment), &fired)) return RESULT_ERROR;
         if (fired || s->at_event || !is_due(c)) continue;
         if (!fire_here(c, &fired)) return RESULT_ERROR;

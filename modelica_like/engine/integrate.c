@@ -76,6 +76,12 @@ int factor_step(Instance *c, double diagonal) {
     return qr_factor(&m->step, c->matrix, c);
 }
 
+/* As a step of length h from a point would. */
+int factor_at(Instance *c, double t, const double *first, double h) {
+    linearize(c, t, first, c->stages);
+    return factor_step(c, step_diagonal(h));
+}
+
 double error_norm(const Instance *c, const double *first, const double *last, const double *error) {
     double sum = 0, rtol = c->state.tolerance, atol = c->state.absolute;
     if (c->model->n_x == 0) return 0;
@@ -166,7 +172,7 @@ static void clear_pending(Instance *c) {
 }
 
 static void leave_piece(Instance *c) {
-    c->state.piece_valid = c->state.looked = c->look_valid = c->edges_valid = 0;
+    c->state.piece_valid = c->state.panel_valid = c->state.looked = c->look_valid = c->edges_valid = 0;
     clear_pending(c);
 }
 
@@ -180,6 +186,31 @@ static double largest_step(const Instance *c) {
 
 /* Below this, two times are the same. */
 static double least_step(const State *s) { return 1e-15 * fmax(1, fabs(s->t)); }
+
+static void take_piece(Instance *c) {
+    c->state.n_steps++;
+    c->state.piece_valid = 1;
+    keep_edges(c);
+}
+
+/* Takes the next piece of another integrator, shorter where an event or an edge asks for it. */
+static Result take_given(Instance *c, double limit, double far) {
+    State *s = &c->state;
+    double least = least_step(s), most = INFINITY;
+    int landings = 0;
+    for (int n = 0; n < MAX_REJECTIONS && limit - s->t >= least; n++) {
+        clear_pending(c);
+        if (!next_piece(c, limit, far)) break;
+        double h = c->piece->end - s->t;
+        double seen = c->model->tapes.edges.n_outputs > 0 ? seen_length(c, least, &most) : INFINITY;
+        int lands = seen < h && landings++ < MAX_LANDINGS;
+        if (!lands && (c->model->n_guards == 0 || search_events(c))) return take_piece(c), RESULT_OK;
+        s->panel_valid = 0;
+        far = limit = s->t + (lands ? seen : 0.25 * h);
+    }
+    leave_piece(c);
+    return fail(c, STEP_TOO_SMALL, s->t);
+}
 
 /* Takes one step from the present point towards `limit`, shorter where accuracy or an event asks for it. */
 static Result take_step(Instance *c, double limit) {
@@ -213,11 +244,9 @@ static Result take_step(Instance *c, double limit) {
             wished = h * (error > 1 ? fmax(0.1, factor) : 0.25);
             continue;
         }
-        s->n_steps++;
         factor = fmin(factor, rejected ? 1 : 6);
         s->step = fmin(cut ? fmax(wished, h * factor) : h * factor, most);
-        keep_edges(c);
-        s->piece_valid = 1;
+        take_piece(c);
         if (c->log_enabled & LOG_INTEGRATOR)
             report(c, LOG_INTEGRATOR, RESULT_OK, "t = %.12g s: step %.3e s, error %.2e of the tolerance, %d rejected",
                 c->piece->end, c->piece->end - c->piece->begin, error, rejected);
@@ -257,12 +286,22 @@ Result pass_instant(Instance *c, unsigned char *wanting, int located) {
     return whens && memcmp(c->first, c->x, size) != 0 ? check_turned_back(c, c->looks) : RESULT_OK;
 }
 
+/* Have the ticks of this instant changed nothing that equations of motion read? */
+static int was_idle(Instance *c) {
+    int idle = 1;
+    for (int k = 0; k < c->model->n_d && idle; k++) idle = !c->felt[k] || c->d[k] == c->d_begun[k];
+    for (int k = 0; k < c->model->n_transitions; k++)
+        if (c->ticking[k]) c->idle[k] = (unsigned char)idle;
+    return idle;
+}
+
 static Result pass_event(Instance *c) {
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
     int located = s->event_pending, ticks = !located && (c->model->n_moments > 0 || delays_due(c));
     size_t size = (size_t)c->model->n_x * sizeof(double);
     double *rates = c->first_rates, step = s->step, events = s->n_events;
+    int panel_valid = s->panel_valid;
     if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
@@ -270,12 +309,15 @@ static Result pass_event(Instance *c) {
     s->z_valid = 0;
     if (!settle(c) || !reach_instant(c)) return RESULT_ERROR;
     if (ticks) evaluate_now(c, &c->model->tapes.rates, rates);
+    if (ticks && find_wanting(c, wanting, 0)) memcpy(c->ticking, wanting, c->model->n_transitions);
     if (!pass_instant(c, wanting, located)) return RESULT_ERROR;
     s->z_valid = 1;
     if (!leave_instant(c, s->n_events != events)) return RESULT_ERROR;
-    if (!ticks || memcmp(c->first, c->x, size) != 0) return RESULT_OK;
+    if (!ticks) return RESULT_OK;
+    if (memcmp(c->first, c->x, size) != 0) return RESULT_OK;
+    if (was_idle(c)) s->panel_valid = panel_valid;
     evaluate_now(c, &c->model->tapes.rates, c->rhs);
-    if (memcmp(rates, c->rhs, size) == 0) s->step = step; /* a tick without effect on what moves */
+    if (memcmp(rates, c->rhs, size) == 0) s->step = step; /* a tick without effect on what moves now */
     return RESULT_OK;
 }
 
@@ -332,10 +374,11 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
             return REACHED;
         }
         if (!s->piece_valid) {
-            double limit = s->stop_time_defined && s->stop_time >= target ? s->stop_time : INFINITY;
-            limit = fmin(limit, next_moment(c));
-            if (held) limit = fmin(limit, target);
-            if (!take_step(c, limit)) return FAILED;
+            double far = s->stop_time_defined && s->stop_time >= target ? s->stop_time : INFINITY;
+            if (held) far = fmin(far, target);
+            double limit = fmin(far, next_moment(c, 1));
+            if (c->integrator != NULL) far = fmin(far, next_moment(c, 0));
+            if (!(c->integrator != NULL ? take_given(c, limit, far) : take_step(c, limit))) return FAILED;
         }
         if (c->piece->end > target) return move_to(c, target) ? REACHED : FAILED;
         keep_piece(c, c->piece->end);

@@ -36,13 +36,14 @@ static int look_inside(Instance *c, double t, Look *look) {
     return look_at(c, t, point, look);
 }
 
-/* By a step again from the beginning of the whole one, which becomes the piece. */
+/* By a step again from the beginning of the whole one, which becomes the piece; that of another integrator is cut. */
 static int step_to(Instance *c, double t, Look *look) {
     const Piece *whole = c->whole;
     if (t <= whole->begin) {
         memcpy(c->piece, whole, piece_size(c->model));
         memcpy(last_of(c->model, c->piece), whole->points, (size_t)c->model->n_unknowns * sizeof(double));
-    } else if (rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, c->piece) < 0) return 0;
+    } else if (c->integrator != NULL) piece_between(c, whole, whole->begin, t, c->piece);
+    else if (rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, c->piece) < 0) return 0;
     c->piece->end = t;
     return look_at(c, t, last_of(c->model, c->piece), look);
 }

@@ -106,6 +106,12 @@ EXPORTED int native_reset(Native *n, double start, double stop, double rtol, dou
     return code(instance_prepare(n->c, start, stop, rtol, atol));
 }
 
+/* Panels come from another integrator from now on; `felt` marks entries of d that equations of motion read. */
+EXPORTED void native_integrate_by(Native *n, Integrator integrator, const unsigned char *felt) {
+    n->c->integrator = integrator;
+    memcpy(n->c->felt, felt, (size_t)n->c->model->n_d);
+}
+
 /* The largest step from now on, in s. */
 EXPORTED void native_limit(Native *n, double longest) { n->c->state.longest = longest; }
 

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
-from modelica_like.errors import Chattering, InitializationError, ModelicaLikeError, NoGradient, SolveError
+from modelica_like.errors import Chattering, InitializationError, LimitPassed, ModelicaLikeError, NoGradient, SolveError
 from modelica_like.language.fields import out_of_range
+from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.native.codes import WORDED, Code
+from modelica_like.native.endless import SWITCHING, chattering, not_settled, stays_true
 from modelica_like.options import Options
-from modelica_like.solve.endless import SWITCHING, chattering, not_settled, stays_true
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.initialize import (
     Point,
@@ -29,7 +30,6 @@ from modelica_like.solve.initialize import (
     singular_block,
     unsettled,
 )
-from modelica_like.solve.instants import limit_passed
 from modelica_like.solve.recorder import Event
 
 
@@ -147,6 +147,24 @@ def _no_real(one: Failure) -> ModelicaLikeError:
 
 def _not_asked(_: Failure) -> ModelicaLikeError:
     return NoGradient("No derivatives were asked for.", advice='Name parameters, inputs or start values: by=["J.J"].')
+
+
+def limit_passed(model: CompiledDae, now: Point, transition: CompiledTransition) -> LimitPassed:
+    """Return the error of a transition that ends the run; its notice tells values of the present point."""
+    owner, dot, _ = model.flat_discretes[transition.mode].path.rpartition(".")
+    told = NAME_IN_NOTICE.sub(lambda name: _told(model, now, owner + dot + name[1]), transition.notice)
+    return LimitPassed(f"At {now.t:.9g} s {owner or model.name} {told}.")
+
+
+def _told(model: CompiledDae, now: Point, path: str) -> str:
+    """Return a parameter, variable or discrete value as a number."""
+    if path in model.position:
+        return f"{call(model, model.variables, now)[model.position[path]]:g}"
+    if path in model.discrete_position:
+        return f"{now.d[model.discrete_position[path]]:g}"
+    if path in model.derived_position:
+        return f"{float(model.derived(model.p)[model.derived_position[path]]):g}"
+    return f"{model.p[model.parameter_position[path]]:g}"
 
 
 WRITTEN: dict[Code, Callable[[Failure], ModelicaLikeError]] = {

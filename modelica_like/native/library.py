@@ -53,6 +53,16 @@ class Failure(c.Structure):
 POINT = 5 * c.POINTER(_NUMBER)
 """What `failure` points to: states and implicit unknowns, d, d before the last change, parameters, inputs."""
 
+
+class Panel(c.Structure):
+    """`Panel` in core.h."""
+
+    _fields_ = [("begin", _NUMBER), ("width", _NUMBER), ("parts", _COUNT), ("knots", _POINTER)]
+
+
+INTEGRATOR = c.CFUNCTYPE(c.c_int, _NUMBER, c.POINTER(Panel))
+"""`Integrator` in core.h."""
+
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "open": (_POINTER, [c.c_char_p, c.c_size_t, c.c_char_p]),
     "close": (None, [_POINTER]),
@@ -62,6 +72,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "failure": (c.POINTER(Failure), [_POINTER, POINT]),
     "reset": (_CODE, [_POINTER, *4 * [_NUMBER]]),
     "limit": (None, [_POINTER, _NUMBER]),
+    "integrate_by": (None, [_POINTER, INTEGRATOR, _POINTER]),
     "set": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),
     "set_all": (None, 3 * [_POINTER]),
     "get": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),

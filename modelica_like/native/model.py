@@ -109,7 +109,7 @@ class Instance:
         return Failure(
             model.twin(p=p, u=u), self.native.start, Code(told.code), int(told.place),
             next((name for name, one in self.native.variables.items() if one.reference == reference), ""),
-            tuple(told.numbers), Point(self.library.time(self.address), x[:nx], x[nx:], d), before,
+            tuple(told.numbers), Point(self.time, x[:nx], x[nx:], d), before,
             self.library.message(self.address).decode(), events, options,
         )  # fmt: skip
 
@@ -117,6 +117,20 @@ class Instance:
         """Start again at a time in s, with the model's parameters and inputs; `end` may be infinite."""
         self.check(self.library.reset(self.address, t0, end, rtol, atol))
         self.library.set_all(self.address, _at(self.model.p), _at(self.model.u))
+
+    @property
+    def time(self) -> float:
+        """Where it stands, in s."""
+        return self.library.time(self.address)
+
+    def point(self) -> tuple[Vector, Vector]:
+        """Return views of states and implicit unknowns, and of d, which change with the instance."""
+        places, unknowns = POINT(), len(self.model.states) + len(self.model.implicit)
+        self.library.failure(self.address, places)
+        return tuple(
+            np.ctypeslib.as_array(place, (size,)) if size else np.zeros(0)
+            for place, size in zip(places, (unknowns, self.model.discrete_size), strict=False)
+        )
 
     def limit(self, longest: float) -> None:
         """Limit steps from now on, in s."""

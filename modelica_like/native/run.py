@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from itertools import pairwise
 from typing import Any
 
@@ -10,14 +11,15 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.native.buffers import Buffers
+from modelica_like.native.endless import chattering
+from modelica_like.native.library import INTEGRATOR
 from modelica_like.native.model import Instance
+from modelica_like.native.notices import note_rest, note_sharing
 from modelica_like.options import Options
 from modelica_like.solve.dense import Dense
-from modelica_like.solve.endless import chattering
-from modelica_like.solve.events import Progress
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.initialize import Point
-from modelica_like.solve.instants import impact_size, impacts_of, note_rest, note_sharing
+from modelica_like.solve.initialize import Impact, Point
+from modelica_like.solve.panels import Panels, Progress
 from modelica_like.solve.recorder import Recorder, Segment
 
 _PARTS = 100
@@ -26,30 +28,46 @@ _ROUNDING = 1e-9
 """Relative one of the times of results."""
 
 
-class OfSteps(Dense):
-    """Dense output of the run-time's steps; `piece_at` in integrate.c has the same polynomial.
+class _ByIdas:
+    """Answers the run-time's question for the next panel.
 
     Args:
-        integrator: solves for implicit unknowns.
-        steps: rows of `steps_taken` in native.c.
-        modes: of the segments, shape (segments, nd).
+        instance: asks.
+        panels: integrates.
+        progress: called with the time reached.
+
+    Attributes:
+        error: why there was no answer: it has to pass C, and is raised behind it.
     """
 
-    def __init__(self, integrator: Integrator, steps: Vector, modes: Vector) -> None:
-        self._integrator, self._steps = integrator, steps
-        self.begins, self.ends, self.d = steps[:, 1], steps[:, 2], modes[steps[:, 0].astype(int)].T
+    error: BaseException | None = None
 
-    def points(self, pieces: Any, times: Vector) -> tuple[Vector, Vector]:
-        """Evaluate the polynomials of degree four."""
-        rows, nx = self._steps[pieces], len(self._integrator.model.states)
-        s = ((times - rows[:, 1]) / (rows[:, 2] - rows[:, 1]))[:, None]
-        first, last, a, b, c = np.split(rows[:, 3:], 5, axis=1)
-        y = ((1 - s) * first + s * (last + (1 - s) * (a + s * (b + s * c)))).T
-        return y[:nx], self._integrator.polished(times, y[:nx], y[nx:], self.d[:, pieces])
+    def __init__(self, instance: Instance, panels: Panels, progress: Progress | None) -> None:
+        self.panels, self._instance, self._progress = panels, instance, progress
+        self._x, self._d = instance.point()
+        self._knots = np.zeros(0)
+        self._asked = INTEGRATOR(self._answer)
+        felt = panels.felt
+        instance.library.integrate_by(instance.address, self._asked, felt.ctypes.data)
+
+    def _answer(self, limit: float, place: Any) -> int:
+        nx = len(self.panels.model.states)
+        now = Point(self._instance.time, self._x[:nx].copy(), self._x[nx:].copy(), self._d.copy())
+        try:
+            if self._progress is not None:
+                self._progress(now.t)
+            width, self._knots = self.panels.go_on(now, limit)
+        except BaseException as error:  # noqa: BLE001 - also an interrupt: ctypes would lose it
+            self.error = error
+            return 0
+        panel = place.contents
+        panel.begin, panel.width, panel.parts = now.t, width, len(self._knots) - 1
+        panel.knots = self._knots.ctypes.data
+        return 1
 
 
-class NativeLoop:
-    """Runs a model from a start point to the end; replaces `EventLoop`.
+class EngineLoop:
+    """Runs a model from a start point to the end by the compiled run-time, with its own steps or those of IDAS.
 
     Args:
         model: the compiled model.
@@ -57,11 +75,13 @@ class NativeLoop:
         start: consistent start.
         end: end time in s.
         progress: called with the time reached.
+        idas: whether IDAS integrates; without states there is nothing to integrate.
     """
 
     def __init__(
-        self, model: CompiledDae, options: Options, start: Point, end: float, progress: Progress | None = None
-    ) -> None:
+        self, model: CompiledDae, options: Options, start: Point, end: float, progress: Progress | None = None,
+        *, idas: bool = False,
+    ) -> None:  # fmt: skip
         self.model, self.options, self.progress = model, options, progress
         self.record, self._span = Recorder(), end - start.t
         self._part = self._span / min(options.points, _PARTS)
@@ -71,10 +91,12 @@ class NativeLoop:
         if options.max_step < end - start.t:
             self._instance.limit(options.max_step)
         self._instance.begin_at(start)
+        by_idas = idas and bool(model.states)
+        self._idas = _ByIdas(self._instance, Panels(model, options, start.t, end), progress) if by_idas else None
         unknowns = len(model.states) + len(model.implicit)
         widths = {
             "times": 1, "states": unknowns, "modes": model.discrete_size, "firsts": 1, "events": 7,
-            "impacts": impact_size(model), "steps_taken": 3 + 5 * unknowns,
+            "impacts": _impact_size(model), "steps_taken": 3 + 5 * unknowns,
         }  # fmt: skip
         self._buffers = Buffers(self._instance, end, options.points, widths)
         self._buffers.emptied = self.record.keeper.forget
@@ -82,12 +104,15 @@ class NativeLoop:
     @property
     def dense(self) -> Callable[[Vector], Dense]:
         """Returns the dense output of written steps, without keeping the instance and its buffers."""
-        model, options, modes = self.model, self.options, self._buffers["modes"].copy()
-        return lambda steps: OfSteps(Integrator(model, options), steps, modes)
+        model, modes = self.model, self._buffers["modes"].copy()
+        return lambda steps: Dense(model, steps, modes)
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """Steps, evaluations of the equations, and tried steps so far."""
+        """Steps, evaluations of the equations, and tried steps or calls of IDAS so far."""
+        if self._idas is not None:
+            integrator = self._idas.panels.integrator
+            return integrator.steps, integrator.evaluations, integrator.calls
         steps, rejected, evaluations, _ = self._instance.counts()
         return steps, evaluations, steps + rejected
 
@@ -98,9 +123,12 @@ class NativeLoop:
             Chattering, StepFailed, SingularAtStart: the run cannot continue; `record` has the run up to then.
         """
         try:
-            code = self._buffers.go(self._reached)
+            with self._watched():
+                code = self._buffers.go(self._reached)
         finally:
             self._read()
+        if self._idas is not None and self._idas.error is not None:
+            raise self._idas.error
         if self._crowded:
             why = f"There were more than {self.options.max_events} events"
             raise chattering(self.model, self.record.events, why, self.options.on_chattering)
@@ -113,13 +141,23 @@ class NativeLoop:
         note_rest(self.record, self.options, self._span)
         return self.record
 
+    def begin(self) -> None:
+        """Let happen what happens at the start, or raise its error."""
+        states = np.zeros(len(self.model.states))
+        self._instance.check(self._instance.library.states(self._instance.address, None, states.ctypes.data))
+
+    def _watched(self) -> AbstractContextManager[None]:
+        return nullcontext() if self._idas is None else self._idas.panels.integrator.interrupts.watched()
+
     @property
     def _crowded(self) -> bool:
         return self._buffers.run.n_events > self.options.max_events
 
     @property
     def _stuck(self) -> bool:
-        return bool(self.model.states) and self.counts[0] - self._passed[1] > self.options.max_steps
+        return (
+            bool(self.model.states) and self._idas is None and self.counts[0] - self._passed[1] > self.options.max_steps
+        )
 
     def _reached(self, time: float) -> bool:
         if self.progress is not None:
@@ -131,7 +169,7 @@ class NativeLoop:
     def _read(self) -> None:
         """Copy the written results into the record."""
         record, model, written = self.record, self.model, self._buffers
-        record.keeper.stretches = written["steps_taken"].copy()
+        record.keeper.steps = written["steps_taken"].copy()
         times, states = written["times"][:, 0], np.ascontiguousarray(written["states"].T)
         firsts, modes, events = written["firsts"][:, 0].astype(int), written["modes"], written["events"]
         # Events before a segment, in order; the last ones follow it.
@@ -143,9 +181,25 @@ class NativeLoop:
             if model.circuits:
                 note_sharing(record, model, record.segments[-1].start)
         self._note(before[-1])
-        record.impacts += impacts_of(model, written["impacts"].tolist())
+        record.impacts += _impacts_of(model, written["impacts"].tolist())
+        record.notices += self._idas.panels.notices if self._idas is not None else ()
 
     def _note(self, events: Vector) -> None:
         for row in events.tolist():
             transition, mode, before, after, number = (int(one) for one in row[1:6])
             self.record.note(self.model, row[0], mode, (before, after), transition, number)
+
+
+def _impact_size(model: CompiledDae) -> int:
+    """Return the number of columns that an impact takes in `NativeRun` in native.c."""
+    return 3 + 2 * (len(model.states) + len(model.implicit) + model.discrete_size)
+
+
+def _impacts_of(model: CompiledDae, rows: Sequence[Sequence[float]]) -> Iterator[Impact]:
+    """Yield impacts from what the run-time has written; the first one of an instant has the trials of all."""
+    last, (nx, nd) = np.nan, (len(model.states), model.discrete_size)
+    for time, held, energy, *numbers in rows:
+        parts = np.split(np.array(numbers), 2) if time != last else ()
+        points = [Point(time, part[:nx], part[nx : len(part) - nd], part[len(part) - nd :]) for part in parts]
+        yield Impact(time, model.holds[int(held)].component, energy, (points[0], points[1]) if points else None)
+        last = time

@@ -15,7 +15,7 @@ from modelica_like.compile.buffers import BufferedFunction
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.options import Options
-from modelica_like.solve.initialize import Point, call, is_linear, newton_at
+from modelica_like.solve.initialize import Point, call, polished
 from modelica_like.solve.interrupts import Interrupts
 
 _FLAGS = {
@@ -32,14 +32,12 @@ _FLAGS = {
     "IDA_ILL_INPUT": "an input was invalid",
 }
 
-_FIRST_STEP = 1e-5
+_FIRST_STEP = 1e-6
 """In scaled time. The first steps have a low order: longer ones cause errors of several tolerances at every event."""
 _SHORTENED = 1e-6
 """Largest factor by which IDAS shortens its first step before it gives up."""
 _SPARSE_FROM = 50
 """Number of unknowns from which CSparse is faster."""
-_POLISHING = 8
-POLISHED = 1e-8
 _RELAXATION = 10.0
 _PANEL_STEPS = 300
 """Largest number of steps between two results of a panel; with more, it has probably passed an event, and ends."""
@@ -222,7 +220,7 @@ class Integrator:
             x, z = x[:, :done], z[:, :done]
         if polish and self.model.implicit:
             times = start.t + span * np.arange(1, x.shape[1] + 1) / outputs
-            z = self.polished(times, x, z, start.d)
+            z = polished(self.model, times, x, z, start.d)
         return x, z
 
     def _call(self, start: Point, p: Vector, outputs: int, steps: int, gentle: bool) -> tuple[Vector, Vector, str]:
@@ -252,38 +250,6 @@ class Integrator:
         if self.counted and not why:
             self._count(instance.statistics())
         return x.reshape(outputs, -1).T, z.reshape(outputs, -1).T, why
-
-    def polished(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
-        """Solve for the implicit unknowns by Newton's method: IDAS returns them only within its tolerance.
-
-        Otherwise guards and constraints on them would be no more precise.
-
-        Args:
-            times: shape (n,), in s.
-            x: states, shape (nx, n).
-            z: guesses, shape (nz, n).
-            d: modes and discrete values, shape (nd,), or (nd, n) if they vary.
-        """
-        if not self.model.implicit:
-            return z
-        for _ in range(_POLISHING):
-            new = self._newton(times, x, z, d)
-            # Behind an event, the equations of the old mode may have no solution.
-            new = np.where(np.isfinite(new).all(axis=0), new, z)
-            step, z = new - z, new
-            # The error after a step of Newton's method is about the square of the step.
-            if is_linear(self.model) or not np.max(np.abs(step) - POLISHED * np.abs(z)) > POLISHED:
-                break
-        return z
-
-    def _newton(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
-        model, count = self.model, len(times)
-        if d.ndim > 1:
-            everywhere = model.along("newton", lambda: newton_at(model, look=False))
-            return everywhere(times, x, z, model.p, model.u, d)[0]
-        fast = model.fast(("newton", count), lambda: along(newton_at(model, look=False), count))
-        fast.forget()  # where a Jacobian is singular, CasADi ends without results
-        return fast(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)[0].reshape(count, -1).T
 
     def _count(self, statistics: dict[str, Any]) -> None:
         self.steps += int(statistics["nsteps"])
@@ -327,8 +293,3 @@ def _reached(text: str) -> float:
 
 def _at_the_start(text: str) -> bool:
     return _reached(text) == 0.0 and "IDA_TOO_MUCH_WORK" not in text
-
-
-def along(function: ca.Function, count: int) -> ca.Function:
-    """Return a function of (t, x, z, p, u, d) at `count` times with the same parameters, inputs and modes."""
-    return function.map(f"{function.name()}_along", "serial", count, [3, 4, 5], []) if count > 1 else function

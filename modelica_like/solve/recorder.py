@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
-
-import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import Source
@@ -90,14 +87,9 @@ class Segment:
         return Point(float(self.times[k]), self.x[:, k].copy(), self.z[:, k].copy(), self.d)
 
 
-Points = tuple[Vector, Vector, Vector]
-_TOGETHER = 64
-_NOTHING = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
-
-
 @dataclass
 class Recorder:
-    """Collects points into segments, events and losses in impacts, and dense output.
+    """Collects segments, events and losses in impacts, and dense output.
 
     `notices` are messages for the report; `ended` is whether a component has ended the run.
     """
@@ -108,33 +100,6 @@ class Recorder:
     notices: list[str] = field(default_factory=list)
     ended: bool = False
     keeper: Keeper = field(default_factory=Keeper)
-    _open: list[Points] = field(default_factory=list)
-    _closed: list[tuple[list[Points], Vector]] = field(default_factory=list)
-
-    def begin(self, point: Point) -> None:
-        """Begin a segment at a point."""
-        self._open = []
-        self.add(np.array([point.t]), point.x[:, None], point.z[:, None])
-
-    def add(self, times: Vector, x: Vector, z: Vector) -> None:
-        """Append at least one point; shapes (n,), (nx, n), (nz, n). The arrays may be filled in until `build`."""
-        # At once: an interrupt comes before or after it.
-        self._open.append((times, x, z))
-
-    @property
-    def many(self) -> bool:
-        """Whether to build segments before finishing more: many small arrays are slow."""
-        return len(self._closed) >= _TOGETHER
-
-    @property
-    def last(self) -> float:
-        """Time of the latest point of the open segment in s."""
-        return float(self._open[-1][0][-1])
-
-    @property
-    def fresh(self) -> bool:
-        """Whether the open segment has no more than its first point."""
-        return len(self._open) < 2
 
     def note(
         self, model: CompiledDae, time: float, number: int, change: tuple[int, int], transition: int, round: int
@@ -147,23 +112,5 @@ class Recorder:
         if known < 0:
             known = next(k for k, one in enumerate(model.transitions) if one.mode == number)
         self.ended |= transition >= 0 and model.transitions[transition].ends
-        source, segment = model.transitions[known].source, len(self.segments) + len(self._closed)
+        source, segment = model.transitions[known].source, len(self.segments)
         self.events.append(Event(time, mode.path, before, after, source, transition, segment, round))
-
-    def end(self, d: Vector) -> None:
-        """Close the segment, if one is open."""
-        if self._open:
-            self._closed.append((self._open, d.copy()))
-            self._open = []
-
-    def build(self, *, complete: bool = True) -> None:
-        """Build the finished segments; unless `complete`, of points that are not nan only."""
-        every = [part for parts, _ in self._closed for part in parts]
-        times, x, z = (np.concatenate(part, axis=-1) for part in zip(*every, strict=True)) if every else _NOTHING
-        last = 0
-        for parts, d in self._closed:
-            those: Any = slice(first := last, last := first + sum(len(part[0]) for part in parts))
-            if not complete:
-                those = first + np.flatnonzero(~np.isnan(x[:, those]).any(axis=0))
-            self.segments.append(Segment(times[those], x[:, those], z[:, those], d))
-        self._closed = []

@@ -33,7 +33,6 @@ from modelica_like.language import (
     var,
     when,
 )
-from modelica_like.solve.delays import Delays
 
 Run = Callable[..., Solution]
 
@@ -64,32 +63,6 @@ def test_polynomials_of_the_method_of_steps(run: Run, rtol: float):
     assert found["y"] == pytest.approx(np.sum(terms, axis=0), abs=3 * rtol)
     assert sum(len(one.times) > 1 for one in found.segments) == 10  # one for each delay
     assert found.at(3.5)["y"] == pytest.approx(np.interp(3.5, found.time, found["y"]), abs=1e-4)
-
-
-def test_kinks_become_smoother_with_every_delay_until_none_counts(monkeypatch: pytest.MonkeyPatch):
-    """At 1 s the slope jumps, at 2 s the second derivative, and so on: steps begin anew at the first eight."""
-    noted, plainly = list[tuple[float, int]](), Delays.broken
-
-    def broken(self: Delays, t: float, before: int = -1) -> None:
-        noted.append((t, before))
-        plainly(self, t, before)
-
-    monkeypatch.setattr(Delays, "broken", broken)
-    simulate(Feedback(y=1.0), 12.0)
-    assert noted == [(pytest.approx(k), k - 1) for k in range(1, 9)]
-
-
-def test_jumps_come_again_as_jumps(monkeypatch: pytest.MonkeyPatch):
-    """0.3 s after each jump of a wave, a count and what has come back: steps begin anew as after the first one."""
-    noted, plainly = list[tuple[float, int]](), Delays.broken
-
-    def broken(self: Delays, t: float, before: int = -1) -> None:
-        noted.append((round(t, 9), before))
-        plainly(self, t, before)
-
-    monkeypatch.setattr(Delays, "broken", broken)
-    simulate(Square(), 1.2)
-    assert [t for t in (0.8, 1.1) if (t, -1) not in noted] == []
 
 
 class Fast(Component):
@@ -268,19 +241,3 @@ def test_a_delayed_rate(run: Run):
     first = 1 / 3 + 2 / 3 * np.exp(-1.0)
     exact = np.where(early, (1 + 2 * np.exp(-found.time)) / 3, np.exp(-late) * (first + late / 3))
     assert found["y"] == pytest.approx(exact, abs=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("roughs", "halves"),
-    [
-        ([0.9], 0), ([5.0, 0.9], 1), ([5.0, 3.1], 0), ([5.0, 2.9, 0.5], 2), ([200.0, 190.0, 80.0, 0.1], 3),
-        ([100.0, 99.0, 1.0], 2),
-    ],
-)  # fmt: skip
-def test_a_series_is_halved_while_that_helps(roughs: list[float], halves: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Errors of the run itself do not fall with the length; above 100 tolerances they are always taken for bends."""
-    delays, lengths = object.__new__(Delays), list[float]()
-    monkeypatch.setattr(delays, "_series", lambda t, half: lengths.append(half) or len(lengths) - 1)
-    monkeypatch.setattr(delays, "_rough", lambda series: roughs[series])
-    half, series = delays._resolved(0.0, 1.0)
-    assert (half, series) == (0.5**halves, halves)

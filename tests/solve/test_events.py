@@ -1,8 +1,6 @@
 """Events against closed forms: located, ordered, iterated, and never missed."""
 
 import math
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -27,8 +25,6 @@ from modelica_like.language import (
     sin,
     var,
 )
-from modelica_like.solve.events import EventLoop
-from modelica_like.solve.instants import just_after
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 
@@ -57,7 +53,6 @@ def times(run: Solution) -> np.ndarray:
 def test_events_are_as_sharp_as_the_numbers_of_time() -> None:
     times = np.array([-1e6, -0.5, 0.0, 2.0])
     assert [time_resolution(t) for t in times] == pytest.approx([1e-4, 1e-10, 1e-10, 2e-10])
-    assert [just_after(t) for t in times] - times == pytest.approx([1e-6, 1e-12, 1e-12, 2e-12], rel=1e-3)
 
 
 # -- location --------------------------------------------------------------------------------------------------------
@@ -417,16 +412,6 @@ class Thrown(Component):
         yield self.state.go("below", "above", when=self.x > self.level)
 
 
-def test_a_top_that_is_not_found_again_is_passed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The top is above the level for 2 ms. If rounding hides that where the event is located, the run goes on."""
-    thrown, locate = Thrown(x=0.0, v=1.1), EventLoop._locate
+def test_a_top_above_a_level_for_two_thousandths_is_met() -> None:
+    thrown = Thrown(x=0.0, v=1.1)
     assert times(simulate(thrown, 1.0, points=1, **TIGHT)) == pytest.approx([0.549], abs=1e-8)
-
-    def hidden(*arguments: Any) -> Any:
-        cell, located = locate(*arguments)
-        return cell, located and replace(located, guards=[])
-
-    monkeypatch.setattr(EventLoop, "_locate", hidden)
-    # Here 0.2 ms: between two looks.
-    run = simulate(Thrown(x=0.0, v=1.1, level=0.3025 - 1e-8), 1.0, points=1)
-    assert (run.events, run.time[-1]) == ((), 1.0)

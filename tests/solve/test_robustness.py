@@ -26,11 +26,9 @@ from modelica_like.language import (
     series,
     var,
 )
-from modelica_like.options import Options
 from modelica_like.show.report.run import notices
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.initialize import Point
-from modelica_like.solve.pace import Pace
 
 TOLERANCES = [1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10]
 
@@ -128,18 +126,6 @@ def test_first_steps_do_not_follow_from_the_end_time(rtol: float) -> None:
 
 
 # -- results and memory ----------------------------------------------------------------------------------------------
-
-
-def test_no_call_has_more_than_some_thousand_results() -> None:
-    pace = Pace(0.0, 1.0, Options(points=1_000_000), guarded=False, timed=False)
-    sizes, t = [], 0.0
-    while t < 1.0:
-        span, count = pace.panel(t, 1.0)
-        sizes.append(count)
-        t += span
-    assert sum(sizes) == 1_000_000
-    assert max(sizes) <= 4096
-    assert len(set(sizes)) <= 2  # few instances of the integrator
 
 
 def test_results_behind_an_event_are_on_the_grid_and_on_the_solution() -> None:

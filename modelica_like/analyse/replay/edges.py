@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modelica_like.analyse.replay.chain import Reading, Replay
+from modelica_like.analyse.replay.guards import Guards
 from modelica_like.analyse.replay.holds import impact
 from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
-from modelica_like.solve.guards import Guards
 from modelica_like.solve.initialize import Point, call, holding, share, solve_implicit, variable_slopes
 from modelica_like.solve.initialize.slopes import Sizes, slopes
 

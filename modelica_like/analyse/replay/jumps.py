@@ -172,7 +172,7 @@ class Work:
         return part.value, total
 
     def fire(self, events: list[Event]) -> None:
-        """Carry out the transitions of a round together, and the impact that follows; see solve.instants."""
+        """Carry out the transitions of a round together, and the impact that follows; see events.c."""
         model, before = self.model, self.point.d
         transitions = [model.transitions[event.transition] for event in events if event.transition >= 0]
         x, d, dx, dd = self.point.x.copy(), self.point.d.copy(), self.x.copy(), self.d.copy()
@@ -206,7 +206,7 @@ class Work:
             self.resting.update(k for k in holding(model, self.point) if model.holds[k].mode in modes)
 
     def update(self) -> bool:
-        """Evaluate the discrete equations once; return whether something changes. See solve.instants."""
+        """Evaluate the discrete equations once; return whether something changes. See events.c."""
         model, rows = self.model, self.model.update_rows
         if not rows:
             return False
@@ -295,7 +295,7 @@ class Work:
         return float(value[0]), slope[0]
 
     def _project(self, targets: list[int], values: list[tuple[float, Vector]]) -> None:
-        """Change the states as little as possible until variables have their new values; see solve.events."""
+        """Change the states as little as possible until variables have their new values; see events.c."""
         model = self.model
         nodes = [model.reset_nodes[k] for k in targets]
         solve_implicit(model, self.point)

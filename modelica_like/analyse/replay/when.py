@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from modelica_like.analyse.replay.guards import Guards
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
-from modelica_like.solve.guards import Guards
 from modelica_like.solve.initialize import Point, call, holding, share, solve_implicit
 from modelica_like.solve.initialize.slopes import slopes
 from modelica_like.solve.recorder import Event

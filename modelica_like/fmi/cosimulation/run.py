@@ -32,7 +32,7 @@ from modelica_like.fmi.cosimulation.system import Inputs, Master, Settings, Syst
 from modelica_like.fmi.inside import PLACE
 from modelica_like.fmi.process import run_child, workplace
 from modelica_like.simulation import seconds
-from modelica_like.solve.events import Progress
+from modelica_like.solve.panels import Progress
 
 __all__ = ["CosimSolution", "Coupling", "cosim"]
 

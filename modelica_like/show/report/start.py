@@ -10,12 +10,12 @@ import casadi as ca
 import numpy as np
 from rich.console import RenderableType
 
+from modelica_like import upper
 from modelica_like.compile import CompiledDae
 from modelica_like.errors import MissingStart
 from modelica_like.language import Component
 from modelica_like.options import Options
 from modelica_like.show.report.tables import table
-from modelica_like.solve.events import EventLoop
 from modelica_like.solve.initialize import Point, StartKind, StartPlan, call, initialize, start_plan
 from modelica_like.solve.initialize.plan import matrix_and_values, start_name
 
@@ -52,7 +52,7 @@ def start_notes(model: CompiledDae) -> list[str]:
     try:
         if not model.inputs:
             first = initialize(model, start=model.settings.get("start", "given"))
-            EventLoop(model, Options(), first, first.t + 1.0).begin()
+            upper.EngineLoop(model, Options(), first, first.t + 1.0).begin()
     except MissingStart as error:
         return [f"{error.what} {error.advice}"]
     return []

@@ -37,6 +37,7 @@ from modelica_like.solve.initialize.point import implicit_at as implicit_at
 from modelica_like.solve.initialize.point import is_linear as is_linear
 from modelica_like.solve.initialize.point import newton_at as newton_at
 from modelica_like.solve.initialize.point import not_solved as not_solved
+from modelica_like.solve.initialize.point import polished as polished
 from modelica_like.solve.initialize.point import rate_not_finite as rate_not_finite
 from modelica_like.solve.initialize.point import solve_implicit as solve_implicit
 from modelica_like.solve.initialize.singular import implicit_singular as implicit_singular

@@ -18,6 +18,8 @@ from modelica_like.solve.initialize.singular import VANISHES, implicit_singular,
 
 _MAX_NEWTON = 50
 _ROUNDING = 1e-14
+_POLISHING, _POLISHED = 8, 1e-8
+"""Steps of Newton's method, and change below which the next one is rounding."""
 _FEW = 3
 """Largest number of implicit unknowns for which a step of Newton's method is unrolled."""
 _WELL_CONDITIONED = 1e10
@@ -115,6 +117,33 @@ def newton_at(model: CompiledDae, *, look: bool) -> ca.Function:
     new = arguments[2] - solved[:, 0]
     condition = size * ca.mmax(ca.fabs(jacobian)) * ca.mmax(ca.fabs(solved[:, 1:])) if look else 0
     return ca.Function("newton", arguments, [new, condition])
+
+
+def polished(model: CompiledDae, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
+    """Solve for the implicit unknowns by Newton's method, from what an integrator has within its tolerance.
+
+    Otherwise constraints on them would be no more precise.
+
+    Args:
+        model: the compiled model.
+        times: shape (n,), in s.
+        x: states, shape (nx, n).
+        z: guesses, shape (nz, n).
+        d: modes and discrete values, shape (nd,), or (nd, n) if they vary.
+    """
+    if not model.implicit:
+        return z
+    everywhere = model.along("newton", lambda: newton_at(model, look=False))
+    d = np.broadcast_to(d if d.ndim > 1 else d[:, None], (len(d), len(times)))
+    for _ in range(_POLISHING):
+        new = everywhere(times, x, z, model.p, model.u, d)[0]
+        # Behind an event, the equations of the old mode may have no solution.
+        new = np.where(np.isfinite(new).all(axis=0), new, z)
+        step, z = new - z, new
+        # The error after a step of Newton's method is about the square of the step.
+        if is_linear(model) or not np.max(np.abs(step) - _POLISHED * np.abs(z)) > _POLISHED:
+            break
+    return z
 
 
 def is_linear(model: CompiledDae) -> bool:
