@@ -19,7 +19,7 @@ import numpy as np
 from modelica_like import Solution, build, simulate
 from modelica_like.compile.buffers import BufferedFunction
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.solve.idas import Integrator
+from modelica_like.solve.idas import Grid, Integrator
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 NETLISTS = {
@@ -54,7 +54,7 @@ def segment_calls(run: Solution) -> Callable[[], None]:
 
     def integrate() -> None:
         for start, span, results in pieces:
-            integrator.run(start, span, results)
+            integrator.run(start, span, Grid(looks=results))
 
     return integrate
 

@@ -76,10 +76,10 @@ typedef struct {
     double gain, forward, backward, restitution;
 } Terms; /* of a motion that modes hold */
 
-typedef struct { /* of another integrator: four parts of equal width for each piece, and a row of unknowns per knot */
-    double begin, width;
-    int64_t parts;
-    const double *knots;
+typedef struct { /* of another integrator: where its pieces end, and five knots of each, shared with the next one */
+    double begin;
+    int64_t pieces, number; /* of the present one */
+    const double *ends, *knots;
 } Panel;
 
 /* Integrates from the present point up to a time at most; returns 0 where it cannot. */

@@ -39,20 +39,17 @@ int next_piece(Instance *c, double limit, double far) {
     State *s = &c->state;
     Panel *panel = &c->panel;
     double resolution = just_after(s) - s->t;
-    if (!s->panel_valid || s->t + resolution >= panel->begin + (double)panel->parts * panel->width) {
+    if (!s->panel_valid || s->t + resolution >= panel->ends[panel->pieces - 1]) {
         if (!c->integrator(far, panel)) return 0;
+        panel->number = 0;
         s->panel_valid = 1;
     }
-    double length = PARTS_OF_PIECE * panel->width, last = panel->begin + (double)panel->parts * panel->width;
-    double number = floor((s->t - panel->begin) / length);
-    if (panel->begin + (number + 1) * length <= s->t) number++; /* the quotient was rounded */
-    double begin = panel->begin + number * length, end = fmin(panel->begin + (number + 1) * length, last);
-    if (last - end < 0.5 * length) end = last;
-    size_t row = (size_t)number * PARTS_OF_PIECE * (size_t)c->model->n_unknowns;
-    piece_through(c->model, panel->knots + row, begin, end, c->piece);
-    if (end < limit && limit - end <= resolution) c->piece->end = limit;
-    if (s->t == begin && end <= limit) return 1;
+    while (panel->ends[panel->number] <= s->t) panel->number++;
+    double begin = panel->number > 0 ? panel->ends[panel->number - 1] : panel->begin;
+    const double *rows = panel->knots + panel->number * PARTS_OF_PIECE * c->model->n_unknowns;
+    piece_through(c->model, rows, begin, panel->ends[panel->number], c->piece);
+    if (s->t == begin && c->piece->end <= limit) return 1;
     memcpy(c->whole, c->piece, piece_size(c->model));
-    piece_between(c, c->whole, s->t, fmin(end, limit), c->piece);
+    piece_between(c, c->whole, s->t, fmin(c->piece->end, limit), c->piece);
     return 1;
 }

@@ -57,7 +57,7 @@ POINT = 5 * c.POINTER(_NUMBER)
 class Panel(c.Structure):
     """`Panel` in core.h."""
 
-    _fields_ = [("begin", _NUMBER), ("width", _NUMBER), ("parts", _COUNT), ("knots", _POINTER)]
+    _fields_ = [("begin", _NUMBER), ("pieces", _COUNT), ("number", _COUNT), ("ends", _POINTER), ("knots", _POINTER)]
 
 
 INTEGRATOR = c.CFUNCTYPE(c.c_int, _NUMBER, c.POINTER(Panel))

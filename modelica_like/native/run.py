@@ -45,7 +45,7 @@ class _ByIdas:
     def __init__(self, instance: Instance, panels: Panels, progress: Progress | None) -> None:
         self.panels, self._instance, self._progress = panels, instance, progress
         self._x, self._d = instance.point()
-        self._knots = np.zeros(0)
+        self._ends = self._knots = np.zeros(0)
         self._asked = INTEGRATOR(self._answer)
         felt = panels.felt
         instance.library.integrate_by(instance.address, self._asked, felt.ctypes.data)
@@ -56,13 +56,13 @@ class _ByIdas:
         try:
             if self._progress is not None:
                 self._progress(now.t)
-            width, self._knots = self.panels.go_on(now, limit)
+            self._ends, self._knots = self.panels.go_on(now, limit)
         except BaseException as error:  # noqa: BLE001 - also an interrupt: ctypes would lose it
             self.error = error
             return 0
         panel = place.contents
-        panel.begin, panel.width, panel.parts = now.t, width, len(self._knots) - 1
-        panel.knots = self._knots.ctypes.data
+        panel.begin, panel.pieces = now.t, len(self._ends)
+        panel.ends, panel.knots = self._ends.ctypes.data, self._knots.ctypes.data
         return 1
 
 

@@ -14,7 +14,7 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.options import SMALLEST_ATOL, Options
 from modelica_like.runs.quadrature import Places, rules
-from modelica_like.solve.idas import Integrator
+from modelica_like.solve.idas import Grid, Integrator
 from modelica_like.solve.initialize import Point
 from modelica_like.solve.recorder import Segment
 
@@ -216,7 +216,7 @@ class Powers:
         start = every.point(begin)
         span, count = float(every.times[end]) - start.t, _MORE * 2 ** math.ceil(math.log2(max(intervals, _LEAST)))
         try:
-            x, z = self._integrator.run(start, span, count)
+            x, z = self._integrator.run(start, span, Grid(looks=count))
         except StepFailed:
             return None
         times = start.t + span * np.arange(count + 1) / count

@@ -6,6 +6,8 @@ import io
 import math
 import re
 import sys
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -41,6 +43,36 @@ _SPARSE_FROM = 50
 _RELAXATION = 10.0
 _PANEL_STEPS = 300
 """Largest number of steps between two results of a panel; with more, it has probably passed an event, and ends."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Where results of a call lie: at equal distances in each piece of it.
+
+    Attributes:
+        pieces: their number.
+        looks: results of each piece.
+        power: 1 for pieces of equal length; with more, the first ones are shorter, as what begins asks for.
+    """
+
+    pieces: int = 1
+    looks: int = 1
+    power: int = 1
+
+    @cached_property
+    def ends(self) -> Vector:
+        """Ends of the pieces, as shares of the whole."""
+        return (np.arange(1, self.pieces + 1) / self.pieces) ** self.power
+
+    @cached_property
+    def shares(self) -> Vector:
+        """Places of the results, as shares of the whole."""
+        ends = np.append(0.0, self.ends)
+        inner = np.arange(1, self.looks + 1) / self.looks
+        return (ends[:-1, None] + np.diff(ends)[:, None] * inner).ravel()
+
+
+_END = Grid()
 
 
 def scaled_problem(model: CompiledDae, *, gentle: bool, scaled: bool) -> tuple[dict[str, Any], ca.Function]:
@@ -129,9 +161,9 @@ class Integrator:
         self._relaxed = factor
         self.tolerances = self.options.rtol * factor, self.options.atol * factor * self.model.nominals
 
-    def _instance(self, outputs: int, steps: int, gentle: bool, first: float, longest: float) -> BufferedFunction:
-        key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first, self._seconds, longest
-        return self.model.fast(key, lambda: self._make(outputs, steps, gentle, first, longest), results=(0, 1))
+    def _instance(self, grid: Grid, steps: int, gentle: bool, first: float, longest: float) -> BufferedFunction:
+        key = "idas", grid, self.rtol, self.options.atol, steps, gentle, first, self._seconds, longest
+        return self.model.fast(key, lambda: self._make(grid, steps, gentle, first, longest), results=(0, 1))
 
     def _longest(self, span: float, gentle: bool) -> float:
         """Return the largest step in scaled time, a power of two so that intervals share instances; 0 for none."""
@@ -152,13 +184,12 @@ class Integrator:
             step *= _FIRST_STEP
         return step
 
-    def _make(self, outputs: int, steps: int, gentle: bool, first: float, longest: float) -> ca.Function:
+    def _make(self, grid: Grid, steps: int, gentle: bool, first: float, longest: float) -> ca.Function:
         length = self._seconds or 1.0
         problem, _ = scaled_problem(self.model, gentle=gentle, scaled=self._seconds is None)
-        grid = np.arange(1, outputs + 1) / outputs
-        grid = (np.sqrt(grid) if gentle else grid * length).tolist()
+        places = (np.sqrt(grid.shares) if gentle else grid.shares * length).tolist()
         return ca.integrator(
-            "segment", "idas", problem, 0, grid, self._settings(steps, gentle, first * length, longest * length)
+            "segment", "idas", problem, 0, places, self._settings(steps, gentle, first * length, longest * length)
         )
 
     def _settings(self, steps: int, gentle: bool, first: float, longest: float) -> dict[str, Any]:
@@ -179,7 +210,7 @@ class Integrator:
         }
 
     def run(
-        self, start: Point, span: float, outputs: int = 1, *, patient: bool = True, partial: bool = False,
+        self, start: Point, span: float, grid: Grid = _END, *, patient: bool = True, partial: bool = False,
         polish: bool = True,
     ) -> tuple[Vector, Vector]:  # fmt: skip
         """Integrate from `start` over `span` seconds.
@@ -187,30 +218,29 @@ class Integrator:
         Args:
             start: consistent start.
             span: length of the interval in s.
-            outputs: number of equidistant results.
+            grid: of the results.
             patient: allow all steps between two results, not only the usual number.
             partial: fewer results are valid, too: those before IDAS gave up.
             polish: whether to solve for the implicit unknowns precisely.
 
         Returns:
-            States and implicit unknowns at `outputs` equidistant times, the last at the end; shapes (nx, outputs),
-            (nz, outputs).
+            States and implicit unknowns, shapes (nx, results), (nz, results).
 
         Raises:
             StepFailed: IDAS gave up.
         """
         self.calls += 1
         if not self.model.states:
-            return self._algebraic(start, span, outputs)
+            return self._algebraic(start, span, grid)
         p = np.concatenate([[start.t, span], self._tail, start.d])
         steps = self.options.max_steps if patient else min(self.options.max_steps, _PANEL_STEPS)
         gentle = span >= self._gentle_from
-        x, z, why = self._call(start, p, outputs, steps, gentle)
+        x, z, why = self._call(start, p, grid, steps, gentle)
         if why and not gentle and _at_the_start(why):
             # IDAS searches for consistent slopes at the start, and may not find them; with `gentle` they are known.
             self._gentle_from = min(span, self._gentle_from)
             gentle = True
-            x, z, why = self._call(start, p, outputs, steps, gentle)
+            x, z, why = self._call(start, p, grid, steps, gentle)
         if why or not np.isfinite(x[:, -1]).all():
             finite = np.isfinite(x).all(axis=0)
             done = int(np.argmin(finite)) if partial else 0
@@ -219,11 +249,11 @@ class Integrator:
                 raise self.gave_up
             x, z = x[:, :done], z[:, :done]
         if polish and self.model.implicit:
-            times = start.t + span * np.arange(1, x.shape[1] + 1) / outputs
+            times = start.t + span * grid.shares[: x.shape[1]]
             z = polished(self.model, times, x, z, start.d)
         return x, z
 
-    def _call(self, start: Point, p: Vector, outputs: int, steps: int, gentle: bool) -> tuple[Vector, Vector, str]:
+    def _call(self, start: Point, p: Vector, grid: Grid, steps: int, gentle: bool) -> tuple[Vector, Vector, str]:
         """Return the results of IDAS and its output if it gives up, which goes into the error and not to the screen.
 
         Raises:
@@ -232,7 +262,7 @@ class Integrator:
         self._seconds = float(p[1]) if self._whole and not gentle else None
         first = self._first_step(start, p[1]) if gentle else _FIRST_STEP
         longest = self._longest(p[1], gentle)
-        instance, scaled = self._instance(outputs, steps, gentle, first, longest), self._seconds is None
+        instance, scaled = self._instance(grid, steps, gentle, first, longest), self._seconds is None
         known = self.model.fast(
             ("known", gentle, scaled), lambda: scaled_problem(self.model, gentle=gentle, scaled=scaled)[1]
         )
@@ -249,24 +279,25 @@ class Integrator:
             sys.stderr = screen
         if self.counted and not why:
             self._count(instance.statistics())
-        return x.reshape(outputs, -1).T, z.reshape(outputs, -1).T, why
+        count = len(grid.shares)
+        return x.reshape(count, -1).T, z.reshape(count, -1).T, why
 
     def _count(self, statistics: dict[str, Any]) -> None:
         self.steps += int(statistics["nsteps"])
         self.evaluations += int(statistics["nfevals"])
 
-    def _algebraic(self, start: Point, span: float, outputs: int) -> tuple[Vector, Vector]:
+    def _algebraic(self, start: Point, span: float, grid: Grid) -> tuple[Vector, Vector]:
         """Without states: solve the implicit equations at each output."""
         from modelica_like.solve.initialize import solve_implicit
 
         columns: list[Vector] = []
         point = start.copy()
-        for k in range(1, outputs + 1):
-            point.t = start.t + span * k / outputs
+        for share in grid.shares:
+            point.t = start.t + span * float(share)
             solve_implicit(self.model, point)
             columns.append(point.z)
-        z = np.array(columns).T if self.model.implicit else np.zeros((0, outputs))
-        return np.zeros((0, outputs)), z
+        z = np.array(columns).T if self.model.implicit else np.zeros((0, len(columns)))
+        return np.zeros((0, len(columns))), z
 
     def _failed(self, start: Point, span: float, text: str, gentle: bool) -> StepFailed:
         flag = next((name for name in _FLAGS if name in text), "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,44 +12,48 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import StepFailed
 from modelica_like.options import Options
-from modelica_like.solve.idas import Integrator
+from modelica_like.solve.idas import Grid, Integrator
 from modelica_like.solve.initialize import Point
 
 Progress = Callable[[float], None]
 
-PARTS = 4
+_PARTS = 4
 """Of a piece, between knots of its polynomial; PARTS_OF_PIECE in panels.c."""
-_LOOKS = 2 * PARTS
+_LOOKS = 2 * _PARTS
 """Results of IDAS per piece: those between knots tell how far its polynomial is off."""
-_SIZES = 1, 4, 16, 64, 256
-"""Pieces of a call: few different numbers, because each needs an instance of IDAS."""
+_EVEN = tuple(Grid(pieces, _LOOKS) for pieces in (1, 4, 16, 64, 256))
+"""Grids of what goes on: few, because each needs an instance of IDAS."""
+_GRADED = Grid(32, _LOOKS, power=3)
+"""Grid of what begins: its first piece is 30,000 times as short as the whole."""
+_SMOOTH = 16
+"""Largest number of even pieces in what begins."""
+_WORTH = 16
+"""Pieces of a panel at least: a start of IDAS costs as much as ten of them."""
 _LARGEST = 2**22
 """Numbers in a call, limited by memory."""
 _PRECISE, _AIM = 2.0, 0.5
 """Largest error of a polynomial in tolerances, and the one to aim at: the error of IDAS is about one."""
 _ORDER = 5
 """Of that error, in the length of a piece."""
+_TELLING = 0.02
+"""Smaller errors are rounding and noise, and tell nothing about lengths."""
 _SHRINKS, _GROWS = 0.1, 30.0
 """Limits of a change of that length."""
-_LONGER = 4.0
-"""Growth of panels without events."""
-_FIRST = 256
-"""Pieces of a run, as far as one knows at its begin."""
-_FIRST_SPAN = 16
-"""First panel of a run with events, as a part of it."""
-_ROOM = 1.5
-"""Length of a panel over that of the last segment with its modes."""
-_WORTH = 16
-"""Pieces of a panel at least: a start costs as much as ten of them."""
-_MOST = 0.8
-"""Of the pieces of a panel, by whose errors the next lengths are chosen."""
+_MOST = 0.2
+"""Of the last pieces of a panel, whose wishes for the next ones count less: IDAS makes some noise."""
+_LONGER, _ROOM = 4.0, 1.5
+"""Growth of panels without events; length of a panel over that of the last segment with its modes."""
+_SHORTEST = 100
+"""Of a panel, in time resolutions."""
+_FIRST = 256, 16
+"""Pieces and panels of a run, as far as one knows at its begin."""
 _MAX_FAILURES, _FEW_FAILURES = 40, 6
 _SAME = 1e-3
 """Distance of two places at which IDAS gave up, relative to the panel, below which they are one."""
 
 
 def _nodes(degree: int) -> Vector:
-    """Differences at the looks between knots, from all looks of a piece; shape (PARTS, looks)."""
+    """Differences at the looks between knots, from all looks of a piece; shape (_PARTS, looks)."""
     knots, looks = np.arange(0, _LOOKS + 1, 2), np.arange(1, _LOOKS, 2)
     powers = np.arange(degree + 1)
     interpolate = (looks[:, None] / _LOOKS) ** powers @ np.linalg.inv((knots[:, None] / _LOOKS) ** powers)
@@ -58,7 +63,16 @@ def _nodes(degree: int) -> Vector:
     return differences
 
 
-_DIFFERENCES = _nodes(PARTS)
+_DIFFERENCES = _nodes(_PARTS)
+
+
+@dataclass
+class _Segment:
+    """Begin of a segment in s, how short its first pieces should have been, and how long it lasted, both in s."""
+
+    begin: float
+    finest: float
+    lasted: float = np.inf
 
 
 class Panels:
@@ -84,12 +98,17 @@ class Panels:
         whole = not (model.transitions or model.delay_parts or model.edges.count)
         self.integrator = Integrator(model, options, whole=whole)
         self.notices: list[str] = []
-        self._length = (end - begin) / _FIRST
-        self._span = (end - begin) / _FIRST_SPAN if self._guarded else np.inf
-        self._known: dict[bytes, tuple[float, float]] = {}
-        self._modes, self._since = b"", begin
-        self._begin, self._width, self._errors = begin, 0.0, np.zeros(0)
-        self._ends, self._cut = begin, False
+        most = max(_LARGEST // (_LOOKS * (len(model.states) + len(model.implicit))), 1)
+        self._grids = [grid for grid in _EVEN if grid.pieces <= most]
+        self._length, self._span = ((end - begin) / count for count in _FIRST)
+        if not self._guarded:
+            self._span = np.inf
+        self._switched = sorted({transition.mode for transition in model.transitions})
+        self._known: dict[bytes, _Segment] = {}
+        self._modes, self._segment = b"", _Segment(begin, self._length)
+        self._graded = self._cut = False
+        self._begin, self._ends, self._wishes = begin, np.zeros(0), np.zeros(0)
+        self._telling = np.zeros(0, bool)
         self._failures, self._failed_before, self._gave_up_at = 0, begin, -np.inf
 
     @property
@@ -97,96 +116,116 @@ class Panels:
         """Marks of the entries of d that equations of motion read: ticks that change no other are passed over."""
         return self.model.once("felt", lambda: _felt(self.model))
 
-    def go_on(self, now: Point, limit: float) -> tuple[float, Vector]:
+    def go_on(self, now: Point, limit: float) -> tuple[Vector, Vector]:
         """Integrate from a consistent point up to a time at most.
 
         Returns:
-            Width of a part in s, and knots: states and implicit unknowns, shape (parts + 1, nx + nz).
+            Ends of the pieces in s, and knots: states and implicit unknowns, shape (4 pieces + 1, nx + nz).
 
         Raises:
             StepFailed: IDAS gave up.
         """
-        self._learn(now)
+        begins = self._learn(now)
         while True:
-            span, pieces = self._plan(now.t, limit)
-            looks = self._looks(now, span, pieces)
-            good = self._judge(now.t, span / pieces, looks)
+            span, grid = self._plan(limit - now.t, _SHORTEST * time_resolution(now.t), begins=begins)
+            looks = self._looks(now, span, grid)
+            good = self._judge(now.t, span, grid, looks)
             if good:
-                self._ends = now.t + good * span / pieces
-                return span / pieces / PARTS, looks[: good * _LOOKS + 1 : 2].copy()
+                self._begin, self._ends = now.t, now.t + span * grid.ends[:good]
+                if span == limit - now.t and good == grid.pieces:
+                    self._ends[-1] = limit
+                return self._ends, looks[: good * _LOOKS + 1 : 2].copy()
+            begins = True
 
-    def _plan(self, t: float, limit: float) -> tuple[float, int]:
-        """Return length in s and number of pieces of a panel."""
-        most = max(_LARGEST // (_LOOKS * (len(self.model.states) + len(self.model.implicit))), 1)
-        sizes = [size for size in _SIZES if size <= most]
-        pieces = max(self._span / self._length, _WORTH)
-        fitting = [size for size in sizes if size <= pieces][-1]
-        if t + 1.1 * fitting * self._length < limit:
-            return fitting * self._length, fitting
-        return limit - t, next((size for size in sizes if size * self._length >= limit - t), sizes[-1])
+    def _plan(self, left: float, least: float, *, begins: bool) -> tuple[float, Grid]:
+        """Return length in s and grid of a panel; of time there is so much left, and a panel has so much at least."""
+        self._span = max(self._span, least)
+        if begins and self._graded and _GRADED.pieces <= self._grids[-1].pieces:
+            return (left if 1.1 * self._span >= left else self._span), _GRADED
+        span = self._span if begins else max(self._span, _WORTH * self._length)
+        span = min(left if 1.1 * span >= left else span, self._grids[-1].pieces * self._length)
+        return span, next(grid for grid in self._grids if grid.pieces * self._length >= span)
 
-    def _looks(self, now: Point, span: float, pieces: int) -> Vector:
-        """Return states and implicit unknowns at equal distances, shape (looks + 1, nx + nz): fewer if IDAS gave up."""
+    def _looks(self, now: Point, span: float, grid: Grid) -> Vector:
+        """Return states and implicit unknowns at the start and the grid, shape (looks + 1, nx + nz).
+
+        They are fewer if IDAS gave up.
+        """
         y = np.concatenate([now.x, now.z])[None]
         try:
-            x, z = self.integrator.run(
-                now, span, _LOOKS * pieces, patient=not self._guarded, partial=True, polish=False
-            )
+            x, z = self.integrator.run(now, span, grid, patient=not self._guarded, partial=True, polish=False)
         except StepFailed:
             return y
         return np.concatenate([y, np.concatenate([x, z]).T])
 
-    def _judge(self, t: float, length: float, looks: Vector) -> int:
-        """Return the number of pieces that are precise; if none is, the next panel is other."""
-        count, nx = (len(looks) - 1) // _LOOKS, len(self.model.states)
+    def _judge(self, t: float, span: float, grid: Grid, looks: Vector) -> int:
+        """Return the number of pieces that are precise, and note how long they should be.
+
+        If none is, the next panel is shorter.
+        """
+        count = (len(looks) - 1) // _LOOKS
         if not count:
-            self._gave_up(t, length)
+            self._gave_up(t, span)
             return 0
-        stride, width = looks.strides
-        shape = count, _LOOKS + 1, nx
-        blocks = np.lib.stride_tricks.as_strided(looks, shape, (_LOOKS * stride, stride, width), writeable=False)
-        sizes = np.abs(blocks[:, 0]) + np.abs(blocks[:, -1])
-        rtol, atol = self.integrator.tolerances
-        errors = np.abs(_DIFFERENCES @ blocks).max(axis=1) / (0.5 * rtol * sizes + atol)
-        self._errors = np.sqrt(np.mean(errors**2, axis=1))  # the norm of IDAS
-        self._begin, self._width = t, length
-        rough = ~(self._errors <= _PRECISE)
+        errors = np.nan_to_num(self._errors(looks, count), nan=np.inf)
+        lengths = span * np.diff(grid.ends[:count], prepend=0.0)
+        with np.errstate(divide="ignore"):  # a straight line has none
+            self._telling = errors > _TELLING
+            self._wishes = lengths * np.clip((_AIM / errors) ** (1 / _ORDER), _SHRINKS, _GROWS)
+        rough = ~(errors <= _PRECISE)
         good = int(np.argmax(rough)) if rough.any() else count
-        if not good and length <= time_resolution(t):
+        if not good and lengths[0] <= time_resolution(t):
             return 1  # nothing is known of what happens in so short a time
         self._cut = good < count
         if not good:
-            self._adapt(float(self._errors[0]))
-            self._span = 0.0
+            self._graded = True
+            self._span = _GRADED.pieces * float(self._wishes[0])
+            self._length = self._span / _GRADED.pieces
         return good
 
-    def _adapt(self, error: float) -> None:
-        factor = (_AIM / error) ** (1 / _ORDER) if 0 < error < np.inf else _SHRINKS if error else _GROWS
-        self._length = self._width * min(max(factor, _SHRINKS), _GROWS)
+    def _errors(self, looks: Vector, count: int) -> Vector:
+        """Return errors of the polynomials of pieces, in tolerances and in the norm of IDAS; shape (pieces,)."""
+        stride, width = looks.strides
+        shape = count, _LOOKS + 1, len(self.model.states)
+        pieces = np.lib.stride_tricks.as_strided(looks, shape, (_LOOKS * stride, stride, width), writeable=False)
+        relative, absolute = self.integrator.tolerances
+        weights = 0.5 * relative * (np.abs(pieces[:, 0]) + np.abs(pieces[:, -1])) + absolute
+        return np.sqrt(np.mean((np.abs(_DIFFERENCES @ pieces).max(axis=1) / weights) ** 2, axis=1))
 
-    def _learn(self, now: Point) -> None:
-        """Choose the next panel by the last one, as far as it was used, or by the last segment with the same modes."""
-        errors = self._errors[: max(int((now.t - self._begin) / self._width + 0.5) + 1, 1)] if self._width else ()
-        if len(errors):
-            # Where IDAS starts, with a low order, it makes some noise.
-            self._adapt(float(np.sort(errors)[int(_MOST * (len(errors) - 1))]))
-        self._width = 0.0
-        modes = now.d.tobytes()
-        if now.t >= self._ends and modes == self._modes:
-            used = self._ends - self._begin
-            self._span = _LONGER * (used if self._cut else max(self._span, used))
-        elif self._modes:
-            lasted = now.t - self._since
-            self._known[self._modes] = lasted, self._length
-            expected, self._length = self._known.get(modes, (lasted, self._length))
-            if self._guarded:
-                self._span = _ROOM * expected
-            self._since = now.t
-        self._modes = modes
+    def _learn(self, now: Point) -> bool:
+        """Choose the next panel by the last one, as far as it was used, or by the last segment with the same modes.
+
+        Returns:
+            Whether a segment begins.
+        """
+        modes, ends, segment = now.d[self._switched].tobytes(), self._ends, self._segment
         if now.t >= self._failed_before:
             self._failures = 0
+        if len(ends):
+            wishes = self._wishes[: int(np.searchsorted(ends, now.t)) + 1]
+            recent = np.sort(wishes[len(wishes) // 2 :])
+            self._length = float(recent[int(_MOST * (len(recent) - 1))])
+            if self._begin == segment.begin:
+                telling = wishes[self._telling[: len(wishes)]]
+                segment.finest = float(telling.min(initial=ends[len(wishes[:-1])] - self._begin))
+            passed = float(ends[-1] - self._begin)
+            self._span = _LONGER * (passed if self._cut else max(self._span, passed))
+        if begins := not len(ends) or now.t < ends[-1] - time_resolution(now.t) or modes != self._modes:
+            if len(ends):
+                segment.lasted = now.t - segment.begin
+                self._known[self._modes] = segment
+                self._begin_like(self._known.get(modes, segment))
+            self._segment = _Segment(now.t, self._length)
+        self._modes = modes
+        return begins
 
-    def _gave_up(self, t: float, length: float) -> None:
+    def _begin_like(self, last: _Segment) -> None:
+        self._length = last.finest
+        self._graded = last.lasted > _SMOOTH * last.finest
+        if self._guarded:
+            self._span = _ROOM * last.lasted
+
+    def _gave_up(self, t: float, span: float) -> None:
         """Count failures on the way to one place: shorter panels start closer to it, an event may be before it.
 
         The last resort is a relaxed tolerance.
@@ -196,17 +235,18 @@ class Panels:
         """
         # Without events, nothing but a tolerance can help across the same place.
         place, self._gave_up_at = self._gave_up_at, self.integrator.reached
-        same = not self._guarded and abs(self._gave_up_at - place) <= _SAME * length
+        same = not self._guarded and abs(self._gave_up_at - place) <= _SAME * span
         self._failures += _FEW_FAILURES if same else 1
-        self._failed_before = max(self._failed_before, t + length)
+        self._failed_before = max(self._failed_before, t + span)
         allowed = _MAX_FAILURES if self._guarded else _FEW_FAILURES
-        if self._failures <= allowed and length > time_resolution(t):
-            self._length = _SHRINKS * length
-            self._span = 0.0
+        if self._failures <= allowed and span > time_resolution(t):
+            self._span = _SHRINKS * span
+            self._length, self._graded = self._span / _GRADED.pieces, True
             return
         if not self.integrator.relax():
             raise self.integrator.gave_up
-        self._failures, self._length = 0, length
+        self._failures, self._span = 0, self._failed_before - t
+        self._length = self._span / _GRADED.pieces
         self.notices.append(
             f"At {t:.9g} s the integrator gave up; from there on its tolerance is {self.integrator.rtol:g} "
             f"instead of {self.options.rtol:g}."

@@ -7,7 +7,7 @@ from modelica_like import Options, build
 from modelica_like.errors import StepFailed
 from modelica_like.language import Component, Equations, Parameter, Variable, cos, der, param, var
 from modelica_like.solve import idas
-from modelica_like.solve.idas import Integrator, linear_solver
+from modelica_like.solve.idas import Grid, Integrator, linear_solver
 from modelica_like.solve.initialize import Point, initialize
 
 TIGHT = Options(rtol=1e-10, atol=1e-12)
@@ -50,7 +50,7 @@ def started(model: Component, options: Options = TIGHT) -> tuple[Integrator, Poi
 def test_states_and_implicit_unknowns_at_equal_distances(t: float, span: float) -> None:
     integrator, point = started(Decay())
     start = Point(t, point.x, point.z, point.d)
-    x, z = integrator.run(start, span, 4)
+    x, z = integrator.run(start, span, Grid(looks=4))
     passed = span * np.array([0.25, 0.5, 0.75, 1.0])
     np.testing.assert_allclose(x, [5.0 * np.exp(-passed / 2), -4e6 * np.exp(-passed / 2)], rtol=1e-8)
     for k in range(4):
@@ -76,19 +76,19 @@ def test_what_errors_are_measured_by() -> None:
 def test_where_it_gives_up_is_told(t: float) -> None:
     integrator, point = started(BlowUp(), Options())
     with pytest.raises(StepFailed, match=rf"^IDAS gave up at about t = {t + 1:g} s:") as caught:
-        integrator.run(Point(t, point.x, point.z, point.d), 4.0, 40)
+        integrator.run(Point(t, point.x, point.z, point.d), 4.0, Grid(looks=40))
     assert caught.value.why == "x changes fastest relative to its tolerance."
 
 
 def test_what_it_reached_is_an_answer_to_who_is_not_patient() -> None:
     integrator, start = started(BlowUp(), Options(rtol=1e-9))
-    x, _ = integrator.run(start, 4.0, 40, patient=False, partial=True)
+    x, _ = integrator.run(start, 4.0, Grid(looks=40), patient=False, partial=True)
     times = 0.1 * np.arange(1, x.shape[1] + 1)
     assert 8 <= len(times) <= 9
     np.testing.assert_allclose(x[1], 1 / (1 - times), rtol=1e-6)
     assert integrator.gave_up.what.startswith("IDAS gave up at about t = ")
     with pytest.raises(StepFailed):
-        integrator.run(start, 4.0, 3, patient=False, partial=True)
+        integrator.run(start, 4.0, Grid(looks=3), patient=False, partial=True)
 
 
 def test_what_is_not_finite_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -96,8 +96,8 @@ def test_what_is_not_finite_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
     states = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, np.nan]])
     monkeypatch.setattr(integrator, "_call", lambda *_: (states, np.zeros((1, 3)), ""))
     with pytest.raises(StepFailed, match="not finite"):
-        integrator.run(start, 1.0, 3)
-    x, z = integrator.run(start, 1.0, 3, patient=False, partial=True)
+        integrator.run(start, 1.0, Grid(looks=3))
+    x, z = integrator.run(start, 1.0, Grid(looks=3), patient=False, partial=True)
     np.testing.assert_array_equal(x, states[:, :2])
     assert z.shape == (1, 2)
 
@@ -114,7 +114,7 @@ def test_whole_runs_of_large_models_have_their_own_instances(
     make = integrator._make
     monkeypatch.setattr(integrator, "_make", lambda *asked: lengths.append(1) or make(*asked))
     for span in (0.5, 2.0, 0.5):
-        x, _ = integrator.run(start, span, 2)
+        x, _ = integrator.run(start, span, Grid(looks=2))
         np.testing.assert_allclose(x[0], 5.0 * np.exp(-np.array([0.25, 0.5]) * span), rtol=1e-8)
     assert len(lengths) == made
 
