@@ -193,20 +193,15 @@ static void take_piece(Instance *c) {
     keep_edges(c);
 }
 
-/* Takes the next piece of another integrator, shorter where an event or an edge asks for it. */
+/* Takes the next piece of another integrator, shorter where an event asks for it. */
 static Result take_given(Instance *c, double limit, double far) {
     State *s = &c->state;
-    double least = least_step(s), most = INFINITY;
-    int landings = 0;
-    for (int n = 0; n < MAX_REJECTIONS && limit - s->t >= least; n++) {
+    for (int n = 0; n < MAX_REJECTIONS && limit - s->t >= least_step(s); n++) {
         clear_pending(c);
         if (!next_piece(c, limit, far)) break;
-        double h = c->piece->end - s->t;
-        double seen = c->model->tapes.edges.n_outputs > 0 ? seen_length(c, least, &most) : INFINITY;
-        int lands = seen < h && landings++ < MAX_LANDINGS;
-        if (!lands && (c->model->n_guards == 0 || search_events(c))) return take_piece(c), RESULT_OK;
+        if (c->model->n_guards == 0 || search_events(c)) return take_piece(c), RESULT_OK;
         s->panel_valid = 0;
-        far = limit = s->t + (lands ? seen : 0.25 * h);
+        far = limit = s->t + 0.25 * (c->piece->end - s->t);
     }
     leave_piece(c);
     return fail(c, STEP_TOO_SMALL, s->t);

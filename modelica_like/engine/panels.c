@@ -2,6 +2,7 @@
 #include "core.h"
 
 #define PARTS_OF_PIECE 4
+#define MOST_PANELS 20 /* tried: what switches without end is integrated as it is written */
 
 /* The polynomials of degree four through five rows at equal distances, as `piece_at` wants them. */
 static void piece_through(const Model *m, const double *rows, double begin, double end, Piece *piece) {
@@ -33,22 +34,70 @@ void piece_between(Instance *c, const Piece *whole, double begin, double end, Pi
     piece_through(m, rows, begin, end, piece);
 }
 
+static double begin_of(const Panel *panel) {
+    return panel->number > 0 ? panel->ends[panel->number - 1] : panel->begin;
+}
+
+static void load_piece(Instance *c) {
+    const Panel *panel = &c->panel;
+    const double *rows = panel->knots + panel->number * PARTS_OF_PIECE * c->model->n_unknowns;
+    piece_through(c->model, rows, begin_of(panel), panel->ends[panel->number], c->piece);
+}
+
+/* Behind an event, equations of the old modes are not valid. */
+static int is_behind_event(Instance *c) {
+    const double *guards = c->looks;
+    if (c->model->n_guards == 0) return 0;
+    evaluate_special(c, &c->model->tapes.guards, c->piece->end, last_of(c->model, c->piece), c->looks);
+    for (int g = 0; g < c->model->n_guards; g++)
+        if (guards[g] > 0 && guard_active(c, g)) return 1;
+    return 0;
+}
+
+/* Judges the pieces of a new panel. Returns the time at which it has to end, as it has not seen what comes behind, or
+ * infinity; where waves ask for shorter pieces, `longest` is smaller than before. */
+static double judge_panel(Instance *c) {
+    Panel *panel = &c->panel;
+    double least = 1e-15 * fmax(1, fabs(c->state.t)), most, end = INFINITY;
+    c->edges_valid = 0;
+    for (panel->number = 0; panel->number < panel->pieces && isinf(end); panel->number++) {
+        load_piece(c);
+        double seen = seen_length(c, least, &most), h = c->piece->end - c->piece->begin;
+        keep_edges(c);
+        if (seen < h && seen == most) panel->longest = end = seen;
+        else if (seen < h) end = c->piece->begin + seen;
+        else if (is_behind_event(c)) break;
+    }
+    c->edges_valid = c->look_valid = 0;
+    return end;
+}
+
+/* A panel that steps over no edge: where it does, it is cut there. */
+static int new_panel(Instance *c, double far) {
+    Panel *panel = &c->panel;
+    panel->longest = INFINITY;
+    for (int n = 0; n < MOST_PANELS; n++) {
+        double longest = panel->longest;
+        if (!c->integrator(far, panel)) return 0;
+        double end = c->model->tapes.edges.n_outputs > 0 ? judge_panel(c) : INFINITY;
+        if (isinf(end)) break;
+        if (panel->longest == longest) far = fmin(far, end);
+    }
+    panel->number = 0;
+    return c->state.panel_valid = 1;
+}
+
 /* The next piece from the present point, up to `limit` at most; panels go as far as `far`, behind time events that
  * change nothing that moves. Returns 0 where the integrator cannot go on. */
 int next_piece(Instance *c, double limit, double far) {
     State *s = &c->state;
     Panel *panel = &c->panel;
     double resolution = just_after(s) - s->t;
-    if (!s->panel_valid || s->t + resolution >= panel->ends[panel->pieces - 1]) {
-        if (!c->integrator(far, panel)) return 0;
-        panel->number = 0;
-        s->panel_valid = 1;
-    }
+    int ended = !s->panel_valid || s->t + resolution >= panel->ends[panel->pieces - 1];
+    if (ended && !new_panel(c, far)) return 0;
     while (panel->ends[panel->number] <= s->t) panel->number++;
-    double begin = panel->number > 0 ? panel->ends[panel->number - 1] : panel->begin;
-    const double *rows = panel->knots + panel->number * PARTS_OF_PIECE * c->model->n_unknowns;
-    piece_through(c->model, rows, begin, panel->ends[panel->number], c->piece);
-    if (s->t == begin && c->piece->end <= limit) return 1;
+    load_piece(c);
+    if (s->t == c->piece->begin && c->piece->end <= limit) return 1;
     memcpy(c->whole, c->piece, piece_size(c->model));
     piece_between(c, c->whole, s->t, fmin(c->piece->end, limit), c->piece);
     return 1;

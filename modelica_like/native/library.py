@@ -57,7 +57,11 @@ POINT = 5 * c.POINTER(_NUMBER)
 class Panel(c.Structure):
     """`Panel` in core.h."""
 
-    _fields_ = [("begin", _NUMBER), ("pieces", _COUNT), ("number", _COUNT), ("ends", _POINTER), ("knots", _POINTER)]
+    _fields_ = [
+        *((name, _NUMBER) for name in ("begin", "longest")),
+        *((name, _COUNT) for name in ("pieces", "number")),
+        *((name, _POINTER) for name in ("ends", "knots")),
+    ]
 
 
 INTEGRATOR = c.CFUNCTYPE(c.c_int, _NUMBER, c.POINTER(Panel))

@@ -306,6 +306,10 @@ class Integrator:
         self.reached = moment = start.t + span * reached
         return self.failure(f"IDAS gave up at about t = {moment:.6g} s: {reason}{f' ({flag})' if flag else ''}.", start)
 
+    def too_fast(self, point: Point) -> StepFailed:
+        """Return the error of states that change by more than their tolerances in any time that can be told."""
+        return self.failure(f"IDAS gave up at about t = {point.t:.6g} s: {_FLAGS['IDA_ERR_FAIL']}.", point)
+
     def failure(self, what: str, point: Point) -> StepFailed:
         """Return an error that names the state which changes fastest at a point."""
         speed = np.abs(call(self.model, self.model.ode, point)) / self.weights(point.x)

@@ -116,8 +116,8 @@ class Panels:
         """Marks of the entries of d that equations of motion read: ticks that change no other are passed over."""
         return self.model.once("felt", lambda: _felt(self.model))
 
-    def go_on(self, now: Point, limit: float) -> tuple[Vector, Vector]:
-        """Integrate from a consistent point up to a time at most.
+    def go_on(self, now: Point, limit: float, longest: float = np.inf) -> tuple[Vector, Vector]:
+        """Integrate from a consistent point up to a time at most, in pieces that are not longer than asked for.
 
         Returns:
             Ends of the pieces in s, and knots: states and implicit unknowns, shape (4 pieces + 1, nx + nz).
@@ -126,10 +126,12 @@ class Panels:
             StepFailed: IDAS gave up.
         """
         begins = self._learn(now)
+        if longest < np.inf:
+            self._length, self._graded = min(self._length, longest), False
         while True:
             span, grid = self._plan(limit - now.t, _SHORTEST * time_resolution(now.t), begins=begins)
             looks = self._looks(now, span, grid)
-            good = self._judge(now.t, span, grid, looks)
+            good = self._judge(now, span, grid, looks)
             if good:
                 self._begin, self._ends = now.t, now.t + span * grid.ends[:good]
                 if span == limit - now.t and good == grid.pieces:
@@ -158,12 +160,15 @@ class Panels:
             return y
         return np.concatenate([y, np.concatenate([x, z]).T])
 
-    def _judge(self, t: float, span: float, grid: Grid, looks: Vector) -> int:
+    def _judge(self, now: Point, span: float, grid: Grid, looks: Vector) -> int:
         """Return the number of pieces that are precise, and note how long they should be.
 
         If none is, the next panel is shorter.
+
+        Raises:
+            StepFailed: states change ever faster.
         """
-        count = (len(looks) - 1) // _LOOKS
+        count, t = (len(looks) - 1) // _LOOKS, now.t
         if not count:
             self._gave_up(t, span)
             return 0
@@ -172,10 +177,11 @@ class Panels:
         with np.errstate(divide="ignore"):  # a straight line has none
             self._telling = errors > _TELLING
             self._wishes = lengths * np.clip((_AIM / errors) ** (1 / _ORDER), _SHRINKS, _GROWS)
-        rough = ~(errors <= _PRECISE)
+        precise = errors <= _PRECISE
+        rough = ~precise & (lengths > time_resolution(t))  # what happens in a shorter time is a jump
         good = int(np.argmax(rough)) if rough.any() else count
-        if not good and lengths[0] <= time_resolution(t):
-            return 1  # nothing is known of what happens in so short a time
+        if good and not precise[:good].any():
+            raise self.integrator.too_fast(now)
         self._cut = good < count
         if not good:
             self._graded = True
