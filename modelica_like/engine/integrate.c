@@ -201,7 +201,7 @@ static Result take_given(Instance *c, double limit, double far) {
         if (!next_piece(c, limit, far)) break;
         if (c->model->n_guards == 0 || search_events(c)) return take_piece(c), RESULT_OK;
         s->panel_valid = 0;
-        far = limit = s->t + 0.25 * (c->piece->end - s->t);
+        far = limit = s->t + (c->whole->begin > c->panel.begin ? 1 : 0.25) * (c->whole->end - s->t);
     }
     leave_piece(c);
     return fail(c, STEP_TOO_SMALL, s->t);

@@ -31,7 +31,7 @@ _WORTH = 16
 """Pieces of a panel at least: a start of IDAS costs as much as ten of them."""
 _LARGEST = 2**22
 """Numbers in a call, limited by memory."""
-_PRECISE, _AIM = 2.0, 0.5
+_PRECISE, _AIM = 1.0, 0.2
 """Largest error of a polynomial in tolerances, and the one to aim at: the error of IDAS is about one."""
 _ORDER = 5
 """Of that error, in the length of a piece."""
@@ -155,7 +155,7 @@ class Panels:
         """
         y = np.concatenate([now.x, now.z])[None]
         try:
-            x, z = self.integrator.run(now, span, grid, patient=not self._guarded, partial=True, polish=False)
+            x, z = self.integrator.run(now, span, grid, patient=False, partial=True, polish=False)
         except StepFailed:
             return y
         return np.concatenate([y, np.concatenate([x, z]).T])
@@ -181,7 +181,9 @@ class Panels:
         rough = ~precise & (lengths > time_resolution(t))  # what happens in a shorter time is a jump
         good = int(np.argmax(rough)) if rough.any() else count
         if good and not precise[:good].any():
-            raise self.integrator.too_fast(now)
+            self.integrator.gave_up = self.integrator.too_fast(now)
+            self._relax(t)
+            return 0
         self._cut = good < count
         if not good:
             self._graded = True
@@ -249,10 +251,13 @@ class Panels:
             self._span = _SHRINKS * span
             self._length, self._graded = self._span / _GRADED.pieces, True
             return
-        if not self.integrator.relax():
-            raise self.integrator.gave_up
+        self._relax(t)
         self._failures, self._span = 0, self._failed_before - t
         self._length = self._span / _GRADED.pieces
+
+    def _relax(self, t: float) -> None:
+        if not self.integrator.relax():
+            raise self.integrator.gave_up
         self.notices.append(
             f"At {t:.9g} s the integrator gave up; from there on its tolerance is {self.integrator.rtol:g} "
             f"instead of {self.options.rtol:g}."

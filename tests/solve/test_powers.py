@@ -13,6 +13,7 @@ from modelica_like.errors import StepFailed
 from modelica_like.options import Options
 from modelica_like.runs import powers
 from modelica_like.runs.powers import _BESIDE, Powers, Results, _mixing, _together
+from modelica_like.solve.idas import Grid
 from modelica_like.solve.initialize import Point
 from modelica_like.solve.recorder import Segment
 
@@ -104,7 +105,8 @@ def test_four_or_more_finer_results_for_each_interval(intervals: int, count: int
     """The next power of two, so that few instances of IDAS are needed; they lie from result to result."""
     asked: list[Any] = []
 
-    def run(start: Point, span: float, number: int) -> tuple[Any, Any]:
+    def run(start: Point, span: float, grid: Grid) -> tuple[Any, Any]:
+        number = grid.looks
         asked.append((start.t, span, number))
         return np.arange(2.0 * number).reshape(2, -1), np.arange(1.0 * number)[None]
 
@@ -123,7 +125,8 @@ def test_a_stretch_that_fails_is_halved(bad: list[int], calls: int) -> None:
     """Of 0 to 7 and 8 to 11, until only the bad ones are left; after 20 failures the rest stays as it is."""
     asked: list[Any] = []
 
-    def run(start: Point, span: float, number: int) -> tuple[Any, Any]:
+    def run(start: Point, span: float, grid: Grid) -> tuple[Any, Any]:
+        number = grid.looks
         asked.append((start.t, span))
         if any(start.t <= one < start.t + span for one in bad):
             raise StepFailed("it gave up")
