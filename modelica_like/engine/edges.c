@@ -105,7 +105,7 @@ double edge_ahead(Instance *c, double t, double *behind) {
 
 /* Does a tangent, whose dots are loaded, move an edge on which the piece stands by more than a part? */
 int leads_off_edge(Instance *c, double least) {
-    int n = c->model->settings->n_slope_edges, any = 0;
+    int n = c->model->settings->n_kinks, any = 0;
     const double *here = c->edges_middle, *end = here + c->model->tapes.edges.n_outputs;
     double *moved = c->edges_middle + 2 * c->model->tapes.edges.n_outputs;
     if (n > 0) tangent_now(c, &c->model->tapes.edges, moved);
@@ -143,7 +143,7 @@ static const double *guards_inside(Instance *c, double t) {
     return c->edge_guards;
 }
 
-/* Is an edge of slopes, or a guard, zero now and at the end of the piece? Nothing but parameters may lead off it.
+/* Is a kink, or a guard, zero now and at the end of the piece? Nothing but parameters may lead off it.
  * `zero` marks the guards. */
 int stands_on_edge(Instance *c, unsigned char *zero) {
     const Model *m = c->model;
@@ -154,9 +154,9 @@ int stands_on_edge(Instance *c, unsigned char *zero) {
         const double *guards = guards_inside(c, t);
         for (int k = 0; k < m->n_guards; k++)
             zero[k] = (side == 0 || zero[k]) && fabs(guards[k]) <= AT_EDGE && guard_active(c, k);
-        if (m->settings->n_slope_edges > 0) edges_inside(c, t, side == 0 ? here : end);
+        if (m->settings->n_kinks > 0) edges_inside(c, t, side == 0 ? here : end);
     }
-    for (int k = 0; k < m->settings->n_slope_edges; k++) any |= fabs(here[k]) <= AT_EDGE && fabs(end[k]) <= AT_EDGE;
+    for (int k = 0; k < m->settings->n_kinks; k++) any |= fabs(here[k]) <= AT_EDGE && fabs(end[k]) <= AT_EDGE;
     return any | any_of(zero, m->n_guards);
 }
 
