@@ -4,7 +4,8 @@ A function of a state, such as exp(-((x - x0)/w)²), 1/(1 + ((x - x0)/w)²) or t
 few w it does what a kink does. An integrator whose step goes over it sees nothing. So its places are edges:
 
 - The top of a pulse, at which the argument has no slope. It is a change of sign that no step is long enough to hide.
-  The argument of an exponential may turn because a state does, too: it has its top where its rate is zero.
+  The argument of an exponential may also turn because its states do: where nothing else bends, the top is at the zero
+  of its rate.
 - Its flanks: where an exponential begins to count, and elsewhere the points of inflection. Between flank and top is a
   good part of the pulse, which a few looks show. Both come to light when the top is located.
 - The middle of a step, if there is another one elsewhere: two, one after the other, are a pulse. One alone has other
@@ -66,17 +67,12 @@ class Narrow:
         yield from self._of_steps(steps)
 
     def _of_exponential(self, turns: Any, exponent: Any) -> Iterator[Any]:
-        moving = self._moving(turns)
+        moving, size = self._moving(turns), 1 + ca.fabs(turns)
         slopes = [_slopes(turns, one) for one in moving]
-        size = 1 + ca.fabs(turns)
-        if any(one.element_hash() in self._implicit for one in moving):  # whose rates are not known
-            tops = [_distance(slope, slope, bend, size) for slope, bend in slopes if not bend.is_zero()]
-        else:
-            rate = sum((slope * self._rates[one.element_hash()] for one, (slope, _) in zip(moving, slopes, strict=True)),
-                       ca.SX(0))  # fmt: skip
-            bends = sum((ca.fabs(bend) for _, bend in slopes), ca.SX(0))
-            tops = [_distance(rate, ca.norm_2(ca.vertcat(*(slope for slope, _ in slopes))), bends, size)]
-            tops = tops if self._moving(rate) else []
+        tops = [_distance(slope, slope, bend, size) for slope, bend in slopes if not bend.is_zero()]
+        if not tops and not any(one.element_hash() in self._implicit for one in moving):  # whose rates are not known
+            rate = sum(slope * self._rates[one.element_hash()] for one, (slope, _) in zip(moving, slopes, strict=True))
+            tops = [rate] if self._moving(rate) else []
         yield from [*tops, (exponent + _COUNTS_FROM) / (ca.fabs(exponent) + _COUNTS_FROM)] if tops else []
 
     def _of_power(self, base: Any, exponent: Any) -> Iterator[Any]:
