@@ -24,8 +24,8 @@ def lowest(name: str, sign: float) -> float:
     """The lowest value of a signal times a sign, at the best of many times, made precise."""
     times = np.linspace(0, END, 20001)
     begin = times[np.argmin(sign * closed_form(times)[name])]
-    found = minimize_scalar(lambda t: sign * value(name, t), bounds=(max(begin - 1e-5, 0), min(begin + 1e-5, END)), method="bounded",
-                            options={"xatol": 1e-12})  # fmt: skip
+    near = max(begin - 1e-5, 0), min(begin + 1e-5, END)
+    found = minimize_scalar(lambda t: sign * value(name, t), bounds=near, method="bounded", options={"xatol": 1e-12})
     return float(found.fun)
 
 

@@ -24,6 +24,8 @@ from modelica_like.language import (
 )
 from modelica_like.simulation import Solver
 
+SEEDS = 6
+"""Forces of each shape."""
 SOLVERS = pytest.mark.parametrize("solver", ["idas", "native"])
 _ROOT = math.sqrt(math.pi)
 
@@ -132,7 +134,7 @@ def work(one: Flight, x: float) -> float:
 @SOLVERS
 @pytest.mark.parametrize("shape", range(len(SHAPES)), ids=[one.__name__ for one, _ in SHAPES])
 def test_a_narrow_smooth_force_does_its_work(shape: int, solver: Solver) -> None:
-    for seed in range(6):
+    for seed in range(SEEDS):
         one, end, speed = flight(seed, shape)
         run = simulate(one, end, solver=solver, rtol=1e-8, points=20 + 50 * seed)
         final = math.sqrt(speed**2 - 2 * work(one, float(run.final["x"])))
