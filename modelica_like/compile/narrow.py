@@ -8,8 +8,8 @@ few w it does what a kink does. An integrator whose step goes over it sees nothi
   of its rate.
 - Its flanks: where an exponential begins to count, and elsewhere the points of inflection. Between flank and top is a
   good part of the pulse, which a few looks show. Both come to light when the top is located.
-- The middle of a step, if there is another one elsewhere: two, one after the other, are a pulse. One alone has other
-  values behind it, which every integrator sees.
+- The middle of a step (tanh), or of a bend (a root of squares), if there is another one elsewhere: two, one after the
+  other, are a pulse. One alone has other values or slopes behind it, which every integrator sees.
 
 All come from the expression graph; slopes are taken by one moving symbol at a time, with the others held. Powers
 without a bend in a symbol (1/x) have no edge.
@@ -29,7 +29,8 @@ _EXPONENTIALS = frozenset({ca.OP_EXP, ca.OP_EXPM1})
 _POWERS = frozenset({ca.OP_POW, ca.OP_CONSTPOW})
 _RECIPROCALS = frozenset({ca.OP_DIV, ca.OP_INV})
 _TINY = 1e-300
-NARROW = _STEPS | _EXPONENTIALS | _POWERS | _RECIPROCALS
+_ROOTS = frozenset({ca.OP_SQRT, ca.OP_HYPOT})
+NARROW = _STEPS | _ROOTS | _EXPONENTIALS | _POWERS | _RECIPROCALS
 """Operations that may make a narrow pulse or step."""
 _STEEP = 3.0
 """Powers from 0 to this one are no narrower than their base."""
@@ -56,6 +57,9 @@ class Narrow:
             base, last = operands[0], operands[-1]
             if code in _STEPS:
                 steps.append(base)
+            elif code in _ROOTS:
+                square = base if code == ca.OP_SQRT else base**2 + last**2
+                steps += [_distance(slope, slope, bend, ca.fabs(square)) for slope, bend in self._bends(square)]
             elif code in _EXPONENTIALS:
                 yield from self._of_exponential(base, base)
             elif code in _RECIPROCALS:
@@ -69,18 +73,17 @@ class Narrow:
     def _of_exponential(self, turns: Any, exponent: Any) -> Iterator[Any]:
         moving, size = self._moving(turns), 1 + ca.fabs(turns)
         slopes = [_slopes(turns, one) for one in moving]
-        tops = [_distance(slope, slope, bend, size) for slope, bend in slopes if not bend.is_zero()]
+        tops = [_distance(slope, slope, bend, size) for slope, bend in self._bends(turns)]
         if not tops and not any(one.element_hash() in self._implicit for one in moving):  # whose rates are not known
             rate = sum(slope * self._rates[one.element_hash()] for one, (slope, _) in zip(moving, slopes, strict=True))
             tops = [rate] if self._moving(rate) else []
         yield from [*tops, (exponent + _COUNTS_FROM) / (ca.fabs(exponent) + _COUNTS_FROM)] if tops else []
 
     def _of_power(self, base: Any, exponent: Any) -> Iterator[Any]:
-        for slope, bend in (_slopes(base, one) for one in self._moving(base)):
-            if not bend.is_zero():
-                steep, bent = (exponent - 1) * slope**2, base * bend
-                yield _distance(slope, slope, bend, ca.fabs(base))
-                yield (steep + bent) / (ca.fabs(steep) + ca.fabs(bent) + _TINY)
+        for slope, bend in self._bends(base):
+            steep, bent = (exponent - 1) * slope**2, base * bend
+            yield _distance(slope, slope, bend, ca.fabs(base))
+            yield (steep + bent) / (ca.fabs(steep) + ca.fabs(bent) + _TINY)
 
     def _of_steps(self, arguments: list[Any]) -> Iterator[Any]:
         """Yield the middles of steps that are not all where their symbols are zero."""
@@ -92,6 +95,12 @@ class Narrow:
         for one, symbols in zip(arguments, moving, strict=True):
             if any(symbol.element_hash() in aside for symbol in symbols):
                 yield one
+
+    def _bends(self, expression: Any) -> Iterator[tuple[Any, Any]]:
+        """Yield first and second derivatives by each moving symbol in which an expression is not linear."""
+        for slope, bend in (_slopes(expression, one) for one in self._moving(expression)):
+            if not bend.is_zero():
+                yield slope, bend
 
     def _moving(self, expression: Any) -> list[Any]:
         keys = self._rates.keys() | self._implicit

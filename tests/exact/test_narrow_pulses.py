@@ -5,9 +5,13 @@ from collections.abc import Callable
 from random import Random
 from typing import Any
 
+import casadi as ca
+import numpy as np
 import pytest
 
-from modelica_like import build, export_fmu, run_fmu, simulate
+from modelica_like import build, export_fmu, run_fmu, sensitivities, simulate
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import NoGradient
 from modelica_like.language import (
     Component,
     Equations,
@@ -67,6 +71,10 @@ def two_rational_steps(u: Expr) -> Expr:
     return (left / sqrt(0.04 + left**2) - right / sqrt(0.04 + right**2)) / 4
 
 
+def tent(u: Expr) -> Expr:
+    return (sqrt((u + 1) ** 2 + 1e-4) - 2 * sqrt(u**2 + 1e-4) + sqrt((u - 1) ** 2 + 1e-4)) / 2
+
+
 def _atan(a: float, b: float) -> float:
     return (math.atan(b) - math.atan(a)) / math.pi
 
@@ -93,7 +101,7 @@ def _whole(_a: float, _b: float) -> float:
 Shape = Callable[[Any], Any]
 SHAPES: tuple[tuple[Shape, Callable[[float, float], float]], ...] = (
     (gaussian, _whole), (expanded, _whole), (power_of_two, _whole), (flat_top, _whole), (two_steps, _whole),
-    (rational, _atan), (rational_square, _square), (rational_root, _root), (two_rational_steps, _steps),
+    (rational, _atan), (rational_square, _square), (rational_root, _root), (two_rational_steps, _steps), (tent, _whole),
 )  # fmt: skip
 """Forces whose work over all u is one, and their work from u = a to b."""
 
@@ -216,3 +224,22 @@ def test_an_edge_of_a_smooth_function_is_no_kink() -> None:
     assert build(Friction()).edges.count == 0
     edges = build(flight(0, 0)[0]).edges
     assert (edges.count, edges.slopes, edges.kinks) == (2, 2, 0)
+
+
+@pytest.mark.parametrize("method", ["forward", "adjoint"])
+def test_derivatives_of_what_a_narrow_force_leaves(method: Any) -> None:
+    """v = sqrt(1 - 2 E) does not depend on the place; x = a + v (t - a) behind it, where t = 4."""
+    one = Flight(v=1.0, shape=0, a=1.0, w=1e-4, energy=0.375)
+    found = sensitivities(one, ["v", "x"], ["energy", "a"], until=4.0, method=method)
+    assert found.derivatives == pytest.approx(np.array([[-2, 0], [-6, 0.5]]), rel=1e-4, abs=1e-5)
+
+
+def test_derivatives_of_another_run_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A repetition that goes over the force ends elsewhere."""
+    monkeypatch.setattr("modelica_like.analyse.replay.kinks._switches", no_switches)
+    with pytest.raises(NoGradient, match=r"ends with x = 2\.50002, its repetition for the derivatives with 4\."):
+        sensitivities(Flight(v=1.0, shape=0, a=1.0, w=1e-4, energy=0.375), "v", "energy", until=4.0)
+
+
+def no_switches(model: CompiledDae) -> ca.Function:
+    return ca.Function("kinks", [*model.arguments.values()], [ca.SX(0, 1)])
