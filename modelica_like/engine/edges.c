@@ -114,8 +114,8 @@ int leads_off_edge(Instance *c, double least) {
 }
 
 /* What the states change in a window otherwise than by their slopes, in tolerances. The matrix of the step takes away
- * what decays in it, as from the estimate of its error. */
-static double window_error(Instance *c, double begin, double end) {
+ * what decays in it, as from the estimate of its error, but costs more than the rest. */
+static double window_error(Instance *c, double begin, double end, int with_matrix) {
     const Model *m = c->model;
     double *point = c->vector + m->n_z, *slopes = c->edge_slopes, *change = c->edge_change,
            h = c->piece->end - c->piece->begin;
@@ -130,8 +130,11 @@ static double window_error(Instance *c, double begin, double end) {
     piece_at(m, c->piece, begin, point);
     for (int k = 0; k < m->n_x; k++) change[k] += point[k];
     piece_at(m, c->piece, end, point);
-    for (int k = 0; k < m->n_x; k++) change[k] = (change[k] - point[k]) * step_diagonal(h);
-    qr_solve(&m->step, c, change);
+    for (int k = 0; k < m->n_x; k++) change[k] -= point[k];
+    if (with_matrix) {
+        for (int k = 0; k < m->n_x; k++) change[k] *= step_diagonal(h);
+        qr_solve(&m->step, c, change);
+    }
     return error_norm(c, c->piece->points, last_of(m, c->piece), change);
 }
 
@@ -182,10 +185,21 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
         double between = 0.5 * (before + edge);
         if (of_guards && between > resolved && has_risen(c, between, 1)) return between - begin;
         if (of_guards && edge > resolved && has_risen(c, edge, 1)) return edge - begin;
-        unseen |= of_slopes && window_error(c, before, edge) > UNSEEN;
+        unseen |= of_slopes && window_error(c, before, edge, 1) > UNSEEN;
         if (landing == h && edge - begin > fmax(least, ALREADY * h)) landing = edge - begin;
     }
+    if (unseen && landing >= h && c->integrator != NULL) return 0.5 * h; /* the piece ends at its only edge */
     return unseen && landing < h ? landing * (1 + BEHIND) : INFINITY;
+}
+
+/* Half of a piece without edges, if its slopes do not explain how its states change; or infinity. Steps of another
+ * integrator may be longer than pieces: one that goes over a force shows it in pieces beside its edges, too. */
+static double explained_length(Instance *c) {
+    double begin = c->piece->begin, end = c->piece->end;
+    if (c->integrator == NULL || c->model->settings->n_slope_edges == 0) return INFINITY;
+    if (window_error(c, begin, end, 0) <= UNSEEN) return INFINITY;
+    if (!factor_at(c, begin, c->piece->points, end - begin)) return INFINITY;
+    return window_error(c, begin, end, 1) > UNSEEN ? 0.5 * (end - begin) : INFINITY;
 }
 
 /* Are all edges farther away than they come by their changes in this step, and in the one before? */
@@ -215,11 +229,11 @@ double seen_length(Instance *c, double least, double *most) {
     *most = advance > 0 ? FINE * h / advance : INFINITY;
     if (advance > 1) return *most;
     if (n_edges == 0) return INFINITY;
-    if (out_of_reach(c, h)) return INFINITY;
+    if (out_of_reach(c, h)) return explained_length(c);
     if (n == n_edges) edges_inside(c, begin + 0.5 * h, middle);
     of_slopes = any_edge(0, m->settings->n_slope_edges, first, middle, last);
     of_guards = any_edge(m->settings->n_slope_edges, n_edges, first, middle, last);
-    if (!of_slopes && !of_guards) return INFINITY;
+    if (!of_slopes && !of_guards) return explained_length(c);
     memset(c->positive, 0, (size_t)m->n_guards);
     if (of_guards) has_risen(c, begin, 0), has_risen(c, c->piece->end, 0);
     length = judge_windows(c, least, of_slopes, of_guards, 0);
