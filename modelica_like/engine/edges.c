@@ -9,6 +9,7 @@
 #define ROUGHLY 1e-8 /* of a part: edges that stand alone and are smooth need no better */
 #define NEAR 0.1     /* an extremum that comes this close to zero is looked at */
 #define UNSEEN 10    /* error of a window between two edges, in tolerances, from which on the step ends before it */
+#define UNEXPLAINED 300 /* of a piece without edges: less is the error of another integrator */
 #define ALREADY 1e-9 /* of the step: edges at its beginning, on which it stands */
 #define FINE 0.9     /* of the advance of a phase that a step may have */
 
@@ -197,9 +198,9 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
 static double explained_length(Instance *c) {
     double begin = c->piece->begin, end = c->piece->end;
     if (c->integrator == NULL || c->model->settings->n_slope_edges == 0) return INFINITY;
-    if (window_error(c, begin, end, 0) <= UNSEEN) return INFINITY;
+    if (window_error(c, begin, end, 0) <= UNEXPLAINED) return INFINITY;
     if (!factor_at(c, begin, c->piece->points, end - begin)) return INFINITY;
-    return window_error(c, begin, end, 1) > UNSEEN ? 0.5 * (end - begin) : INFINITY;
+    return window_error(c, begin, end, 1) > UNEXPLAINED ? 0.5 * (end - begin) : INFINITY;
 }
 
 /* Are all edges farther away than they come by their changes in this step, and in the one before? */
