@@ -49,10 +49,13 @@ ROWS = {
         Row("small drives that once were wrong", "the same solver", "{len(SMALL)} drives", "the same", "exact/test_small_drives.py"),
         Row("random laws over all functions of the language", "plain Python in small steps", "{MANY[-1][-1] + 1} laws", "{NEAR}, the reference's own error; by both solvers, through Modelica text and FMUs", "properties/test_random_laws.py"),
         Row("masses that meet narrow forces on their way or in time", "energy and momentum", "{24 + 50 * BLOCKS} forces: widths from 1 µm to 0.1 m, speeds over six decades", "1e-5 of the speed; by both solvers, two as FMU", "solve/test_edges.py"),
+        Row("masses that meet narrow smooth forces (Gaussian, rational, two steps, …) on their way", "energy", "{SEEDS * len(SHAPES)} forces: widths from 1 µm to 30 mm, speeds over six decades", "1e-5 of the speed; by both solvers, one as FMU", "exact/test_narrow_pulses.py"),
         Row("relations with fast functions of time", "fixed small steps", "{12 + 25 * BLOCKS} carriers", "2e-6 and 2e-5 of the duration; by both solvers", "solve/test_edges.py"),
         Row("rams with friction through their dead centres", "SciPy (DOP853), with its events", "one crank with two frictions, in three orders of lines", "1e-7, by both solvers", "solve/test_dead_centres.py"),
         Row("largest values, integrals and means of runs", "closed forms; document 003 in small steps", "runs of 1 to 300 s with 5 to 500 results", "1e-6, whatever is written of a run", "runs/test_readings.py"),
+        Row("the same of runs of FMUs and of co-simulations", "closed forms", "every kind of reading, with 7 to 500 results, fixed and variable steps", "1e-5 of the largest amount, 3e-5 of co-simulations, or a refusal in words", "fmus/test_fmu_readings.py"),
         Row("gradients of random drives", "differences of runs in fractions, steps of 2^-70", "{len(SMOOTH) + len(TIES) + len(EDGES)} drives", "{PRECISE}", "exact/test_gradients_exactly.py"),
+        Row("derivatives by parameters that are zero or at a bound", "one-sided differences of runs at 1e-10, in smaller and smaller steps", "{len(QUICK) + len(OFTEN)} examples, all others by hand", "1e-2, which tells a kink; else both sides are told", "analyse/test_parameters_at_kinks.py"),
         Row("random trees of inertias, gears, planetary sets, springs, clutches", "laws: energy, order of lines, signs, inertias in two", "{EXAMPLES} drives for each law", "{SAME} of the largest speed", "properties/test_properties.py"),
     ],
     "Engines against each other": [

@@ -9,6 +9,8 @@ from typing import Any
 
 import casadi as ca
 
+from modelica_like.compile.narrow import NARROW, Narrow
+
 PHASE_STEP = math.pi / 6
 """Largest advance of a phase in rad that an integrator may pass unseen: twelve looks show all humps of a wave."""
 
@@ -18,8 +20,6 @@ _OPERANDS = frozenset({ca.OP_FABS, ca.OP_SIGN, ca.OP_COPYSIGN})
 _COUNTS = frozenset({ca.OP_FLOOR, ca.OP_CEIL})
 _RATIOS = frozenset({ca.OP_FMOD, ca.OP_REMAINDER})
 _EDGES = _DIFFERENCES | _OPERANDS | _COUNTS | _RATIOS
-_COUNTS_FROM = 36.0
-"""exp(-36) is rounding beside exp(0)."""
 _WAVES = frozenset({ca.OP_SIN, ca.OP_COS, ca.OP_TAN})
 
 
@@ -32,12 +32,14 @@ class Edges:
             jump, then phases, over `PHASE_STEP`.
         count: number of edges.
         slopes: how many of them, the first ones, are edges of the equations; the others are of guards.
+        kinks: how many of these, the first ones, are not of smooth functions.
         phases: number of phases.
     """
 
     function: ca.Function
     count: int
     slopes: int
+    kinks: int
     phases: int
 
 
@@ -51,25 +53,19 @@ def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, gu
         guards: of the state events.
     """
     given = list(arguments.values())
-    of_slopes, of_guards = (
+    rates = ode(*given)
+    equations = ca.vertcat(rates, alg(*given))
+    kinks, of_guards = (
         _different([_edge(*one) for one in _operations(arguments, expressions, _EDGES)])
-        for expressions in (ca.vertcat(ode(*given), alg(*given)), guards(*given))
+        for expressions in (equations, guards(*given))
     )
-    of_slopes = _different([*of_slopes, *_pulses(arguments, ca.vertcat(ode(*given), alg(*given)))])
-    edges = of_slopes + of_guards
+    smooth = _different([*Narrow(arguments, rates).edges(_operations(arguments, equations, NARROW))])
+    edges = kinks + smooth + of_guards
+    slopes = len(edges) - len(of_guards)
     phases = _different([one for _, (one, *_) in _operations(arguments, ca.vertcat(*edges, guards(*given)), _WAVES)])
     result = ca.densify(ca.vertcat(ca.SX(0, 1), *edges, *(one / PHASE_STEP for one in phases)))
     function = ca.Function("edges", list(arguments.values()), [result], list(arguments), ["edges"])
-    return Edges(function, len(edges), len(of_slopes), len(phases))
-
-
-def _pulses(arguments: dict[str, Any], expressions: Any) -> Iterator[Any]:
-    """Edges of exponentials of time that rise and fall: the tops of their exponents, and where they begin to count."""
-    t, *others = arguments["t"], *(arguments[name] for name in "xzd")
-    for _, (exponent, *_) in _operations(arguments, expressions, frozenset({ca.OP_EXP})):
-        rate = ca.jacobian(exponent, t)
-        if ca.depends_on(rate, t) and not any(ca.depends_on(exponent, one) for one in others if one.numel()):
-            yield from (rate, exponent + _COUNTS_FROM)
+    return Edges(function, len(edges), slopes, len(kinks), len(phases))
 
 
 def _edge(code: int, operands: list[Any]) -> Any:

@@ -6,11 +6,12 @@
 #define BEHIND 1e-12  /* of a step that ends at an edge: the next one begins behind it */
 #define ROUNDS 60
 #define REACH 2
-#define ROUGHLY 1e-8 /* of a part: edges that stand alone and are smooth need no better */
-#define NEAR 0.1     /* an extremum that comes this close to zero is looked at */
-#define UNSEEN 10    /* error of a window between two edges, in tolerances, from which on the step ends before it */
-#define ALREADY 1e-9 /* of the step: edges at its beginning, on which it stands */
-#define FINE 0.9     /* of the advance of a phase that a step may have */
+#define ROUGHLY 1e-8    /* of a part: edges that stand alone and are smooth need no better */
+#define NEAR 0.1        /* an extremum that comes this close to zero is looked at */
+#define UNSEEN 10       /* error of a window between two edges, in tolerances, from which on the step ends before it */
+#define UNEXPLAINED 300 /* of a piece without edges: less is the error of another integrator */
+#define ALREADY 1e-9    /* of the step: edges at its beginning, on which it stands */
+#define FINE 0.9        /* of the advance of a phase that a step may have */
 
 static double *edges_at(Instance *c, double t, double *point, double *values) {
     evaluate_special(c, &c->model->tapes.edges, t, point, values);
@@ -105,7 +106,7 @@ double edge_ahead(Instance *c, double t, double *behind) {
 
 /* Does a tangent, whose dots are loaded, move an edge on which the piece stands by more than a part? */
 int leads_off_edge(Instance *c, double least) {
-    int n = c->model->settings->n_slope_edges, any = 0;
+    int n = c->model->settings->n_kinks, any = 0;
     const double *here = c->edges_middle, *end = here + c->model->tapes.edges.n_outputs;
     double *moved = c->edges_middle + 2 * c->model->tapes.edges.n_outputs;
     if (n > 0) tangent_now(c, &c->model->tapes.edges, moved);
@@ -114,8 +115,8 @@ int leads_off_edge(Instance *c, double least) {
 }
 
 /* What the states change in a window otherwise than by their slopes, in tolerances. The matrix of the step takes away
- * what decays in it, as from the estimate of its error. */
-static double window_error(Instance *c, double begin, double end) {
+ * what decays in it, as from the estimate of its error, but costs more than the rest. */
+static double window_error(Instance *c, double begin, double end, int with_matrix) {
     const Model *m = c->model;
     double *point = c->vector + m->n_z, *slopes = c->edge_slopes, *change = c->edge_change,
            h = c->piece->end - c->piece->begin;
@@ -130,8 +131,11 @@ static double window_error(Instance *c, double begin, double end) {
     piece_at(m, c->piece, begin, point);
     for (int k = 0; k < m->n_x; k++) change[k] += point[k];
     piece_at(m, c->piece, end, point);
-    for (int k = 0; k < m->n_x; k++) change[k] = (change[k] - point[k]) * step_diagonal(h);
-    qr_solve(&m->step, c, change);
+    for (int k = 0; k < m->n_x; k++) change[k] -= point[k];
+    if (with_matrix) {
+        for (int k = 0; k < m->n_x; k++) change[k] *= step_diagonal(h);
+        qr_solve(&m->step, c, change);
+    }
     return error_norm(c, c->piece->points, last_of(m, c->piece), change);
 }
 
@@ -143,7 +147,7 @@ static const double *guards_inside(Instance *c, double t) {
     return c->edge_guards;
 }
 
-/* Is an edge of slopes, or a guard, zero now and at the end of the piece? Nothing but parameters may lead off it.
+/* Is a kink, or a guard, zero now and at the end of the piece? Nothing but parameters may lead off it.
  * `zero` marks the guards. */
 int stands_on_edge(Instance *c, unsigned char *zero) {
     const Model *m = c->model;
@@ -154,9 +158,9 @@ int stands_on_edge(Instance *c, unsigned char *zero) {
         const double *guards = guards_inside(c, t);
         for (int k = 0; k < m->n_guards; k++)
             zero[k] = (side == 0 || zero[k]) && fabs(guards[k]) <= AT_EDGE && guard_active(c, k);
-        if (m->settings->n_slope_edges > 0) edges_inside(c, t, side == 0 ? here : end);
+        if (m->settings->n_kinks > 0) edges_inside(c, t, side == 0 ? here : end);
     }
-    for (int k = 0; k < m->settings->n_slope_edges; k++) any |= fabs(here[k]) <= AT_EDGE && fabs(end[k]) <= AT_EDGE;
+    for (int k = 0; k < m->settings->n_kinks; k++) any |= fabs(here[k]) <= AT_EDGE && fabs(end[k]) <= AT_EDGE;
     return any | any_of(zero, m->n_guards);
 }
 
@@ -182,10 +186,21 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
         double between = 0.5 * (before + edge);
         if (of_guards && between > resolved && has_risen(c, between, 1)) return between - begin;
         if (of_guards && edge > resolved && has_risen(c, edge, 1)) return edge - begin;
-        unseen |= of_slopes && window_error(c, before, edge) > UNSEEN;
+        unseen |= of_slopes && window_error(c, before, edge, 1) > UNSEEN;
         if (landing == h && edge - begin > fmax(least, ALREADY * h)) landing = edge - begin;
     }
+    if (unseen && landing >= h && c->integrator != NULL) return 0.5 * h; /* the piece ends at its only edge */
     return unseen && landing < h ? landing * (1 + BEHIND) : INFINITY;
+}
+
+/* Half of a piece without edges, if its slopes do not explain how its states change; or infinity. Steps of another
+ * integrator may be longer than pieces: one that goes over a force shows it in pieces beside its edges, too. */
+static double explained_length(Instance *c) {
+    double begin = c->piece->begin, end = c->piece->end;
+    if (c->integrator == NULL || c->model->settings->n_slope_edges == 0) return INFINITY;
+    if (window_error(c, begin, end, 0) <= UNEXPLAINED) return INFINITY;
+    if (!factor_at(c, begin, c->piece->points, end - begin)) return INFINITY;
+    return window_error(c, begin, end, 1) > UNEXPLAINED ? 0.5 * (end - begin) : INFINITY;
 }
 
 /* Are all edges farther away than they come by their changes in this step, and in the one before? */
@@ -215,11 +230,11 @@ double seen_length(Instance *c, double least, double *most) {
     *most = advance > 0 ? FINE * h / advance : INFINITY;
     if (advance > 1) return *most;
     if (n_edges == 0) return INFINITY;
-    if (out_of_reach(c, h)) return INFINITY;
+    if (out_of_reach(c, h)) return explained_length(c);
     if (n == n_edges) edges_inside(c, begin + 0.5 * h, middle);
     of_slopes = any_edge(0, m->settings->n_slope_edges, first, middle, last);
     of_guards = any_edge(m->settings->n_slope_edges, n_edges, first, middle, last);
-    if (!of_slopes && !of_guards) return INFINITY;
+    if (!of_slopes && !of_guards) return explained_length(c);
     memset(c->positive, 0, (size_t)m->n_guards);
     if (of_guards) has_risen(c, begin, 0), has_risen(c, c->piece->end, 0);
     length = judge_windows(c, least, of_slopes, of_guards, 0);

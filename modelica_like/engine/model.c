@@ -3,7 +3,7 @@
  * resources, which importers name in many ways. */
 #include "model.h"
 
-#define FORMAT 8
+#define FORMAT 9
 #define UNKNOWN (-1)
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
 
@@ -188,7 +188,8 @@ typedef struct { /* integers of records, not below `low` and below `end` */
 static int check_indices(const Model *m, char *message) {
     const Range ranges[] = {COLUMN(settings, terminal, n_settings, -1, m->n_modes),
         COLUMN(settings, n_edges, n_settings, 0, m->tapes.edges.n_outputs + 1),
-        COLUMN(settings, n_slope_edges, n_settings, 0, m->settings->n_edges + 1), ARRAY(state_names, n_x, n_text),
+        COLUMN(settings, n_slope_edges, n_settings, 0, m->settings->n_edges + 1),
+        COLUMN(settings, n_kinks, n_settings, 0, m->settings->n_slope_edges + 1), ARRAY(state_names, n_x, n_text),
         ARRAY(implicit_names, n_z, n_text), ARRAY(singular_names, n_determinants, n_text),
         COLUMN(variables, kind, n_variables, 0, N_KINDS), COLUMN(variables, type, n_variables, 0, N_TYPES),
         TEXT(variables, name), COLUMN(variables, count, n_variables, 1, m->n_p + 2), INDEX(rising, below, n_p),

@@ -109,7 +109,8 @@ typedef struct {
     int terminal;               /* entry of d that becomes 1 at the end of a run, or -1 */
     int ideal;                  /* entry of d where the rows of ideal elements begin */
     int n_edges, n_slope_edges; /* the first results of their tape: of slopes, then of guards; phases follow */
-    int rests;                  /* where impacts follow each other ever faster, they end in contact */
+    int n_kinks;                /* the first edges of slopes; behind them are those of smooth functions */
+    int rests, unused;          /* where impacts follow each other ever faster, they end in contact */
     double absolute_to_relative, default_tolerance;
     double fixed_step; /* 0: as accuracy asks for */
 } Settings;

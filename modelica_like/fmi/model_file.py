@@ -30,7 +30,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
 """Path of the file in an FMU."""
-FORMAT = 8
+FORMAT = 9
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
 _ENTRY = struct.Struct("<4i")
@@ -55,7 +55,7 @@ _TAPES = (
 )  # fmt: skip
 SECTIONS: dict[str, Any] = {
     "settings": _record(
-        "n_d n_y steady rates_depend_on_time implicit_linear terminal ideal n_edges n_slope_edges rests",
+        "n_d n_y steady rates_depend_on_time implicit_linear terminal ideal n_edges n_slope_edges n_kinks rests unused",
         "absolute_to_relative default_tolerance fixed_step",
     ),
     "text": _TEXT,
@@ -193,7 +193,9 @@ def _contents(
                 model.ideal.first if model.ideal else 0,
                 model.edges.count,
                 model.edges.slopes,
+                model.edges.kinks,
                 int(model.settings.get("on_chattering") == "rest"),
+                0,
                 ABSOLUTE_TO_RELATIVE,
                 tolerance,
                 fixed_step,

@@ -14,7 +14,7 @@ from modelica_like.errors import FmuFailed, ValueOutOfRange
 from modelica_like.fmi.failures import tell_error
 from modelica_like.fmi.process import run_child, workplace
 from modelica_like.runs.recorded import RecordedModel, RecordedSolution, RecordedVariable
-from modelica_like.runs.results import settled
+from modelica_like.runs.results import needed_outputs, settled
 from modelica_like.solve.recorder import TERMINATED, Ended
 
 Kind = Literal["me", "cs"]
@@ -76,7 +76,7 @@ def run_fmu(
     _check_times(path.name, start, stop, step, timeout)
     run = _run(path, job, timeout)
     if readings:
-        intervals, needed = int(np.count_nonzero(np.diff(run.time))), _needed(run, readings)
+        intervals, needed = int(np.count_nonzero(np.diff(run.time))), needed_outputs(run, readings)
         again = lambda times: _run(path, job | {"points": times * intervals, "outputs": needed}, timeout)  # noqa: E731
         run.readings = settled(run, again, readings)
     return run
@@ -96,13 +96,6 @@ def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:
         run.notices = (f"{path.name} {death} while it was freed, after its results were complete.",)
     _check_finite(path.name, run)
     return run
-
-
-def _needed(run: RecordedSolution, readings: Sequence[str]) -> list[str]:
-    """Return modes, which tell where values jump, and what readings may name, energies of parts included."""
-    owners = [(one.path, one.path.rpartition(".")[0]) for one in run.model.flat_variables]
-    named = [path for path, owner in owners if any((owner or path) in name for name in readings)]
-    return [*named, *run.model.discrete_position]
 
 
 def _check_finite(name: str, run: RecordedSolution) -> None:

@@ -324,7 +324,9 @@ class Component(Declared):
         found = next((self._connectors[name] for name in names if name in self._connectors), None)
         if found is None:
             error = unknown(which, f"{self.label} ({type(self).__name__})", " or ".join(names), list(self._connectors))
-            error.advice = f'Join it in [connect], not in a series: joint = ["{self.label}.{min(self._connectors)}", …]'
+            ends = [*self._connectors, *self.terminal_members()]
+            example = f': joint = ["{self.label}.{min(ends)}", …]' if ends else "."
+            error.advice = f"Join it in [connect], not in a series{example}"
             raise error
         return found
 

@@ -182,6 +182,13 @@ def along(run: Any, *texts: str) -> tuple[Fitted, str]:
     return curves.fitted(dense), str(expressions[0][1])
 
 
+def needed_outputs(run: RecordedSolution, readings: Sequence[str]) -> list[str]:
+    """Return modes, which tell where values jump, and what readings may name, energies of parts included."""
+    owners = [(one.path, one.path.rpartition(".")[0]) for one in run.model.flat_variables]
+    named = [path for path, owner in owners if any((owner or path) in name for name in readings)]
+    return [*named, *run.model.discrete_position]
+
+
 def settled(run: RecordedSolution, again: Callable[[int], RecordedSolution], names: Sequence[str]) -> dict[str, Number]:
     """Read numbers off a run that is repeated with twice as many results until they no longer change.
 

@@ -1,11 +1,13 @@
 """A two-mass oscillator, cut behind its shaft once for all tests."""
 
+import sys
 from pathlib import Path
 
 import pytest
 
 from modelica_like.fmi.cosimulation.split import Split, split
 
+sys.path.insert(0, str(Path(__file__).parent))
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 

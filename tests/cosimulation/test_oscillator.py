@@ -9,12 +9,13 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from math import log2, sqrt
+from math import log2
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from two_masses import J1, J2, M, closed_form
 
 from modelica_like import Trajectories
 from modelica_like.errors import FmuCrashed, FmuFailed, FmuTimeout, StepFailed
@@ -22,21 +23,9 @@ from modelica_like.fmi.cosimulation.run import cosim
 from modelica_like.fmi.cosimulation.split import Split, split
 from modelica_like.fmi.cosimulation.system import System
 
-M, J1, J2, C, D = 5.0, 0.02, 0.08, 400.0, 0.2
 MASTERS = pytest.mark.parametrize("master", ["jacobi", "gauss-seidel"])
 SIGNALS = ("J2.w", "shaft.tau")
 PRECISE = {"until": 0.2, "fmu_tolerance": 1e-9, "outputs": [*SIGNALS, "J1.w"]}
-
-
-def closed_form(time: np.ndarray) -> dict[str, np.ndarray]:
-    """A damped oscillation of the twist around its mean, on top of a constant acceleration of the centre of mass."""
-    total, reduced = J1 + J2, J1 * J2 / (J1 + J2)
-    mean, decay = -M * J2 / (total * C), D / (2 * reduced)
-    w = sqrt(C / reduced - decay**2)
-    swing = np.exp(-decay * time)
-    twist = mean - mean * swing * (np.cos(w * time) + decay / w * np.sin(w * time))
-    rate = mean * swing * (w + decay**2 / w) * np.sin(w * time)
-    return {"J2.w": M / total * time + J1 / total * rate, "shaft.tau": C * twist + D * rate}
 
 
 def error(run: Trajectories) -> float:

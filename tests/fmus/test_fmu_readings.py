@@ -86,8 +86,17 @@ def test_a_table_is_straight_lines_between_its_rows(tmp_path: Path) -> None:
     assert (found[1].time, found[1].sign) == (1.0, -1)
 
 
-def test_a_system_of_fmus_says_what_to_do(fmu: Path, tmp_path: Path) -> None:
+def test_a_system_of_fmus_reads_like_one(fmu: Path, tmp_path: Path) -> None:
     system = tmp_path / "system.toml"
-    system.write_text(f'name = "alone"\n[fmus]\nboth = "{fmu.as_posix()}"\n[simulate]\nuntil = "0.1 s"\n')
-    with pytest.raises(MissingValue, match="shorter communication steps until its results no longer change"):
-        cosim(system).read("peak(spring.tau)")
+    system.write_text(f'name = "alone"\n[fmus]\nboth = "{fmu.as_posix()}"\n[simulate]\nuntil = "{END} s"\n')
+    expected = {f"{name[:-1].replace('(', '(both.', 1)})": value for name, value in (
+        ("peak(spring.tau)", LARGEST), ("min(mass.w)", -AMPLITUDE * OMEGA),
+    )}  # fmt: skip
+    run = cosim(system, step=0.05, fmu_tolerance=1e-9, readings=[*expected])
+    for name, value in expected.items():
+        assert run.readings[name] == pytest.approx(value, abs=SETTLED * abs(value)), name
+    with pytest.raises(MissingValue, match=r"Ask before the run: cosim\(…, readings=\[…\]\)"):
+        run.read("peak(both.mass.w)")
+    brake = {"first(both.disk.w < 5 rad/s)": 2.5, "mean(both.disk.w)": 25 / 6}
+    run = cosim(system, 6.0, step=0.5, readings=[*brake])
+    assert run.read(*brake) == pytest.approx([*brake.values()], rel=2 * SETTLED)

@@ -50,6 +50,9 @@ METER = netlist(
 
 CUTS: dict[str, tuple[Assembly, list[str], str]] = {
     "nothing": (DRIVE, [], "drive: it is not said where to cut.\nIt can be cut at J1, shaft, J2, as in --at J1."),
+    "nothing, with signals": (
+        ENGAGED, [], "drive: it is not said where to cut.\nIt can be cut at clutch, J1, J2, as in --at clutch.",
+    ),
     "unknown": (DRIVE, ["shft"], f"drive has no shaft 'shft'; did you mean 'shaft'?\n{PLACES}"),
     "free end": (DRIVE, ["J2.flange_b"], f"drive has no shaft 'J2.flange_b'; did you mean 'J2.flange_a'?\n{PLACES}"),
     "series": (

@@ -71,6 +71,12 @@ meter = { is = "VoltageSensor" }
 [series]
 circuit = ["v", "meter"]
 """
+SIGNAL = """[parts]
+k = { is = "Constant", k = 1 }
+J = { is = "Inertia", J = 1 }
+[series]
+shaft = ["k", "J"]
+"""
 WRONG: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
     "a former name": (UnknownName, lambda: build(loads(BRAKE)).with_parameters({"eddy.alpha": 0.004}), """\
 netlist has no parameter 'eddy.alpha'.
@@ -108,6 +114,10 @@ Connect it, or list it: free = ["m.an"]."""),
 meter (VoltageSensor) has no inlet 'flange_a or flange'. It has p, n.
   in netlist.toml:5 `circuit = ["v", "meter"]`
 Join it in [connect], not in a series: joint = ["meter.n", …]"""),
+    "a signal in a series": (UnknownName, lambda: build(loads(SIGNAL)), """\
+k (Constant) has no outlet 'flange_b or flange'. It has none.
+  in netlist.toml:5 `shaft = ["k", "J"]`
+Join it in [connect], not in a series: joint = ["k.y", …]"""),
     "an input that does not exist": (UnknownName, lambda: simulate(loads(PUSHED), 1, inputs={"push.g": 3}), """\
 pushed has no input 'push.g'; did you mean 'push.f'?"""),
     "times that do not rise": (

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from modelica_like import export_fmu, load, simulate
+from modelica_like.errors import ModelicaTextError
 from modelica_like.netlist import loads
 from modelica_like.netlist.modelica.netlist_form import netlist_text
 from modelica_like.netlist.modelica.read import read_modelica
@@ -259,3 +260,46 @@ def test_units_of_version_3_of_the_standard_library(text_file: Any) -> None:
 def test_long_sums_are_no_deep_trees(text_file: Any, count: int) -> None:
     parts = f"Real x = {' + '.join(['time'] * count)} - {' - '.join(['1'] * count)};"
     assert run(text_file(own(parts, ""))).final["x"] == pytest.approx(0, abs=1e-9)
+
+
+LED = """
+model Led
+  Real x[2];
+  Real A[2, 2];
+  Real y(start = 0, fixed = true);
+equation
+  homotopy(actual = {x[1]^2 - 4, x[2]^2 - 9}, simplified = {x[1] - 3, -1 - x[2]}) = zeros(2);
+  homotopy({{A[1, 1]^2, A[1, 2]^2}, {A[2, 1]^2, A[2, 2]^2}}, A) = {{1, 4}, {9, 16}};
+  der(y) = x[1];
+end Led;
+"""
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_homotopy_of_arrays_leads_each_element(text_file: Any, solver: Any) -> None:
+    """x^2 = 4 from x = 3, x^2 = 9 falling through x = -1, roots of a matrix from the squares; from x = 0 none."""
+    result = run(text_file(LED), until=1, solver=solver)
+    assert [result.final[f"x[{k}]"] for k in (1, 2)] == pytest.approx([2, -3], rel=1e-9)
+    assert [result.final[f"A[{k},{j}]"] for k in (1, 2) for j in (1, 2)] == pytest.approx([1, 2, 3, 4], rel=1e-9)
+    assert result.final["y"] == pytest.approx(2, rel=1e-9)
+
+
+def test_no_event_of_an_array_makes_none(text_file: Any) -> None:
+    text = """
+    model Quiet
+      Real x[2];
+      Real y[2](each start = 0, each fixed = true);
+    equation
+      x = noEvent({if time > 0.5 then 1 else 2, abs(time - 0.3)});
+      der(y) = x;
+    end Quiet;
+    """
+    result = run(text_file(text), until=1)
+    assert not result.events
+    assert [result.final[f"y[{k}]"] for k in (1, 2)] == pytest.approx([1.5, (0.3**2 + 0.7**2) / 2], abs=1e-6)
+
+
+def test_arrays_of_other_sizes_are_refused(text_file: Any) -> None:
+    for call in ("atan2({1, 2}, {1, 2, 3})", "homotopy({x[1], x[2]}, {1, 2, 3})"):
+        with pytest.raises(ModelicaTextError, match="has arrays of 2 and 3 elements"):
+            load(text_file(f"model A\n  Real x[2];\nequation\n  x = {call};\nend A;"))

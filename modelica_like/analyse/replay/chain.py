@@ -19,7 +19,7 @@ from modelica_like.analyse.replay.jumps import Jump, Work, make_jump
 from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.replay.start import start_slopes
 from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try_step
-from modelica_like.analyse.replay.steps import StepFunctions, Tolerances
+from modelica_like.analyse.replay.steps import ABSOLUTE, StepFunctions, Tolerances
 from modelica_like.analyse.replay.when import Coincidence, event_time
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import TERMINAL, CompiledDae
@@ -32,6 +32,8 @@ from modelica_like.solve.recorder import Event, Segment
 _SHRINK, _GROW, _SAFETY = 0.2, 8.0, 0.8
 _SMALLEST = 1e-14
 _RELOCATIONS = 6
+_ALIKE = 1e-2
+"""Difference of the states at the end of a run and of its repetition, over their largest values."""
 _FIRST = 1e-3
 """First step behind an event, relative to the last one before: a law can begin there with an infinite slope."""
 
@@ -212,7 +214,7 @@ def replay(
         tolerances: of the steps.
 
     Raises:
-        NoGradient: an event of the run has no derivative, or its end is an event.
+        NoGradient: an event of the run has no derivative, or its end is an event, or the states at the end differ.
         StepFailed: a step did not converge.
         LanguageError: the model has no states.
     """
@@ -238,7 +240,23 @@ def replay(
         if number:
             maker.jump(number)
         maker.smooth(segment)
+    _check_end(solution, chain.nodes[-1])
     return chain
+
+
+def _check_end(solution: Solution, end: Point) -> None:
+    """Refuse derivatives of another run: both integrate the same equations, so one of them has gone over something."""
+    model, x = solution.model, np.hstack([segment.x for segment in solution.segments])
+    allowed = _ALIKE * (np.abs(x).max(axis=1) + ABSOLUTE * model.nominals)
+    apart = np.abs(end.x - x[:, -1]) / allowed
+    if not apart.max() <= 1.0:
+        k = int(np.argmax(apart))
+        raise NoGradient(
+            f"No gradient of {model.name}: the run ends with {model.states[k]} = {x[k, -1]:.6g}, its repetition for "
+            f"the derivatives with {end.x[k]:.6g}.",
+            why="Either it depends on its last digits, or one of them has gone over a narrow pulse.",
+            advice="Repeat both with smaller tolerances, or compare runs with other values.",
+        )
 
 
 class _Maker:

@@ -1,6 +1,7 @@
 """Places inside a smooth segment at which equations change their slope: breakpoints of tables, |x|, min, max, where.
 
-States are smooth there, their sensitivities are not: a step must end there.
+States are smooth there, their sensitivities are not: a step must end there. It also must at tops and flanks of smooth
+functions that may be narrow, because it would go over them.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class Kinks:
 
 
 def _switches(model: CompiledDae) -> ca.Function:
-    """Arguments of operations with a kink, if they change during a segment."""
+    """Arguments of operations with a kink, if they change during a segment, and edges of smooth functions."""
     given = list(model.arguments.values())
     equations = ca.Function("equations", given, [model.ode(*given), model.alg(*given)])
     found: dict[str, Any] = {}
@@ -76,7 +77,9 @@ def _switches(model: CompiledDae) -> ca.Function:
         for one in arguments_of_kinks(equations, given):
             if ca.depends_on(one, moving):
                 found.setdefault(str(one), one)
-    return ca.Function("kinks", given, [ca.densify(ca.SX(ca.vertcat(*found.values())))])
+    edges = model.edges
+    smooth = edges.function(*given)[edges.kinks : edges.slopes] if edges.kinks < edges.slopes else ca.SX(0, 1)
+    return ca.Function("kinks", given, [ca.densify(ca.vertcat(ca.SX(0, 1), *found.values(), smooth))])
 
 
 def arguments_of_kinks(function: ca.Function, given: list[Any]) -> list[Any]:

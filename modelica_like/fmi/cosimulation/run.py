@@ -18,6 +18,7 @@ from modelica_like.errors import (
     FmuRefused,
     FmuTimeout,
     Interrupted,
+    MissingValue,
     ModelicaLikeError,
     SolveError,
     StepFailed,
@@ -27,10 +28,11 @@ from modelica_like.errors import (
 )
 from modelica_like.fmi import failures
 from modelica_like.fmi.cosimulation.files import opened
-from modelica_like.fmi.cosimulation.solution import CosimSolution, Coupling
+from modelica_like.fmi.cosimulation.solution import CosimSolution, Coupling, bond_columns
 from modelica_like.fmi.cosimulation.system import Inputs, Master, Settings, System, check_system
 from modelica_like.fmi.inside import PLACE
 from modelica_like.fmi.process import run_child, workplace
+from modelica_like.runs.results import needed_outputs, settled
 from modelica_like.simulation import seconds
 from modelica_like.solve.panels import Progress
 
@@ -40,6 +42,7 @@ TIMEOUT = 600.0
 _FIXED_PART = 1e-3
 _FIRST_PART = 1e-6
 _INNER_PART = 0.1
+_LEAST_TOLERANCE = 1e-12
 _WATCH = 0.1
 _CHILD = Path(__file__).with_name("child.py")
 
@@ -49,7 +52,7 @@ def cosim(
     master: Master | str | None = None, inputs: Inputs | str | None = None, tolerance: float | None = None,
     parameters: Mapping[str, float] | None = None, fmu_tolerance: float | None = None,
     outputs: Sequence[str] | None = None, interval: float = 0.0, timeout: float = TIMEOUT,
-    progress: Progress | None = None,
+    progress: Progress | None = None, readings: Sequence[str] = (),
 ) -> CosimSolution:  # fmt: skip
     """Run a system of FMUs, all in one separate process.
 
@@ -68,11 +71,16 @@ def cosim(
         interval: shortest time between two results, in s.
         timeout: time limit in s.
         progress: called with the time reached.
+        readings: numbers to read off the run, `max(load.J4.tau)`. Between communication points FMUs tell nothing, and
+            the step has its own error. So the run is repeated with half the step, or a quarter of the tolerance, until
+            a number changes by less than 1e-5 of the largest amount twice in a row; `change` of a number is what it
+            was. The results stay those of the step that is asked for.
 
     Raises:
         NetlistError, UnknownName, ValueOutOfRange: the system or a value is wrong.
         FmuRefused: an FMU cannot be run this way.
         FmuFailed: an FMU reported an error; FmuCrashed: it crashed the process; FmuTimeout: the run did not finish.
+        MissingValue: a reading still changes with 100,000 results, or with the tolerance 1e-12.
         Interrupted: the run was interrupted. `run` of this and of a `SolveError` is the solution up to then.
         OSError: a file cannot be read.
     """
@@ -81,16 +89,46 @@ def cosim(
             return cosim(
                 known, until, step=step, master=master, inputs=inputs, tolerance=tolerance, parameters=parameters,
                 fmu_tolerance=fmu_tolerance, outputs=outputs, interval=interval, timeout=timeout, progress=progress,
+                readings=readings,
             )  # fmt: skip
     check_system(system)
     system = _with_parameters(system, parameters or {})
     settings = _settings(system, until, step, master, inputs, tolerance)
     if timeout <= 0:
         raise ValueOutOfRange(f"{system.name}: the time limit must be positive, not {timeout:g} s.")
-    if fmu_tolerance is None and settings.tolerance is not None:
-        fmu_tolerance = _INNER_PART * settings.tolerance  # errors of the FMUs must not look like those of the coupling
-    job = _job(system, settings) | {"fmu_tolerance": fmu_tolerance, "interval": interval, "outputs": outputs}
-    return _solution(system, job, timeout, progress)
+    job = _job(system, settings) | {"interval": interval, "outputs": outputs, "fmu_tolerance": fmu_tolerance}
+    run = _solution(system, _tolerant(job), timeout, progress)
+    if readings:
+        made_here = {one.path for one in bond_columns(system)}  # recorded with every run
+        needed = [name for name in needed_outputs(run, readings) if name not in made_here]
+
+        def again(times: int) -> CosimSolution:
+            finer = _finer(system.name, job, times, readings[0]) | {"outputs": needed}
+            return _solution(system, _tolerant(finer), timeout, None)
+
+        run.readings = settled(run, again, readings)
+    return run
+
+
+def _tolerant(job: dict[str, Any]) -> dict[str, Any]:
+    """Return a job whose FMUs have a tolerance: their errors must not look like those of the coupling."""
+    if job["fmu_tolerance"] is not None or job["tolerance"] is None:
+        return job
+    return job | {"fmu_tolerance": _INNER_PART * job["tolerance"]}
+
+
+def _finer(name: str, job: dict[str, Any], times: int, reading: str) -> dict[str, Any]:
+    """Return a job with so many times as many results."""
+    finer = {"step": job["step"] / times, "interval": job["interval"] / times}
+    if job["tolerance"] is None:
+        return job | finer
+    tolerance = job["tolerance"] / times**2
+    if tolerance < _LEAST_TOLERANCE:
+        raise MissingValue(
+            f"{reading} of {name} is not known: it still changes with the tolerance {4 * tolerance:.2g}.",
+            advice="Ask with a fixed step, without a tolerance, or simulate the whole netlist.",
+        )
+    return job | finer | {"tolerance": tolerance}
 
 
 def _solution(system: System, job: dict[str, Any], timeout: float, progress: Progress | None) -> CosimSolution:
@@ -148,7 +186,7 @@ def _settings(
     for what, value in (("end time", end), ("step", size)):
         if not 0 < value < np.inf:
             raise ValueOutOfRange(f"The {what} must be positive, not {value:g} s.")
-    if chosen is not None and not 1e-12 <= chosen <= 0.1:
+    if chosen is not None and not _LEAST_TOLERANCE <= chosen <= 0.1:
         raise ValueOutOfRange(f"tolerance = {chosen:g} must be a number from 1e-12 to 0.1.")
     return Settings(end, min(size, end), master or base.master, inputs or base.inputs, chosen)
 

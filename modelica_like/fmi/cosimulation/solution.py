@@ -54,10 +54,7 @@ class CosimSolution(RecordedSolution):
         notices: messages about the run: unconnected inputs.
     """
 
-    advice = (
-        "Repeat the run with shorter communication steps until its results no longer change, or simulate the whole "
-        "netlist."
-    )
+    advice = "Ask before the run: cosim(…, readings=[…]), or simulate the whole netlist."
 
     def __init__(self, system: System, left: Mapping[str, Any], table: Vector, seconds: float) -> None:
         columns = _columns(system, [part["columns"] for part in left["units"]])
@@ -67,7 +64,7 @@ class CosimSolution(RecordedSolution):
             for name, value in part["constants"].items()
         }
         modes = np.array([column.kind == "discrete" for column in columns], dtype=bool)
-        continuous = (*(one for one in columns if one.kind != "discrete"), *_bond_columns(system))
+        continuous = (*(one for one in columns if one.kind != "discrete"), *bond_columns(system))
         model = RecordedModel(
             system.name, continuous, tuple(one for one in columns if one.kind == "discrete"), constants
         )
@@ -90,7 +87,7 @@ def described_model(system: System) -> RecordedModel:
     """Return the names of the results of a run, as far as the descriptions of the FMUs give them."""
     fmus = [described(unit.file).variables.values() for unit in system.units]
     columns = _columns(system, [[{"path": one.name} for one in fmu if one.varies] for fmu in fmus])
-    return RecordedModel(system.name, (*columns, *_bond_columns(system)), (), {})
+    return RecordedModel(system.name, (*columns, *bond_columns(system)), (), {})
 
 
 def _columns(system: System, units: Sequence[Sequence[Mapping[str, Any]]]) -> list[RecordedVariable]:
@@ -104,7 +101,8 @@ def _columns(system: System, units: Sequence[Sequence[Mapping[str, Any]]]) -> li
     return found
 
 
-def _bond_columns(system: System) -> list[RecordedVariable]:
+def bond_columns(system: System) -> list[RecordedVariable]:
+    """Return the variables of the couplings, which no FMU has."""
     told = ("power", "W", "power through the coupling"), ("residual_energy", "J", "energy created by the coupling")
     return [RecordedVariable(f"{bond.name}.{name}", unit, text) for bond in system.bonds for name, unit, text in told]
 

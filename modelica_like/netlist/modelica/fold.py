@@ -154,10 +154,42 @@ def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
     wanted = 2 if name in ("atan2", "mod", "rem", "div", "min", "max") else 1
     if len(args) != wanted:
         raise Unfit(f"{name} has {wanted} argument{'s' if wanted > 1 else ''}, not {len(args)}")
-    if any(one.kind == "array" for one in args):
-        length = next(len(one.args) for one in args if one.kind == "array")
-        rows = (tuple(one.args[k] if one.kind == "array" else one for one in args) for k in range(length))
-        return Expr("array", tuple(function(name, row, line) for row in rows), line)
-    if all(one.kind == "number" for one in args):
-        return _computed(_FUNCTIONS[name], args, line)
+    known = _FUNCTIONS[name]
+
+    def made(one: tuple[Expr, ...]) -> Expr:
+        return _computed(known, one, line) if _all_known(one) else call(name, one, line)
+
+    return each(name, args, line, made)
+
+
+def kept(name: str, args: tuple[Expr, ...], line: int) -> Expr:
+    """Return the call of a function that only a run evaluates; of arrays element by element. What is known stays.
+
+    Raises:
+        Unfit: arrays differ in size.
+    """
+    return each(name, args, line, lambda one: one[0] if _all_known(one) else call(name, one, line))
+
+
+def each(name: str, args: tuple[Expr, ...], line: int, made: Callable[[tuple[Expr, ...]], Expr]) -> Expr:
+    """Return what is made of arguments; of arrays what is made of their elements.
+
+    Raises:
+        Unfit: arrays differ in size.
+    """
+    lengths = {len(one.args) for one in args if one.kind == "array"}
+    if not lengths:
+        return made(args)
+    if len(lengths) > 1:
+        raise Unfit(f"{name} has arrays of {' and '.join(map(str, sorted(lengths)))} elements")
+    rows = (tuple(one.args[k] if one.kind == "array" else one for one in args) for k in range(lengths.pop()))
+    return Expr("array", tuple(each(name, row, line, made) for row in rows), line)
+
+
+def _all_known(args: tuple[Expr, ...]) -> bool:
+    return all(one.kind == "number" for one in args)
+
+
+def call(name: str, args: tuple[Expr, ...], line: int) -> Expr:
+    """Return the call of a function."""
     return Expr("call", (name, args, ()), line)

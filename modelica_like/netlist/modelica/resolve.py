@@ -314,9 +314,10 @@ class Resolver:
             return self._homotopy([*given, *(others[key] for key in ("actual", "simplified") if key in others)], line)
         if short in ("smooth", "noEvent"):
             value = self(given[1 if short == "smooth" else 0])
-            return value if value.kind in ("number", "array") else Expr("call", ("noEvent", (value,), ()), line)
+            return fold.kept("noEvent", (value,), line)
         if short in KEPT:
-            return Expr("call", (short, tuple(self(one) for one in given), ()), line)
+            values = tuple(self(one) for one in given)
+            return self._told(lambda: fold.each(short, values, line, lambda one: fold.call(short, one, line)), line)
         if short == "size":
             items = self._sized(given[0])
             return functions.size(items, int(self.number(given[1])) if len(given) > 1 else 0, line)
@@ -331,13 +332,12 @@ class Resolver:
         return self._told(lambda: functions.called(self, expression, values, others), line)
 
     def _homotopy(self, given: list[Expr], line: int) -> Expr:
-        """Resolve a homotopy; one of arrays, or of what is known, is its actual expression."""
+        """Resolve a homotopy; one of arrays element by element."""
         if len(given) != 2:
             what = f"homotopy(…) has 2 arguments, actual and simplified, not {len(given)}."
             raise ModelicaTextError(what, where=self.text.place(line))
-        actual, simplified = map(self, given)
-        known = actual.kind in ("number", "array") or simplified.kind == "array"
-        return actual if known else Expr("call", ("homotopy", (actual, simplified), ()), line)
+        values = tuple(map(self, given))
+        return self._told(lambda: fold.kept("homotopy", values, line), line)
 
     def _sized(self, expression: Expr) -> Expr:
         """Resolve an array for its size; one of components counts, too."""
