@@ -1,15 +1,17 @@
 /* Delayed values: Chebyshev series of time in d, through what a run has been before. The past is rows of a time and the
  * values that are delayed: four or more for an own step, one for an importer's. A row behind a jump or kink begins
- * anew; what was there comes again exactly one delay later, where a series ends at the latest. See solve/delays.py. */
+ * anew; what was there comes again exactly one delay later, where a series ends at the latest. */
 #include "core.h"
 
 #define LAST 3 /* terms that must be below the tolerance */
 #define SHORTEST 1e-6
-#define NOISE_OF_RUN 100 /* last terms in tolerances that are errors of the run, if half the length */
-#define SMOOTHER 0.6     /* leaves more than this part of them */
-#define SMOOTH 7         /* a kink that has come again so often is smooth */
-#define DEGREE 5         /* of the polynomial through rows */
-#define FEWEST 4         /* rows of a step */
+#define NOISE_OF_RUN 100   /* last terms in tolerances that are errors of the run, if half the length */
+#define NOISE_OF_PIECES 10 /* of another integrator, in tolerances */
+#define SMOOTHER 0.6       /* leaves more than this part of them */
+#define SMOOTH 7           /* a kink that has come again so often is smooth */
+#define DEGREE 7           /* of the polynomial through rows */
+#define APART 1e-12        /* relative: nearer rows tell nothing but rounding */
+#define FEWEST 4           /* rows of a step */
 #define MOST 256
 
 typedef struct { /* order: how often a jump or kink has been integrated that is at its begin, or -1 */
@@ -39,7 +41,7 @@ void keep_past(Instance *c, double t, const double *point, double order) {
     Row *row;
     if (c->model->n_delays == 0 || (s->n_past == 0 && order < 0)) return;
     while (s->n_past > 1 && last_row(c)->t > t) s->n_past--;
-    if (order < 0 && last_row(c)->t >= t) return;
+    if (order < 0 && last_row(c)->t + APART * fmax(1, fabs(t)) >= t) return;
     evaluate(c, &c->model->tapes.delays, t, point, delayed);
     c->variables_valid = 0;
     if (s->n_past == MOST_PAST) forget(c, delayed);
@@ -89,12 +91,13 @@ static double allowed_of(const Instance *c, int which) {
 /* Do rows tell what is delayed along the present piece, in the middle of two of its n parts? */
 static int is_told(Instance *c, double begin, double end, int n) {
     double *point = c->vector + c->model->n_z, *delayed = c->delayed;
+    double noise = c->integrator != NULL ? NOISE_OF_PIECES : 1;
     for (int part = 0; part < n; part += n / 2) {
         double t = begin + (end - begin) * (part + 0.5) / n;
         piece_at(c->model, c->piece, t, point);
         evaluate(c, &c->model->tapes.delays, t, point, delayed);
         for (int k = 0; k < c->model->n_delays; k++)
-            if (fabs(past_value(c, k, t) - delayed[2 * k]) > allowed_of(c, k)) return 0;
+            if (fabs(past_value(c, k, t) - delayed[2 * k]) > noise * allowed_of(c, k)) return 0;
     }
     return 1;
 }
@@ -104,7 +107,7 @@ void keep_piece(Instance *c, double end) {
     double *point = c->vector + c->model->n_z, begin;
     if (c->model->n_delays == 0 || c->state.n_past == 0) return;
     begin = last_row(c)->t;
-    if (!(begin < end)) return;
+    if (!(begin + APART * fmax(1, fabs(end)) < end)) return;
     for (int n = FEWEST; n <= MOST; n *= 2) {
         for (int k = 1; k <= n; k++) {
             double t = k < n ? begin + (end - begin) * k / n : end;

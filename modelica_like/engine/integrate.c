@@ -281,12 +281,14 @@ Result pass_instant(Instance *c, unsigned char *wanting, int located) {
     return whens && memcmp(c->first, c->x, size) != 0 ? check_turned_back(c, c->looks) : RESULT_OK;
 }
 
-/* Have the ticks of this instant changed nothing that equations of motion read? */
+/* Have the ticks of this instant changed nothing that equations of motion read? Of ticks that fall together, those have
+ * that did before. */
 static int was_idle(Instance *c) {
-    int idle = 1;
+    int idle = 1, known = 0;
     for (int k = 0; k < c->model->n_d && idle; k++) idle = !c->felt[k] || c->d[k] == c->d_begun[k];
+    for (int k = 0; k < c->model->n_transitions; k++) known |= c->ticking[k] && !c->idle[k];
     for (int k = 0; k < c->model->n_transitions; k++)
-        if (c->ticking[k]) c->idle[k] = (unsigned char)idle;
+        if (c->ticking[k] && (idle || !known)) c->idle[k] = (unsigned char)idle;
     return idle;
 }
 

@@ -54,7 +54,8 @@ def test_a_meter_costs_no_restarts():
     found = run(Meter(x=1.0, v=0.0), 1.5)
     exact = np.cos(20 * 0.005 * np.arange(301))
     assert (found.final["n"], len(found.events)) == (301, 301)
-    assert found.final["total"] == pytest.approx(exact.sum(), abs=1e-7)
+    # IDAS itself is off by 1e-8 at worst where it goes through in one call.
+    assert found.final["total"] == pytest.approx(exact.sum(), abs=301 * 1e-9)
     # Both sides of a tick are in the results: the sample is that of the time of its tick, from there on.
     begins = [one.times[0] for one in found.segments]
     assert begins == pytest.approx([0.005 * k for k in range(301)], abs=1e-12)
