@@ -9,7 +9,7 @@
 #define NOISE_OF_PIECES 10 /* of another integrator, in tolerances */
 #define SMOOTHER 0.6       /* leaves more than this part of them */
 #define SMOOTH 7           /* a kink that has come again so often is smooth */
-#define DEGREE 7           /* of the polynomial through rows */
+#define DEGREE 5           /* of the polynomial through rows */
 #define APART 1e-12        /* relative: nearer rows tell nothing but rounding */
 #define FEWEST 4           /* rows of a step */
 #define MOST 256
