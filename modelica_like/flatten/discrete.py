@@ -95,7 +95,15 @@ class DiscreteEquations:
                 self._write_assertion(one, f"assertion[{number}]")
         told = [(expression, one.source) for one in self.events for expression in _expressions(one)]
         for expression, source in told:
-            self._check_pre(expression, source)
+            for symbol in symbols_in(expression) if is_expression(expression) else ():
+                if isinstance(symbol, Pre):
+                    raise LanguageError(
+                        f"{self._kind}: {symbol.name} is in a transition, where it never differs from "
+                        f"{symbol.of.name}.",
+                        where=source,
+                        advice=f"Write {symbol.of.name}: in a reset it is the value before. For an edge, write "
+                        "once=True.",
+                    )
         self._write_markers([*others, *told, *((e, u.source) for u in self.updates for e in (u.active, u.value))])
 
     def forms(self, path: Any) -> tuple[UpdateForm, ...]:
@@ -161,15 +169,6 @@ class DiscreteEquations:
                 what = f"{self._kind}: nothing determines the discrete variable {name}."
                 raise LanguageError(what, advice=f"Yield self.{name} == …, or set it in a `when` or a reset.")
 
-    def _check_pre(self, expression: Any, source: Source) -> None:
-        for one in symbols_in(expression) if is_expression(expression) else ():
-            if isinstance(one, Pre):
-                raise LanguageError(
-                    f"{self._kind}: {one.name} is in a transition, where it never differs from {one.of.name}.",
-                    where=source,
-                    advice=f"Write {one.of.name}: in a reset it is the value before. For an edge, write once=True.",
-                )
-
     def _write_markers(self, pending: list[Located]) -> None:
         """Name the markers in expressions, and write what determines them."""
         seen: set[int] = set()
@@ -198,7 +197,12 @@ class DiscreteEquations:
         """Write what determines a marker; return further expressions."""
         own: Any = one.of
         if one.kind == "relation":
-            self._write_relation(one, source)
+            mode, opposite = self._mode(one.name, str(one.of), one, ("false", "true")), cast(Expr, ca.logic_not(one.of))
+            self.events += [
+                replace(mode.go("false", "true", when=one.of), source=source),
+                replace(mode.go("true", "false", when=opposite), source=source),
+                replace(mode.initially("true", when=one.of), source=source),
+            ]
             return ()
         self.hidden.append(Hidden(one.name, f"{one.kind} {own}"))
         if one.kind in ("floor", "clock"):
@@ -217,14 +221,6 @@ class DiscreteEquations:
             self.hidden.append(Hidden(part.name, f"delay {one.of}"))
         self.updates.append(Update(parts(one)[0], INITIAL, one.of, source, at_start=True))
         return [(one.of, source), (one.offset, source), (INITIAL, source)]
-
-    def _write_relation(self, one: Marker, source: Source) -> None:
-        mode, opposite = self._mode(one.name, str(one.of), one, ("false", "true")), cast(Expr, ca.logic_not(one.of))
-        self.events += [
-            replace(mode.go("false", "true", when=one.of), source=source),
-            replace(mode.go("true", "false", when=opposite), source=source),
-            replace(mode.initially("true", when=one.of), source=source),
-        ]
 
     def _write_floor(self, one: Marker, source: Source) -> None:
         """Count up and down by what is passed; the value itself may still be on the other side by rounding."""

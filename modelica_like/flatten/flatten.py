@@ -93,7 +93,14 @@ class _Flattener:
         for component, template in templates:
             self._declare(component, used)
             for path, text in template.initial:
-                self._declare_initial(component, path, text)
+                # What is left of an initial equation is zero at the start.
+                full_path, node = f"{component.path}.{path}".lstrip("."), len(self.variables)
+                self.variable_of[id(component), path] = node
+                told = f"{INITIAL_EQUATION} `{text}`"
+                self.variables.append(
+                    FlatVariable(full_path, ONE, told, "local", "avoid", 0.0, 1.0, None, None, hidden=True)
+                )
+                self.starts.append(StartValue(node, 0.0, "fixed"))
             for one in template.hidden:
                 self._hide(id(component), one.path, f"{component.path}.{one.path}".lstrip("."), one)
         added = self._disturb() if self.disturbed else None
@@ -181,14 +188,6 @@ class _Flattener:
         limits = field.nominal, *field.bounds, field.driving, field.difference
         self.variables.append(FlatVariable(path, unit, field.description, kind, field.state, field.guess, *limits))
 
-    def _declare_initial(self, component: Component, name: str, text: str) -> None:
-        """Declare what is left of an initial equation, which is zero at the start."""
-        path, node = f"{component.path}.{name}".lstrip("."), len(self.variables)
-        self.variable_of[id(component), name] = node
-        told = f"{INITIAL_EQUATION} `{text}`"
-        self.variables.append(FlatVariable(path, ONE, told, "local", "avoid", 0.0, 1.0, None, None, hidden=True))
-        self.starts.append(StartValue(node, 0.0, "fixed"))
-
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
         self.discrete_of[id(component), name] = len(self.discretes)
         start = self._start(component, name, path)
@@ -225,7 +224,7 @@ class _Flattener:
     # -- instances ---------------------------------------------------------------------------------------------------
 
     def _instance(self, component: Component, template: Template) -> Instance:
-        nodes = [self._node(self._variable(component, slot.path), slot.order) for slot in template.slots]
+        nodes = [self._node(self.variable_of[self._owner(component, slot.path)], slot.order) for slot in template.slots]
         parameters = [self._parameter(component, name) for name in template.parameters]
         discretes = [self._discrete(component, name) for name in template.discretes]
         return Instance(component.path, template, tuple(nodes), tuple(parameters), tuple(discretes))
@@ -237,9 +236,6 @@ class _Flattener:
         for step in names:
             owner = owner.connectors[step] if step in owner.connectors else owner.parts[step]
         return id(owner), name
-
-    def _variable(self, component: Component, path: str) -> int:
-        return self.variable_of[self._owner(component, path)]
 
     def _parameter(self, component: Component, path: str) -> int:
         *names, name = path.split(".")
@@ -304,7 +300,9 @@ class _Flattener:
                     what, advice = f"{path} has a value and a connection: only one can count.", "Remove one of the two."
                     self.errors.append(WrongConnection(what, where=component.place_of(name), advice=advice))
                 continue
-            if component is self.root or self._is_open(component, name):
+            if component is self.root or (
+                self.open_inputs and (component.terminal is not None or component.value(name) is None)
+            ):
                 self.inputs.append(node)
             elif component.value(name) is not None:
                 value = self.parameters.q(self.parameters.position(component, name))
@@ -322,9 +320,6 @@ class _Flattener:
             if all(node in self.inputs for node in nodes):
                 terms = ((self._node(nodes[0], 1), 1.0), (nodes[1], -1.0))
                 self.linear.append(LinearEquation(terms, 0.0, Origin(component.path, type(component).__name__, _WIRE)))
-
-    def _is_open(self, component: Component, name: str) -> bool:
-        return self.open_inputs and (component.terminal is not None or component.value(name) is None)
 
     def _read_starts(self, component: Component) -> None:
         for name, field in component.fields.items():

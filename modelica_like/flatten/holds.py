@@ -67,7 +67,10 @@ def ideal_forms(component: Component, residuals: list[Any]) -> tuple[IdealForm, 
         zeros = [_variable(component, mode, mode.ideal[name], "variable") for name in mode.names]
         for row, residual in enumerate(residuals):
             own = [ca.substitute(residual, symbol, ca.SX(k)) for k in range(2)]
-            if all(_only(one, zero) and _depends(one, zero) for one, zero in zip(own, zeros, strict=True)):
+            if all(
+                _only(one, zero) and _number(ca.jacobian(one, zero)) != 0.0
+                for one, zero in zip(own, zeros, strict=True)
+            ):
                 forms.append(IdealForm(mode.name, (zeros[0].name, zeros[1].name), row))
                 break
         else:
@@ -77,10 +80,6 @@ def ideal_forms(component: Component, residuals: list[Any]) -> tuple[IdealForm, 
                 advice=f"Write {mode.name}.choose({written}) == 0.",
             )
     return tuple(forms)
-
-
-def _depends(residual: Any, symbol: Symbol) -> bool:
-    return _number(ca.jacobian(residual, symbol)) != 0.0
 
 
 def hold_forms(component: Component, residuals: list[Any]) -> tuple[tuple[HoldForm, ...], list[Any]]:

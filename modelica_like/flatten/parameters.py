@@ -112,7 +112,8 @@ class Parameters:
         if value.formula is None:
             return value.number
         expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scope, path, label), self._quantity))
-        result = self._with_numbers(expression)
+        found = [one for one in ca.symvar(expression) if leaf_id(one) in self._quantities]
+        result = ca.substitute(expression, column(found), column(self._quantities[leaf_id(one)][1] for one in found))
         if result.is_constant() and not math.isfinite(float(result)):
             raise ValueOutOfRange(f"{label} must be a finite number, not {float(result):g}.")
         if getattr(scope, "units_checked", True):
@@ -128,10 +129,6 @@ class Parameters:
         symbol = ca.SX.sym(text)
         self._quantities[leaf_id(symbol)] = symbol, number, unit
         return symbol
-
-    def _with_numbers(self, expression: Any) -> Any:
-        found = [one for one in ca.symvar(expression) if leaf_id(one) in self._quantities]
-        return ca.substitute(expression, column(found), column(self._quantities[leaf_id(one)][1] for one in found))
 
     def _unit_of_leaf(self, leaf: Any) -> Unit:
         key = leaf_id(leaf)

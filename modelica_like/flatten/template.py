@@ -209,25 +209,18 @@ def template_of(component: Component) -> Template:
     if component.parts or component.fields is not component._class_fields:
         with symbols_in_tables(component):
             return _build(component)
-    cache: dict[Any, Template] = _class_cache(type(component))
-    key = _structural_key(component)
-    if key not in cache:
-        cache[key] = _build(component)
-    return cache[key]
-
-
-def _class_cache(kind: type[Component]) -> dict[Any, Template]:
+    kind = type(component)
     if "_templates" not in vars(kind):
         kind._templates = {}  # type: ignore[attr-defined]
-    return vars(kind)["_templates"]
-
-
-def _structural_key(component: Component) -> tuple[Any, ...]:
+    cache: dict[Any, Template] = vars(kind)["_templates"]
     structural = tuple(component.__dict__[name] for name in component._structural)
     used = tuple(name for name, connector in component.connectors.items() if connector.used)
     given = tuple(name for name, field in component.fields.items() if field.default is None and component.given(name))
     units = tuple(str(unit_of_field(component, name)) for name, f in component.fields.items() if f.unit == ANY)
-    return structural, used, given, units
+    key = structural, used, given, units
+    if key not in cache:
+        cache[key] = _build(component)
+    return cache[key]
 
 
 def _build(component: Component) -> Template:
@@ -239,7 +232,12 @@ def _build(component: Component) -> Template:
     sources = tuple(e.source for e in (*equations, *initial))
     residuals += [honest(one - (e.left - e.right)) for one, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
-    energy, energy_terms = Names(component), _energy_terms(component, wiring)
+    # Stored energy, loss, source power, then the power into each connector, without those of parts.
+    passed_on = {id(end) for one in wiring if isinstance(one, Connection) for end in one.ends}
+    terms: list[Any] = [component.stored_energy(), component.loss_power(), component.source_power()]
+    own = [c for c in component.connectors.values() if c.used and id(c) not in passed_on]
+    terms += [connector.power() for connector in own]
+    energy, energy_terms = Names(component), [ca.SX(cast(Any, term)) for term in terms]
     others = [*zip(residuals, sources, strict=True), *((term, NOWHERE) for term in energy_terms)]
     discrete = DiscreteEquations(component, determined, events, others)
     checked = [*equations, *initial], discrete.events, discrete.updates, discrete.delays
@@ -288,19 +286,17 @@ def _statements(
     written = located(component.equations(), f"{kind}.equations()")
     statements = [as_statement(item, source, kind) for item, source in written]
     every = [s for s in statements if isinstance(s, Equation)]
-    equations = [s for s in every if not is_discrete(s)] + _constants(component)
+    # Parameters that initial equations determine do not change.
+    kept = (name for name, field in component.fields.items() if isinstance(field, Variable) and field.constant)
+    equations = [s for s in every if not is_discrete(s)] + [
+        Equation(der(symbol_of(component, name)), ca.SX(0)) for name in kept
+    ]
     at_start = located(component.initial_equations(), f"{kind}.initial_equations()")
     initial = [as_equation(item, source, kind) for item, source in at_start]
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
     joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
     check_balance(component, equations, joined)
     return equations, [s for s in every if is_discrete(s)], initial, wiring
-
-
-def _constants(component: Component) -> list[Equation]:
-    """Equations of parameters that initial equations determine: they do not change."""
-    kept = (name for name, field in component.fields.items() if isinstance(field, Variable) and field.constant)
-    return [Equation(der(symbol_of(component, name)), ca.SX(0)) for name in kept]
 
 
 class _Changes:
@@ -360,15 +356,6 @@ class _Changes:
 
     def _path(self, symbol: Symbol) -> str:
         return path_of(symbol, self.component)
-
-
-def _energy_terms(component: Component, wiring: Iterable[Connection | FreeEnd]) -> list[Any]:
-    """Stored energy, loss, source power, then the power into each connector, without those of parts."""
-    passed_on = {id(end) for one in wiring if isinstance(one, Connection) for end in one.ends}
-    terms: list[Any] = [component.stored_energy(), component.loss_power(), component.source_power()]
-    own = [c for c in component.connectors.values() if c.used and id(c) not in passed_on]
-    terms += [connector.power() for connector in own]
-    return [ca.SX(cast(Any, term)) for term in terms]
 
 
 def _rows(sparsity: ca.Sparsity) -> tuple[tuple[int, ...], ...]:

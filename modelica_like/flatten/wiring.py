@@ -123,13 +123,13 @@ class Wiring:
         for driver, sink, source in self.signals:
             if not all((one.owner._owner or one.owner).units_checked for one in (driver, sink)):
                 continue
-            units = [self._unit(symbol) for symbol in (driver, sink)]
+            units = [
+                self.inferred.get((id(symbol.owner), symbol.name)) or unit_of_field(symbol.owner, symbol.name)
+                for symbol in (driver, sink)
+            ]
             if not same_dimension(*units):
                 what = f"{_name(driver)} is in {units[0]}, {_name(sink)} expects {units[1]}."
                 self._refuse(what, source, "Give the source's parameters in that unit.")
-
-    def _unit(self, symbol: Symbol) -> Unit:
-        return self.inferred.get((id(symbol.owner), symbol.name)) or unit_of_field(symbol.owner, symbol.name)
 
     def check_free(self, component: Component) -> None:
         """Collect an error for every connector that must be connected and is not."""

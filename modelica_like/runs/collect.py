@@ -74,7 +74,11 @@ class Collector:
             return
         for row, k in enumerate(self._along):
             if self._every[k].kind == "at":
-                self._read_at(dense, k, row, self._every[k].moment)
+                piece = int(np.searchsorted(dense.begins, self._every[k].moment, side="right")) - 1
+                if piece >= 0 and self._every[k].moment <= dense.ends[piece]:
+                    pieces, times = np.array([piece]), np.array([self._every[k].moment])
+                    x, z = dense.points(pieces, times)
+                    self._values[k] = self._curves.at(times, x, z, dense.d[:, pieces])[row, 0]
         if not self._between:
             return
         fitted = self._fits.fitted(dense)
@@ -93,13 +97,6 @@ class Collector:
         if not value <= known + SAME * abs(known):
             self._times[k] = time
         self._values[k] = np.fmax(known, value)
-
-    def _read_at(self, dense: Dense, k: int, row: int, moment: float) -> None:
-        piece = int(np.searchsorted(dense.begins, moment, side="right")) - 1
-        if piece >= 0 and moment <= dense.ends[piece]:
-            pieces, times = np.array([piece]), np.array([moment])
-            x, z = dense.points(pieces, times)
-            self._values[k] = self._curves.at(times, x, z, dense.d[:, pieces])[row, 0]
 
     def finish(self, record: Recorder | Solution) -> list[Number]:
         """Return the numbers, with both sides of every event of the run and with its end."""

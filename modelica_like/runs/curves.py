@@ -189,23 +189,19 @@ def compare_solutions(
     """
     if min(first.time[-1], second.time[-1]) <= max(first.time[0], second.time[0]):
         raise ValueOutOfRange(f"{' and '.join(labels)} have no time in common.")
-    names = _signals(first, second, labels, signals)
-    events = tuple(_match_events(first, second))
-    grid = _Grid.of(first, second, events)
-    scales = ranges(first, names, least)
-    deviations = [_deviation(first, second, name, grid, scales[name]) for name in names]
-    ordered = tuple(sorted(deviations, key=lambda deviation: -deviation.relative))
-    return Curves(first, second, ordered, events, labels, grid.interpolated)
-
-
-def _signals(first: Trajectories, second: Trajectories, labels: tuple[str, str], patterns: Sequence[str]) -> list[str]:
     common = [name for name in first.names if name in first.model.position and name in second.model.position]
     if not common:
         raise UnknownName(
             f"{' and '.join(labels)} have no signal in common.",
             advice="Signals are compared by their names, such as clutch.tau.",
         )
-    return fitting(common, patterns, "They have no common signal") or common
+    names = fitting(common, signals, "They have no common signal") or common
+    events = tuple(_match_events(first, second))
+    grid = _Grid.of(first, second, events)
+    scales = ranges(first, names, least)
+    deviations = [_deviation(first, second, name, grid, scales[name]) for name in names]
+    ordered = tuple(sorted(deviations, key=lambda deviation: -deviation.relative))
+    return Curves(first, second, ordered, events, labels, grid.interpolated)
 
 
 def _instants(events: Sequence[Event], start: float, known: set[str]) -> dict[str, list[tuple[float, str]]]:

@@ -103,12 +103,11 @@ def _rows(drive: Assembly, path: str, times: Any, values: Any, unit: str) -> lis
         raise ValueOutOfRange(
             f"The times of the input '{path}' do not rise.", advice="For a jump, write two times close to each other."
         )
-    numbers = [to_si(f"{float(one)!r} {unit}" if unit else _plain(one), own, path) for one in values]
+    numbers = [
+        to_si(f"{float(one)!r} {unit}" if unit else one.item() if isinstance(one, np.generic) else one, own, path)
+        for one in values
+    ]
     return [list(row) for row in zip(moments, numbers, strict=True)]
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def _has(drive: Assembly, path: str) -> bool:

@@ -40,7 +40,18 @@ def read_columns(path: Path) -> dict[str, tuple[Vector, str]]:
     """
     text = _text(path)
     said = _SEPARATOR.match(text)
-    separator = said[1] if said else next((one for one in ";\t" if one in _line_of_names(text)), ",")
+    separator = (
+        said[1]
+        if said
+        else next(
+            (
+                one
+                for one in ";\t"
+                if one in next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+            ),
+            ",",
+        )
+    )
     before = 1 if said else 0
     reader = csv.reader(io.StringIO(text[said.end() if said else 0 :], newline=""), delimiter=separator)
     try:
@@ -107,10 +118,6 @@ def _text(path: Path) -> str:
         if "\0" not in text:
             return text
     raise NetlistError(f"{path.name} is not a text: a table is UTF-8, UTF-16 or Windows-1252.")
-
-
-def _line_of_names(text: str) -> str:
-    return next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
 
 
 def _trimmed(row: list[str], least: int) -> list[str]:

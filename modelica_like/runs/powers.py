@@ -179,17 +179,15 @@ class Powers:
             weights[bent, :, :2] = _BESIDE * np.diff(every.times[ends[:, bent]], axis=0)[0][:, None, None]
             coarse = self._coarse(every.terms, ends, places, weights, bent, bends, depth)
         again, finer = self._again(every, ends, _stretches(coarse, first) if depth < _DEEPEST else [])
-        self._miss(every, ends, places, weights, coarse & ~again)
+        # What is unknown in intervals that remain too coarse.
+        missed = coarse & ~again
+        for k in missed.nonzero()[0]:
+            change = np.diff(every.terms[0][:, ends[:, k]])[:, 0]
+            self.unknown += np.abs(change - every.terms[POWERS][:, places[k]] @ weights[k, 0])
         weights[again] = 0.0
         total = _summed(powers, places, weights[:, 0]) + bends[0] @ ~again[bent]
         parts = (self.integrals(some, depth + 1) for some in results(self.model, finer))
         return sum(parts, total.reshape(POWERS, -1))
-
-    def _miss(self, every: Results, ends: Places, places: Places, weights: Vector, missed: Places) -> None:
-        """Note what is unknown in intervals that remain too coarse."""
-        for k in missed.nonzero()[0]:
-            change = np.diff(every.terms[0][:, ends[:, k]])[:, 0]
-            self.unknown += np.abs(change - every.terms[POWERS][:, places[k]] @ weights[k, 0])
 
     def _again(self, every: Results, ends: Places, stretches: list[Places]) -> tuple[Places, list[Segment]]:
         """Return the intervals with finer results, and these; a stretch lies within one smooth piece.

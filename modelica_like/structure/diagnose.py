@@ -44,7 +44,11 @@ def check_solvable(system: System, incidence: list[list[int]], contradictions: l
         over, under = ([_chain_name(system, chains[c]) for c in block] for block in (over_cols, under_cols))
         raise _overdetermined(system.model, [system.origins[r] for r in over_rows], over, under)
     if contradictions:
-        raise _contradiction(system.model, contradictions)
+        parts = _parts(contradictions)
+        what = (
+            f"{_list(parts)} {'fixes' if len(parts) == 1 else 'fix'} the same {{potential}} or {{flow}} more than once."
+        )
+        raise doubly_fixed(system.model, contradictions, what, "Two parts prescribe it, or rigid parts form a loop.")
     if len(under_cols) > len(under_rows):
         raise _underdetermined(
             system,
@@ -93,12 +97,6 @@ def _overdetermined(model: FlatModel, origins: list[Origin], over: list[str], un
         advice = f"Check the equations of {parts[0]}: does one of them use the wrong variable?"
         return Overdetermined(what, where=_places(origins), why=why, advice=advice)
     return doubly_fixed(model, origins, what, "Two rigid parts fix the same {potential} or {flow}.")
-
-
-def _contradiction(model: FlatModel, origins: list[Origin]) -> Overdetermined:
-    parts = _parts(origins)
-    what = f"{_list(parts)} {'fixes' if len(parts) == 1 else 'fix'} the same {{potential}} or {{flow}} more than once."
-    return doubly_fixed(model, origins, what, "Two parts prescribe it, or rigid parts form a loop.")
 
 
 def doubly_fixed(model: FlatModel, origins: Sequence[Origin], what: str, why: str) -> Overdetermined:

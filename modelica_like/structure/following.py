@@ -226,7 +226,14 @@ def _follow(system: System, group: Group, numbers: Counter[str]) -> Following:
     for row in first:
         numbers[prefix] += 1
         name = f"{prefix}state[{numbers[prefix]}]"
-        chains.append(_add_chain(system, name, group.count))
+        # A state has as many derivatives as the constraints have.
+        added = len(system.chains)
+        system.chains.append([len(system.levels)])
+        system.levels.append(Level(added, 0, name, _ALWAYS, 1.0, 0.0))
+        system.symbols.append(ca.SX.sym(name))
+        for _ in range(group.count):
+            system.add_level(added)
+        chains.append(added)
         discretes += [FlatDiscrete(f"{name}.{of}", ONE, f"weight of {of} in {name}", float(weight), hidden=True)
                       for of, weight in zip(moved, row, strict=True)]  # fmt: skip
     symbols = ca.vertcat(*(ca.SX.sym(one.path) for one in discretes))
@@ -242,17 +249,6 @@ def _follow(system: System, group: Group, numbers: Counter[str]) -> Following:
 def _measured(system: System, group: Group, levels: Sequence[int]) -> Any:
     """Variables, or their derivatives, over the nominal values of the variables."""
     return system.column(levels) / ca.DM([system.levels[level].nominal for level in group.levels])
-
-
-def _add_chain(system: System, name: str, count: int) -> int:
-    """Add a state with as many derivatives as the constraints have."""
-    chain = len(system.chains)
-    system.chains.append([len(system.levels)])
-    system.levels.append(Level(chain, 0, name, _ALWAYS, 1.0, 0.0))
-    system.symbols.append(ca.SX.sym(name))
-    for _ in range(count):
-        system.add_level(chain)
-    return chain
 
 
 def _first_weights(system: System, slopes: Any) -> Any:

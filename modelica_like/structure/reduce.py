@@ -145,7 +145,8 @@ def reduce(flat: FlatModel) -> ReducedDae:
         chosen = _choose(flat, find_aliases(flat), groups)
     system, counts, states, holds, flags = chosen.system, chosen.counts, chosen.states, chosen.holds, chosen.flags
     residual, origins = _differentiate(system, counts)
-    unknowns = _unknowns(system, states)
+    known = {*states, *system.inputs}
+    unknowns = [n for n in range(len(system.levels)) if n not in known]
     if flags.settle(residual, unknowns):
         residual, origins = _differentiate(system, counts)
     derivatives = {system.derivative(state) for state in states}
@@ -191,7 +192,9 @@ def _choose(flat: FlatModel, aliases: Aliases, groups: tuple[Group, ...]) -> _Ch
     _check_input_rates(system)
     prefer_relative_states(system)
     contradictions = [flat.linear[k].origin for group in aliases.contradictions for k in group]
-    incidence = _incidence(system)
+    incidence: list[list[int]] = [[] for _ in range(system.residual.numel())]
+    for row, column in zip(*ca.jacobian_sparsity(system.residual, system.everything).get_triplet(), strict=True):
+        incidence[row].append(column)
     check_solvable(system, incidence, contradictions)
     counts = Pantelides(system, incidence).counts
     prefer(system, groups, following)
@@ -209,14 +212,6 @@ def _check_input_rates(system: System) -> None:
                 "which is not known.",
                 advice="Give the derivative as a separate input, or filter the input before it prescribes a motion.",
             )
-
-
-def _incidence(system: System) -> list[list[int]]:
-    """Level numbers in each residual."""
-    rows: list[list[int]] = [[] for _ in range(system.residual.numel())]
-    for row, column in zip(*ca.jacobian_sparsity(system.residual, system.everything).get_triplet(), strict=True):
-        rows[row].append(column)
-    return rows
 
 
 def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:
@@ -265,11 +260,6 @@ def _check_inputs(system: System, equations: Any, rows: list[int]) -> None:
             )
 
 
-def _unknowns(system: System, states: list[int]) -> list[int]:
-    known = {*states, *system.inputs}
-    return [n for n in range(len(system.levels)) if n not in known]
-
-
 def _assemble(
     system: System, counts: list[int], states: list[int], unknowns: list[int], origins: list[Origin], solved: Solved
 ) -> ReducedDae:
@@ -293,6 +283,7 @@ def _assemble(
         for block in solved.blocks
     ]
     numbers = [number for number, _ in solved.determinants]
+    position = {level: k for k, level in enumerate(states)}
     return ReducedDae(
         flat=model,
         states=tuple(levels[s].name for s in states),
@@ -303,7 +294,9 @@ def _assemble(
         ode=ca.vertcat(*rates) if rates else ca.SX(0, 1),
         alg=ca.vertcat(*alg) if alg else ca.SX(0, 1),
         values=place(level_values, model.p),
-        node_states=_node_states(system, states),
+        node_states=tuple(
+            (position[p[0]], p[1]) if p is not None and p[0] in position else None for p in system.node_level
+        ),
         guesses=tuple(levels[s].guess for s in states),
         nominals=tuple(levels[s].nominal for s in states),
         z_guesses=tuple(levels[n].guess for n in z_levels),
@@ -326,8 +319,3 @@ def _written_out(system: System, unknowns: list[int], solved: Solved) -> tuple[A
         _, results = ca.substitute_inplace(symbols, expressions, results, False)
     end = 1 + len(solved.alg)
     return results[0], results[1:end], results[end:]
-
-
-def _node_states(system: System, states: list[int]) -> tuple[tuple[int, float] | None, ...]:
-    position = {level: k for k, level in enumerate(states)}
-    return tuple((position[p[0]], p[1]) if p is not None and p[0] in position else None for p in system.node_level)

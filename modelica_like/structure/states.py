@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from modelica_like.errors import Overdetermined
 from modelica_like.structure.alias import PREFERRED
 from modelica_like.structure.diagnose import doubly_fixed
 from modelica_like.structure.matching import Elimination
@@ -41,9 +40,18 @@ def select_states(
         # speeds are wanted more than the relative one, is a state all the same: absolute angles grow without bound.
         ranked = [c for c in _ranked(system, counts, slopes, incidence, stage) if system.chains[c][0] not in known]
         choices = [_independent(rows, some, slopes) for some in ([c for c in ranked if c in candidates], ranked)]
-        chosen = min(choices, key=lambda one: (-len(one), sum(_preference(system, c, stage) for c in one)))
+        chosen = min(
+            choices,
+            key=lambda one: (-len(one), sum(system.levels[system.chains[c][-1 - stage]].preference for c in one)),
+        )
         if len(chosen) < len(rows):
-            raise _dependent(system, [e for e in rows if e not in chosen.values()])
+            equations = [e for e in rows if e not in chosen.values()]
+            origins = [system.origins[row] for row in equations]
+            places = ", ".join(dict.fromkeys(o.path or o.kind for o in origins))
+            what = f"The motion is constrained twice: the constraint of {places} follows from others."
+            raise doubly_fixed(
+                system.model, origins, what, "Rigid parts form a loop, or two parts fix the same {potential}."
+            )
         dummies.update(system.chains[c][-1 - stage] for c in chosen)
         candidates = set(chosen)
         stage += 1
@@ -77,10 +85,6 @@ def _ranked(
     return sorted((c for c, chain in enumerate(system.chains) if len(chain) > stage), key=rank)
 
 
-def _preference(system: System, chain: int, stage: int) -> int:
-    return system.levels[system.chains[chain][-1 - stage]].preference
-
-
 def _independent(rows: list[int], columns: list[int], slopes: list[dict[int, float]]) -> dict[int, int]:
     """Choose columns in their order as long as they are linearly independent; return column -> pivot row."""
     entries: dict[int, dict[int, float]] = {c: {} for c in columns}
@@ -93,10 +97,3 @@ def _independent(rows: list[int], columns: list[int], slopes: list[dict[int, flo
         if found.add(entries[column]):
             chosen[column] = found.pivot
     return chosen
-
-
-def _dependent(system: System, equations: list[int]) -> Overdetermined:
-    origins = [system.origins[e] for e in equations]
-    places = ", ".join(dict.fromkeys(o.path or o.kind for o in origins))
-    what = f"The motion is constrained twice: the constraint of {places} follows from others."
-    return doubly_fixed(system.model, origins, what, "Rigid parts form a loop, or two parts fix the same {potential}.")

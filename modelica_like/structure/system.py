@@ -111,7 +111,9 @@ class System:
 def build_system(model: FlatModel, aliases: Aliases) -> System:
     """Replace every node by its class, and collect the equations that remain."""
     chains, place = _chains(aliases)
-    node_level = _node_levels(aliases, place)
+    # Level and factor of every node, None where its value is known.
+    pairs = ((place.get(root), factor) for root, factor in zip(aliases.root, aliases.factor, strict=True))
+    node_level = [found and (found[0], factor * found[1]) for found, factor in pairs]
     # A state equals the variable after which its chain is named, with sign.
     ranked = _ranked(model, node_level)
     scale = {level: ranked[chain[0]][0][-1] for chain in chains for level in chain}
@@ -144,12 +146,6 @@ def _chains(aliases: Aliases) -> tuple[list[list[int]], dict[int, tuple[int, flo
             root, times = aliases.derivative.get(root, (None, 1.0))
             factor *= times
     return chains, place
-
-
-def _node_levels(aliases: Aliases, place: dict[int, tuple[int, float]]) -> list[tuple[int, float] | None]:
-    """Level and factor of every node, None where its value is known."""
-    pairs = ((place.get(root), factor) for root, factor in zip(aliases.root, aliases.factor, strict=True))
-    return [found and (found[0], factor * found[1]) for found, factor in pairs]
 
 
 _Named = tuple[tuple[Any, ...], int, FlatVariable, float]
@@ -204,7 +200,8 @@ def _collect_residuals(system: System, aliases: Aliases) -> None:
     system.origins += [model.origin(instance, row) for instance, row in model.general]
     for number in aliases.remaining:
         equation = model.linear[number]
-        system.linear_rows.append(_levels_of(system, equation.terms))
+        placed = (system.node_level[node] for node, _ in equation.terms)
+        system.linear_rows.append(list(dict.fromkeys(pair[0] for pair in placed if pair is not None)))
         if equation.row is not None:
             places.append(first[equation.row[0]] + equation.row[1])
         else:
@@ -217,9 +214,3 @@ def _collect_residuals(system: System, aliases: Aliases) -> None:
     stacked = ca.vertcat(ca.SX(0, 1), *columns.values(), *sums)
     # A vector of one entry, indexed by a list, gives a row.
     system.residual = ca.vec(stacked[places])
-
-
-def _levels_of(system: System, terms: tuple[tuple[int, Any], ...]) -> list[int]:
-    """Levels of the unknown nodes in an equation, each once."""
-    placed = (system.node_level[node] for node, _ in terms)
-    return list(dict.fromkeys(pair[0] for pair in placed if pair is not None))

@@ -83,7 +83,11 @@ class _Builder:
             self._attempt(place, self._member, name, member)
         if self.errors:
             raise raise_together_or_one(self.errors)
-        self._equations()
+        self.component.__dict__.update(
+            _statements=tuple(self.statements.equations), _initial=tuple(self.statements.initial),
+            _happenings=tuple(self.statements.happenings),
+            _instants=frozenset(name for name, instant in self.statements.outputs.items() if instant),
+        )  # fmt: skip
         component.__dict__.update(_simulate={}, _display={}, _class=text.path)
         self._connect()
         if self.errors:
@@ -160,7 +164,7 @@ class _Builder:
         given = member.given
         if given.value is None and "start" in given.inner and given.inner["start"].value is not None:
             given = given.inner["start"]
-            self.notes.tell(f"{self._label(name)} has no value; its start value is taken.")
+            self.notes.tell(f"{f'{self.instance.path}.{name}'.lstrip('.')} has no value; its start value is taken.")
         low, high = (self._number(basic.given.inner.get(one)) for one in ("min", "max"))
         fixed = self._known(basic.given.inner.get("fixed")) is not False
         made = param(self._unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
@@ -206,7 +210,15 @@ class _Builder:
             field_made = signal_out(self._unit(basic), description)
         else:
             nominal = self._number(basic.given.inner.get("nominal"))
-            field_made = var(self._unit(basic), description, state=self._preference(basic), nominal=nominal or 1.0)
+            wanted = self._known(basic.given.inner.get("stateSelect"))
+            field_made = var(
+                self._unit(basic),
+                description,
+                state={"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}.get(
+                    wanted, "default"
+                ),
+                nominal=nominal or 1.0,
+            )
         if path in self.statements.outputs:
             memory = boolean(description)
             self.component._declare(f"{path}{MEMORY}", memory)
@@ -269,27 +281,13 @@ class _Builder:
         self.notes.tell(f"The unit '{unit}' is left out: numbers of the text stay as they are.")
         return "1"
 
-    def _preference(self, basic: Basic) -> Any:
-        wanted = self._known(basic.given.inner.get("stateSelect"))
-        return {"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}.get(wanted, "default")
-
     def _display(self, path: str, basic: Basic) -> None:
         unit = str(self._known(basic.given.inner.get("displayUnit")) or "")
         with suppress(UnitError):  # it is only shown
             if unit and same_dimension(parse_unit(unit), parse_unit(self._unit(basic))):
                 self.notes.display[f"{self.instance.path}.{path}".lstrip(".")] = unit
 
-    def _label(self, name: str) -> str:
-        return f"{self.instance.path}.{name}".lstrip(".")
-
     # -- equations and connections -----------------------------------------------------------------------------------
-
-    def _equations(self) -> None:
-        self.component.__dict__.update(
-            _statements=tuple(self.statements.equations), _initial=tuple(self.statements.initial),
-            _happenings=tuple(self.statements.happenings),
-            _instants=frozenset(name for name, instant in self.statements.outputs.items() if instant),
-        )  # fmt: skip
 
     def _connect(self) -> None:
         component = self.component

@@ -136,19 +136,16 @@ class Classes:
             return None
         self.open.add(key)
         try:
-            return self._inherited(level, name)
+            bases = [one for one in level.elements if isinstance(one, Extends)] + ([level.short] if level.short else [])
+            for one in bases:
+                base = self.find(one.base, level)
+                if isinstance(base, ClassText) and base is not level:
+                    found = self._inside(base, name)
+                    if found is not None:
+                        return found
+            return None
         finally:
             self.open.remove(key)
-
-    def _inherited(self, level: ClassText, name: str) -> Found | None:
-        bases = [one for one in level.elements if isinstance(one, Extends)] + ([level.short] if level.short else [])
-        for one in bases:
-            base = self.find(one.base, level)
-            if isinstance(base, ClassText) and base is not level:
-                found = self._inside(base, name)
-                if found is not None:
-                    return found
-        return None
 
     def full(self, path: str) -> Found | None:
         """Return a class by its full name; units of version 3 of the standard library have the names of version 4."""

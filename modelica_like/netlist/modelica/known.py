@@ -81,7 +81,9 @@ class _Part:
         for name, one in self.entries.items():
             here = self.known.here(name)
             if name in self.known.only:
-                self._demand(name, one)
+                if one.value is not None and one.scope is not None:
+                    self._equal(name, Resolver(*one.scope, numeric=True)(one.value), one.value.line)
+                    self.values.pop(name, None)
             elif name in self.known.ignore and name not in used:
                 continue
             elif name in used or isinstance(self.fields.get(here), Parameter | Input) or here in self.kind._structural:
@@ -154,7 +156,8 @@ class _Part:
         if one.scope[0] is not self.owner or (as_formula(node) is None and node.kind not in (*fold.KNOWN, "array")):
             known = Resolver(*one.scope, numeric=True)(one.value)
             if known != node:
-                self.notes.tell(f"{self.name}.{name} is a number now: a formula cannot have '{_words(one)}'.")
+                words = one.scope[1].place(one.value.line).text
+                self.notes.tell(f"{self.name}.{name} is a number now: a formula cannot have '{words}'.")
             node = known
         if node.kind == "name" and name in self.known.omit:
             node = Resolver(*one.scope, numeric=True)(one.value)
@@ -174,13 +177,6 @@ class _Part:
             if name in self.known.only and name in self.values:
                 self._equal(name, self.values.pop(name), self.member.declaration.line)
 
-    def _demand(self, name: str, one: Given) -> None:
-        """Check a parameter for which one value is supported."""
-        if one.value is not None and one.scope is not None:
-            self._equal(name, Resolver(*one.scope, numeric=True)(one.value), one.value.line)
-            self.values[name] = Expr("boolean", (True,))
-            self.values.pop(name)
-
     def _equal(self, name: str, value: Expr, line: int) -> None:
         only = self.known.only[name]
         wanted = only if isinstance(only, list) else [only]
@@ -193,7 +189,7 @@ class _Part:
 
     def _plain(self, here: str, value: Expr) -> Any:
         """Return the value of a field that decides the structure."""
-        if value.kind == "name" or (value.kind == "array" and _has_names(value)):
+        if value.kind == "name" or (value.kind == "array" and any(True for _ in names_in(value))):
             value = self._owners().known()(value)
         if value.kind == "literal":
             kind, _, name = value.args[0].rpartition(".")
@@ -265,14 +261,6 @@ class _Part:
             f"{self.known.path} has no '{name}' here{did_you_mean(name, [*names, *ours]) or '.'}",
             where=self.member.text.place(one.line or self.member.declaration.line),
         )
-
-
-def _has_names(value: Expr) -> bool:
-    return any(True for _ in names_in(value))
-
-
-def _words(one: Given) -> str:
-    return one.scope[1].place(one.value.line).text if one.scope and one.value else ""
 
 
 def _without_jumps(rows: tuple[Any, ...], name: str, notes: Notes) -> tuple[Any, ...]:

@@ -56,10 +56,15 @@ class _Form:
             else self._part(name, part)
             for name, part in self.model._parts.items()
         }
+        parameters: dict[str, Any] = {}
+        for name, unit in self.parameters.items():
+            value = self.model.value(name)
+            if value is None:
+                raise ModelicaTextError(f"{name} has no value.")
+            parameters[name] = self._text(value, unit, name)
         made = Assembly(
             self.model._name, parts=parts, free=self.model.free_ends, description=self.model.__dict__["_description"],
-            parameters={name: self._parameter(name) for name in self.parameters},
-            connect={_wire_name(ends, k): ends for k, ends in enumerate(self.wires, 1)},
+            parameters=parameters, connect={_wire_name(ends, k): ends for k, ends in enumerate(self.wires, 1)},
         )  # fmt: skip
         shown = {path: unit for path, unit in self.model.__dict__["_display"].items() if _is_shown(made, path, unit)}
         made.__dict__.update(_simulate=dict(self.model.__dict__["_simulate"]), _display=shown)
@@ -205,12 +210,6 @@ class _Form:
                 text = self._text(start, one.unit, f"{path}.{name}")
                 twin.give(name, text if start.fixed else guess(text))
         return twin
-
-    def _parameter(self, name: str) -> Any:
-        value = self.model.value(name)
-        if value is None:
-            raise ModelicaTextError(f"{name} has no value.")
-        return self._text(value, self.parameters[name], name)
 
     def _text(self, value: Value, unit: Unit, path: str) -> Any:
         """Return a number with its unit; a formula stays if its unit fits."""

@@ -102,7 +102,10 @@ def _events(component: Component) -> list[str]:
             lines.append(f"    {path} = {new};" if isinstance(field, Discrete) else f"    reinit({path}, {new});")
     lines += ["  end when;"] if resets else []
     for one in ends:
-        lines += _ending(one, component)
+        conditions = ", ".join(_text(each, component) for each in one.conditions)
+        texts = (key.text.replace('"', "'") for _, new in one.branches for key in new if isinstance(key, Ending))
+        written = (f'    terminate("{re.sub(r"[{}]", "", text)}");' for text in texts)
+        lines += [f"  when {{{conditions}}} then", *written, "  end when;"]
     for one in events:
         if isinstance(one, Transition) and one.fails:
             words = one.notice.replace('"', "'")
@@ -114,13 +117,6 @@ def _only_ends(one: Any) -> bool:
     """Return whether an event is a `when` that ends the run and does nothing else."""
     whole = one.branches if isinstance(one, When) else ()
     return len(whole) == 1 and all(isinstance(key, Ending) and not key.fails for key in whole[0][1])
-
-
-def _ending(one: When, component: Component) -> list[str]:
-    conditions = ", ".join(_text(each, component) for each in one.conditions)
-    texts = (key.text.replace('"', "'") for _, new in one.branches for key in new if isinstance(key, Ending))
-    written = (f'    terminate("{re.sub(r"[{}]", "", text)}");' for text in texts)
-    return [f"  when {{{conditions}}} then", *written, "  end when;"]
 
 
 def _due(one: Transition, component: Component, before: bool = True) -> str:

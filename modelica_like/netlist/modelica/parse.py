@@ -105,7 +105,13 @@ class _Parser(Expressions):
     def _short(self, made: ClassText) -> None:
         if self.take("enumeration"):
             self.need("(")
-            made.literals = tuple(self._literals())
+            literals = []
+            while self.kind == "name":
+                literals.append(self.take("name"))
+                self.strings()
+                self.annotation(None)
+                self.take(",")
+            made.literals = tuple(literals)
             self.need(")")
         else:
             while word := self.take("input", "output", "flow"):
@@ -118,15 +124,6 @@ class _Parser(Expressions):
         made.description = self.strings()
         self.annotation(made)
 
-    def _literals(self) -> list[str]:
-        literals = []
-        while self.kind == "name":
-            literals.append(self.take("name"))
-            self.strings()
-            self.annotation(None)
-            self.take(",")
-        return literals
-
     def _composition(self, made: ClassText) -> None:
         hidden = False
         while self.kind != "end":
@@ -137,7 +134,13 @@ class _Parser(Expressions):
                 self.annotation(made)
                 self.need(";")
             elif self.kind in ("initial", "equation", "algorithm"):
-                self._section(made, bool(self.take("initial")), line)
+                if self.take("algorithm"):
+                    if made.kind != "function":
+                        made.unsupported.append(("an algorithm outside a function", line))
+                    made.algorithm += self.statements()
+                else:
+                    self.need("equation")
+                    (made.initial_equations if bool(self.take("initial")) else made.equations).extend(self.statements())
             elif self.take("external"):
                 made.unsupported.append(("external functions", line))
                 while self.kind not in (";", "end of file"):
@@ -148,15 +151,6 @@ class _Parser(Expressions):
             else:
                 self._element(made, hidden)
                 self.need(";")
-
-    def _section(self, made: ClassText, initial: bool, line: int) -> None:
-        if self.take("algorithm"):
-            if made.kind != "function":
-                made.unsupported.append(("an algorithm outside a function", line))
-            made.algorithm += self.statements()
-        else:
-            self.need("equation")
-            (made.initial_equations if initial else made.equations).extend(self.statements())
 
     def _element(self, made: ClassText, hidden: bool) -> None:
         line = self.line

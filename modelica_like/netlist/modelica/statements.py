@@ -147,7 +147,12 @@ class Statements:
         elif one.kind == "when":
             self._when(one, text, local)
         elif one.kind == "call":
-            self._demand(one.parts[0], resolver, text)
+            if one.parts[0].args[0] != "assert":
+                raise refused(f"{one.parts[0].args[0]}(…) among equations", text, one.parts[0].line)
+            demand = self._demanded(one.parts[0], resolver, text)
+            if demand is not None:
+                condition, words = demand
+                self.happenings.append(Happening((((condition,), {}),), text.place(one.parts[0].line), words.args[0]))
         else:
             raise refused(f"'{one.kind}' among equations", text, one.line)
 
@@ -207,7 +212,7 @@ class Statements:
         for k in range(counts.pop()):
             rows = [(condition, *one.equations[k]) for condition, one in branches]
             left = rows[0][1]
-            if all(_same(row[1], left) for row in rows):
+            if all(row[1].kind == "name" and _text(row[1]) == _text(left) for row in rows):
                 self.equations.append((left, _choice([(row[0], row[2]) for row in rows], line), rows[0][3]))
                 continue
             zero = [(row[0], fold.operation("-", (row[1], row[2]), line)) for row in rows]
@@ -253,18 +258,14 @@ class Statements:
             if any(each.kind in ("boolean", "number") for each in conditions):
                 raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
             values = self._changes(body, text, local)
-            states = self._states(body, resolver)
+            calls = (one.parts[0] for one in body if one.kind == "call" and one.parts[0].args[0] == "reinit")
+            states = {resolver(call.args[1][0]).args[0][0] for call in calls}
             made |= {name for name in values if name not in states and not _is_ending(name)}
             branches.append((conditions, values))
         for name in made & self.assigned:
             raise ModelicaTextError(f"Two whens determine {name}.", where=source)
         self.assigned |= made
         self.happenings.append(Happening(tuple(branches), source))
-
-    def _states(self, body: list[Statement], resolver: Resolver) -> set[str]:
-        """Return the names that `reinit` sets."""
-        calls = (one.parts[0] for one in body if one.kind == "call" and one.parts[0].args[0] == "reinit")
-        return {resolver(call.args[1][0]).args[0][0] for call in calls}
 
     def _changes(self, body: list[Statement], text: ClassText, local: dict[str, Expr]) -> dict[str, Expr]:
         """Return the new values of a branch of a when."""
@@ -288,15 +289,6 @@ class Statements:
             else:
                 raise refused(f"'{one.kind}' in a 'when'", text, one.line)
         return values
-
-    def _demand(self, call: Expr, resolver: Resolver, text: ClassText) -> None:
-        """Read an assertion: it ends the run where it is broken."""
-        if call.args[0] != "assert":
-            raise refused(f"{call.args[0]}(…) among equations", text, call.line)
-        demand = self._demanded(call, resolver, text)
-        if demand is not None:
-            condition, words = demand
-            self.happenings.append(Happening((((condition,), {}),), text.place(call.line), words.args[0]))
 
     def _demanded(self, call: Expr, resolver: Resolver, text: ClassText) -> tuple[Expr, Expr] | None:
         """Return the condition of an assertion and its words; None of a warning and of what always holds."""
@@ -345,10 +337,6 @@ def _text(node: Expr) -> str:
     if node.kind == "call":
         inner = (node.args[0], *(_text(one) for one in node.args[1]))
     return f"{node.kind}:{','.join(inner)}"
-
-
-def _same(one: Expr, other: Expr) -> bool:
-    return one.kind == "name" and _text(one) == _text(other)
 
 
 def _words(node: Expr) -> str:

@@ -50,14 +50,17 @@ class _Writer:
 
     def model(self, assembly: Assembly, name: str) -> str:
         """Return the class of an assembly."""
-        joined = self._joined(assembly)
-        lines = [f"model {name}{_described(assembly.__dict__['_description'])}"]
+        joined = {_path(assembly, end) for ends in self._wires(assembly) for end in ends}
+        quoted = assembly.__dict__["_description"].replace("\\", "\\\\").replace('"', '\\"')
+        lines = [f'model {name} "{quoted}"' if quoted else f"model {name}"]
         for key, field in assembly.fields.items():
             if isinstance(field, Parameter):
                 value = assembly.value(key)
                 if value is None:
                     raise ModelicaTextError(f"{assembly.label}.{key} has no value.")
-                lines.append(f"  parameter Real {identifier(key)}{_unit(value)} = {self._value(value, assembly)};")
+                unit = str(coherent(value.unit))
+                attribute = f'(unit = "{unit}")' if unit not in ("1", "") else ""
+                lines.append(f"  parameter Real {identifier(key)}{attribute} = {self._value(value, assembly)};")
         lines += [f"  {connector_class(one)} {identifier(key)};" for key, one in assembly.connectors.items()]
         for key, field in assembly.fields.items():
             if isinstance(field, Input | Output):
@@ -145,10 +148,6 @@ class _Writer:
 
     # -- connections -------------------------------------------------------------------------------------------------
 
-    def _joined(self, assembly: Assembly) -> set[str]:
-        """Return the paths of the ends that are connected."""
-        return {_path(assembly, end) for ends in self._wires(assembly) for end in ends}
-
     def _wires(self, assembly: Assembly) -> Iterator[list[Any]]:
         for statement in assembly.equations():
             ends = getattr(statement, "ends", None)
@@ -208,7 +207,14 @@ class _Arguments:
     def _structural(self, name: str, value: Any) -> None:
         if name in self.known.fix:
             if value != self.known.fix[name]:
-                self._held(name, value)
+                # The last value holds: a row more makes the last slope zero.
+                if name != "extrapolate" or value != "hold":
+                    raise self._refused(name, value)
+                for one in self.part._tables:
+                    rows = self.part.__dict__[one]
+                    if len(rows) > 1 and rows[-1][1:] != rows[-2][1:]:
+                        more = (*rows, (rows[-1][0] + max(abs(rows[-1][0]), 1.0), *rows[-1][1:]))
+                        self.done[self.known.there(one)] = self._plain(one, more)
         elif value != self.part._structural[name] or any(self._scales(name)):
             if name in self.known.absent:
                 raise self._refused(name, value)
@@ -220,16 +226,6 @@ class _Arguments:
         given = (one.scale in self.part._values and one.scale not in self.known.names for one in columns)
         return [one.scale if scaled else "" for one, scaled in zip(columns, given, strict=True)]
 
-    def _held(self, name: str, value: Any) -> None:
-        """Write a table whose last value holds: a row more makes the last slope zero."""
-        if name != "extrapolate" or value != "hold":
-            raise self._refused(name, value)
-        for one in self.part._tables:
-            rows = self.part.__dict__[one]
-            if len(rows) > 1 and rows[-1][1:] != rows[-2][1:]:
-                more = (*rows, (rows[-1][0] + max(abs(rows[-1][0]), 1.0), *rows[-1][1:]))
-                self.done[self.known.there(one)] = self._plain(one, more)
-
     def _put(self, there: str, text: str) -> None:
         if text.startswith("connected "):
             if f"{self.path}.{text.split()[1]}" in self.joined:
@@ -239,11 +235,8 @@ class _Arguments:
         if any(f"{self.path}.{name}" in self.joined for name in names):
             return
         given = [name for name in names if name in self.part._values or name in self.part._structural]
-        if given or all(self._has(name) for name in names):
+        if given or all(name in self.part._structural or self.part.value(name) is not None for name in names):
             self.done[there] = self._expression(text)
-
-    def _has(self, name: str) -> bool:
-        return name in self.part._structural or self.part.value(name) is not None
 
     def _expression(self, text: str) -> str:
         """Return an expression of the component's fields with their values."""
@@ -366,16 +359,6 @@ def _arguments(values: Mapping[str, str]) -> str:
     return f"({', '.join(texts)})" if texts else ""
 
 
-def _described(text: str) -> str:
-    quoted = text.replace("\\", "\\\\").replace('"', '\\"')
-    return f' "{quoted}"' if text else ""
-
-
 def _number(value: float) -> str:
     whole = float(value)
     return str(int(whole)) if whole == int(whole) and abs(whole) < 1e15 else repr(whole)
-
-
-def _unit(value: Value) -> str:
-    unit = str(coherent(value.unit))
-    return f'(unit = "{unit}")' if unit not in ("1", "") else ""
