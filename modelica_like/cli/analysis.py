@@ -48,7 +48,11 @@ def modes(
         if loop:
             page.print("", escape(str(loop.margins())))
         if shapes:
-            speeds = [one.path for one in linear.model.flat_variables if _is_speed(one.path, str(one.unit))]
+            speeds = [
+                one.path
+                for one in linear.model.flat_variables
+                if (str(one.unit), one.path.rpartition(".")[2]) in (("rad/s", "w"), ("m/s", "v"))
+            ]
             save_plot(found.plot(show or speeds), shapes)
         if draw:
             save_schematic(assembly, draw, modes=found)
@@ -56,10 +60,6 @@ def modes(
             save_plot(linear.bode(), bode)
         if nyquist:
             save_plot(linear.nyquist(), nyquist)
-
-
-def _is_speed(path: str, unit: str) -> bool:
-    return (unit, path.rpartition(".")[2]) in (("rad/s", "w"), ("m/s", "v"))
 
 
 def steady(

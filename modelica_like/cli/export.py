@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from modelica_like.cli.declare import Option
 from modelica_like.cli.shared import Assignments, Debug, Json, Netlist, load_netlist, say, told
@@ -58,7 +57,9 @@ def export(
 
         with Console(stderr=True).status("loading") as status:
             if html is not None:
-                _page(assembly, html, outputs or (), status.update)
+                from modelica_like.show.browser.page import export_html
+
+                say(str(export_html(assembly, html, show=(outputs or ()), report=status.update)))
             if html is not None and output is None:
                 return
             done = export_fmu(
@@ -68,12 +69,6 @@ def export(
                 fixed_step=fixed_step, tables=tables or (), check=check, strict=strict, report=status.update,
             )  # fmt: skip
         say(str(done))
-
-
-def _page(assembly: Any, file: Path, show: Sequence[str], report: Callable[[str], None]) -> None:
-    from modelica_like.show.browser.page import export_html
-
-    say(str(export_html(assembly, file, show=show, report=report)))
 
 
 def runtimes(

@@ -17,7 +17,6 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.sliding import as_asked
 from modelica_like.errors import ExportError, UnknownName
 from modelica_like.flatten import flatten
-from modelica_like.flatten.model import FlatModel
 from modelica_like.fmi.build import PLATFORMS, build, chosen_platforms, native_platform
 from modelica_like.fmi.check import Check, communication_step, compare_with_idas, problems
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
@@ -153,14 +152,14 @@ def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
     return tuple(one for one in get_args(Kind) if one in asked)
 
 
-def _fixed_step(asked: float | str | None, kinds: tuple[Kind, ...]) -> float:
-    step = positive_step(asked)
-    if step and "cs" not in kinds:
+def _fixed_step(step: float | str | None, kinds: tuple[Kind, ...]) -> float:
+    size = positive_step(step)
+    if size and "cs" not in kinds:
         raise ExportError(
             "A fixed step is for Co-Simulation, but only Model Exchange is exported.",
             why="In Model Exchange the importer chooses the steps.", advice="Also export cs.",
         )  # fmt: skip
-    return step
+    return size
 
 
 # -- the model ---------------------------------------------------------------------------------------------------------
@@ -179,7 +178,9 @@ def compiled_open(
     if tables:
         drive = with_tunable_tables(drive, tables)
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
-    return as_asked(compile(reduce(flat))), str(getattr(drive, "_description", "") or ""), _equations(flat)
+    lines = ((one, [source.text or str(source) for source in one.template.sources]) for one in flat.instances)
+    equations = [(one.path, one.template.component, texts) for one, texts in lines if texts]
+    return as_asked(compile(reduce(flat))), str(getattr(drive, "_description", "") or ""), equations
 
 
 def _loaded(drive: Model) -> CompiledDae | Component:
@@ -197,11 +198,6 @@ def _pictures(drive: CompiledDae | Component) -> tuple[bytes, bytes]:
         return general[0], general[1]
     svg, png = upper.icon(drive if drive.parts else with_open_ends(drive))
     return svg.encode(), png or general[1]
-
-
-def _equations(flat: FlatModel) -> Listing:
-    told = ((one, [source.text or str(source) for source in one.template.sources]) for one in flat.instances)
-    return [(one.path, one.template.component, lines) for one, lines in told if lines]
 
 
 def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], description: str, fixed_step: float) -> About:
@@ -246,22 +242,18 @@ def _contents(
         pictures |= {f"terminalsAndIcons/icon.{ending}": one for ending, one in zip(("svg", "png"), icon, strict=True)}
     seen = variables.variables + (variables.arrays if about.version == "3.0" else ())
     data = model_file(make_tables(model, variables.start), seen, _TOKEN, about.tolerance, about.fixed_step)
-    token = _token(texts, data)
+    # A GUID that is a hash of the content.
+    total = hashlib.sha256(data)
+    for key in sorted(texts):
+        total.update(f"{key}\0{texts[key]}\0".encode())
+    digest = total.hexdigest()
+    token = f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
     data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}
     texts["sources/model_data.c"] = as_c(data)
     files: dict[str, bytes] = {name: text.encode() for name, text in texts.items()}
     files |= pictures
     return files if embed else files | {MODEL: data}
-
-
-def _token(texts: dict[str, str], data: bytes) -> str:
-    """A GUID that is a hash of the content."""
-    total = hashlib.sha256(data)
-    for name in sorted(texts):
-        total.update(f"{name}\0{texts[name]}\0".encode())
-    digest = total.hexdigest()
-    return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
 
 
 def _binaries(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -13,7 +13,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName, did_you_mean
-from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
+from modelica_like.flatten.model import FlatParameter, FlatVariable
 from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.language.units import ONE, Unit, parse_unit
@@ -131,12 +131,6 @@ def interface(model: CompiledDae, outputs: Sequence[str] = (), modes: ModesAs = 
     )  # fmt: skip
 
 
-def _times_of_delays(model: CompiledDae) -> set[int]:
-    """Numbers of the parameters on which times of delays depend: these do not change during a run."""
-    pattern = model.delays.jac_sparsity(0, model.delays.name_in().index("p"))
-    return {number for row, number in zip(*pattern.get_triplet(), strict=True) if row % 2}
-
-
 class _Builder:
     def __init__(self, model: CompiledDae, outputs: Sequence[str]) -> None:
         self.model = model
@@ -144,10 +138,22 @@ class _Builder:
         self.states: dict[int, int] = {}
         self.derivatives: dict[int, int] = {}
         self.indicators: dict[int, int] = {}
-        self.wanted = _matcher(model, outputs)
+        paths, chosen = [one.path for one in model.flat_variables], set[str]()
+        for pattern in outputs:
+            found = [path for path in paths if fnmatchcase(path, pattern.replace("[", "[[]"))]
+            if not found:
+                hint = did_you_mean(pattern, paths) or "."
+                raise UnknownName(f"{model.name} has no variable '{pattern}' that could be an output{hint}")
+            chosen.update(found)
+        self.wanted = lambda one: one.kind == "output" or one.path in chosen
         self.starts = _Starts(model)
         self.reach = Reach(model.variables)
-        self.depends = _dependence(self.reach, model.variables)
+        # Variables change with time, at events only, or with parameters only.
+        moving = self.reach.mask(*(name for name in model.variables.name_in() if name not in ("p", "d")))
+        switching = self.reach.mask("d")
+        self.depends = [
+            "continuous" if row & moving else "discrete" if row & switching else "tunable" for row in self.reach.rows
+        ]
         self.add("time", ("time", 0), "independent", initial=None, unit=_SECOND, description="time")
 
     def add(
@@ -161,7 +167,9 @@ class _Builder:
 
     def parameters(self) -> None:
         """Independent parameters, and those that follow from others."""
-        fixed = _times_of_delays(self.model)
+        # Parameters on which times of delays depend do not change during a run.
+        pattern = self.model.delays.jac_sparsity(0, self.model.delays.name_in().index("p"))
+        fixed = {number for row, number in zip(*pattern.get_triplet(), strict=True) if row % 2}
         for k, one in enumerate(self.model.flat_parameters):
             variability, start = "tunable" if one.tunable and k not in fixed else "fixed", float(self.model.p[k])
             self.add(one.path, ("parameter", k), "parameter", variability, None, start=start, **_about(one))
@@ -218,7 +226,9 @@ class _Builder:
         """Modes, and other discrete values, which are local; equations determine some at the start, too."""
         determined = {row.reset.index for row in self.model.update_rows if row.at_start}
         for k, one in ((k, one) for k, one in enumerate(self.model.flat_discretes) if not one.hidden):
-            slot, about = ("discrete", k), {"unit": one.unit, "description": _mode_text(one)}
+            values = ", ".join(f"{k}: {name}" for k, name in enumerate(one.names))
+            description = " – ".join(text for text in (one.description, values) if text)
+            slot, about = ("discrete", k), {"unit": one.unit, "description": description}
             if one.names:
                 kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", one.names)
                 causality = "local" if modes == "local" else "output"
@@ -271,29 +281,6 @@ def _about(one: FlatVariable | FlatParameter) -> dict[str, Any]:
     if isinstance(one, FlatVariable) and one.nominal != 1.0:
         about["nominal"] = abs(one.nominal)
     return about
-
-
-def _mode_text(one: FlatDiscrete) -> str:
-    names = ", ".join(f"{k}: {name}" for k, name in enumerate(one.names))
-    return " – ".join(text for text in (one.description, names) if text)
-
-
-def _matcher(model: CompiledDae, patterns: Sequence[str]) -> Callable[[FlatVariable], bool]:
-    paths, chosen = [one.path for one in model.flat_variables], set[str]()
-    for pattern in patterns:
-        found = [path for path in paths if fnmatchcase(path, pattern.replace("[", "[[]"))]
-        if not found:
-            hint = did_you_mean(pattern, paths) or "."
-            raise UnknownName(f"{model.name} has no variable '{pattern}' that could be an output{hint}")
-        chosen.update(found)
-    return lambda one: one.kind == "output" or one.path in chosen
-
-
-def _dependence(reach: Reach, variables: Any) -> list[Variability]:
-    """How each variable changes: with time, at events only, or with parameters only."""
-    moving = reach.mask(*(name for name in variables.name_in() if name not in ("p", "d")))
-    switching = reach.mask("d")
-    return ["continuous" if row & moving else "discrete" if row & switching else "tunable" for row in reach.rows]
 
 
 class _Starts:

@@ -73,7 +73,12 @@ def run_fmu(
         "solver": solver, "outputs": list(outputs) if outputs else None, "parameters": _plain(parameters or {}),
         "inputs": {name: _series(name, value) for name, value in (inputs or {}).items()},
     }  # fmt: skip
-    _check_times(path.name, start, stop, step, timeout)
+    if stop is not None and stop <= start:
+        raise ValueOutOfRange(f"{path.name}: the end time {stop:g} s is not after the start time {start:g} s.")
+    if step is not None and step <= 0:
+        raise ValueOutOfRange(f"{path.name}: the step must be positive, not {step:g} s.")
+    if timeout <= 0:
+        raise ValueOutOfRange(f"{path.name}: the time limit must be positive, not {timeout:g} s.")
     run = _run(path, job, timeout)
     if readings:
         intervals, needed = int(np.count_nonzero(np.diff(run.time))), needed_outputs(run, readings)
@@ -89,7 +94,13 @@ def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:
         tell_error(folder, {"": path.name})
         table = np.load(folder / "result.npy", max_header_size=_HEADER)  # names of all columns
         meta = json.loads((folder / "meta.json").read_text())
-    run = _solution(meta, table, job["parameters"], time.perf_counter() - begin)
+    known = (RecordedVariable(**{**one, "names": dict(one["names"])}) for one in meta["variables"])
+    columns = [one for one in known if one.path in table.dtype.names]
+    parts = [tuple(one for one in columns if (one.kind == "discrete") is modes) for modes in (False, True)]
+    constants = {name: float(job["parameters"].get(name, value)) for name, value in meta["constants"].items()}
+    model = RecordedModel(meta["name"], parts[0], parts[1], constants)
+    values, modes = (np.array([table[one.path] for one in part], float).reshape(-1, len(table)) for part in parts)
+    run = RecordedSolution(model, table["time"].copy(), values, modes, time.perf_counter() - begin)
     if meta["ended"]:
         run._ended = Ended(float(run.time[-1]), run.model.name, TERMINATED)
     if death:
@@ -138,22 +149,3 @@ def _series(name: str, value: Any) -> Any:
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.all(np.isfinite(pairs)) or np.any(np.diff(pairs[:, 0]) < 0):
         raise ValueOutOfRange(f"The input '{name}' must be a number, or pairs of rising time and value.")
     return pairs.tolist()
-
-
-def _check_times(name: str, start: float, stop: float | None, step: float | None, timeout: float) -> None:
-    if stop is not None and stop <= start:
-        raise ValueOutOfRange(f"{name}: the end time {stop:g} s is not after the start time {start:g} s.")
-    if step is not None and step <= 0:
-        raise ValueOutOfRange(f"{name}: the step must be positive, not {step:g} s.")
-    if timeout <= 0:
-        raise ValueOutOfRange(f"{name}: the time limit must be positive, not {timeout:g} s.")
-
-
-def _solution(meta: dict[str, Any], table: Any, given: Mapping[str, float], seconds: float) -> RecordedSolution:
-    known = (RecordedVariable(**{**one, "names": dict(one["names"])}) for one in meta["variables"])
-    columns = [one for one in known if one.path in table.dtype.names]
-    parts = [tuple(one for one in columns if (one.kind == "discrete") is modes) for modes in (False, True)]
-    constants = {name: float(given.get(name, value)) for name, value in meta["constants"].items()}
-    model = RecordedModel(meta["name"], parts[0], parts[1], constants)
-    values, modes = (np.array([table[one.path] for one in part], float).reshape(-1, len(table)) for part in parts)
-    return RecordedSolution(model, table["time"].copy(), values, modes, seconds)

@@ -187,7 +187,11 @@ def parse_formula(text: str) -> Formula:
             tree = ast.parse(replaced, mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise _not_a_formula(text) from None
-    if _depth(tree) > _MAX_DEPTH:
+    layer, depth = [tree], 0
+    while layer:
+        layer = [child for node in layer for child in ast.iter_child_nodes(node)]
+        depth += 1
+    if depth > _MAX_DEPTH:
         raise _not_a_formula(text, "it is nested too deeply")
     return _convert(tree.body, text, quantities)
 
@@ -208,14 +212,6 @@ def _without_quantities(text: str) -> tuple[str, dict[str, str]]:
         return placeholder
 
     return _QUANTITY.sub(name, text), quantities
-
-
-def _depth(tree: ast.AST) -> int:
-    layer, depth = [tree], 0
-    while layer:
-        layer = [child for node in layer for child in ast.iter_child_nodes(node)]
-        depth += 1
-    return depth
 
 
 def _not_a_formula(text: str, why: str = "") -> NetlistError:

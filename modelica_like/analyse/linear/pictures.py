@@ -57,7 +57,11 @@ def bode(linear: LinearModel, f: Any = None) -> Figure:
         if len(curves) > 1 or not margins:
             size.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
         phase.set(ylabel="phase in \u00b0", xlabel="frequency in Hz")
-        _degrees(phase)
+        from matplotlib.ticker import MultipleLocator
+
+        low, high = phase.get_ylim()
+        step = next((one for one in (45, 90, 180, 360) if (high - low) / one <= 6), 720)
+        phase.yaxis.set_major_locator(MultipleLocator(step))
         for axes in (size, phase):
             for one in modes:
                 axes.axvline(one.frequency, color="#999999", linewidth=0.7, linestyle=":", zorder=0.5)
@@ -125,15 +129,6 @@ def _angles(gains: Any) -> Any:
     """Return continuous phases in degrees that end between -360 and 0, as many poles more than zeros have it."""
     angles = np.degrees(np.unwrap(np.angle(gains)))
     return angles - 360 * np.ceil(angles[-1] / 360 - 1e-6)
-
-
-def _degrees(axes: Any) -> None:
-    """Put marks at multiples of 45, 90 or 180 degrees."""
-    from matplotlib.ticker import MultipleLocator
-
-    low, high = axes.get_ylim()
-    step = next((one for one in (45, 90, 180, 360) if (high - low) / one <= 6), 720)
-    axes.yaxis.set_major_locator(MultipleLocator(step))
 
 
 def _mark_margins(size: Any, phase: Any, margins: Any, gains: Any, f: Any) -> None:

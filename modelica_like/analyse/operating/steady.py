@@ -121,7 +121,11 @@ def steady(
     point = _settle(model, begin)
     if free:
         model, point = target.reach(model, point)
-    return _operating_point(model, point)
+    values = dict(zip(model.position, map(float, call(model, model.variables, point)), strict=True))
+    values.update(zip(model.discrete_position, map(float, point.d), strict=False))
+    values.update(zip(model.parameter_position, map(float, model.p), strict=True))
+    values.update(zip(model.derived_position, map(float, model.derived(model.p).full().ravel()), strict=True))
+    return OperatingPoint(model, point, values)
 
 
 def _settle(model: CompiledDae, near: Point | None) -> Point:
@@ -213,11 +217,3 @@ def steady_slopes(model: CompiledDae, point: Point, paths: Sequence[str], free: 
     variables = slopes(model, point, "variables", nodes_of(model, paths))
     theta = np.eye(Sizes.of(model).theta)[:, columns_of(model, free)]
     return variables.x @ steady_change(model, point, theta) + variables.theta @ theta
-
-
-def _operating_point(model: CompiledDae, point: Point) -> OperatingPoint:
-    values = dict(zip(model.position, map(float, call(model, model.variables, point)), strict=True))
-    values.update(zip(model.discrete_position, map(float, point.d), strict=False))
-    values.update(zip(model.parameter_position, map(float, model.p), strict=True))
-    values.update(zip(model.derived_position, map(float, model.derived(model.p).full().ravel()), strict=True))
-    return OperatingPoint(model, point, values)

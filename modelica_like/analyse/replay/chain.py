@@ -342,7 +342,8 @@ class _Maker:
             if h < _SMALLEST * max(1.0, abs(here.t)) and h < left:
                 raise stuck(here)
             made, error = try_step(self.chain.functions, here, h, before)
-            factor = max(_SHRINK, min(_GROW, _SAFETY * (error + 1e-16) ** self._exponent))
+            order = len(self.chain.functions.tableau.nodes) + 1
+            factor = max(_SHRINK, min(_GROW, _SAFETY * (error + 1e-16) ** (-1.0 / order)))
             if made is not None and error <= 1.0:
                 if h == left:
                     made.after.t = end
@@ -376,7 +377,3 @@ class _Maker:
             if passed.size:
                 return int(passed[0]), (point.t - step.before.t, float(values[passed[0]]))
         return None
-
-    @property
-    def _exponent(self) -> float:
-        return -1.0 / (len(self.chain.functions.tableau.nodes) + 1)

@@ -74,7 +74,13 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
         one = model.transitions[event.transition]
         trigger = _moment(model, before, one) if one.timed else _crossing(model, before, one, begin)
         if trigger is None:
-            return When(None, _grazing(event))
+            return When(None, NoGradient(
+                f"No gradient at t = {event.time:.9g} s: {event.mode} changes from {event.before} to {event.after} "
+                "where its condition only grazes zero.",
+                where=event.source,
+                why="A small change of a parameter moves the event far, or removes it.",
+                advice="Move the parameters away from this limit.",
+            ))  # fmt: skip
         found.append((event, trigger))
     found = _give_way_together(model, before, found)
     first, trigger = found[0]
@@ -163,16 +169,6 @@ def _crossing(model: CompiledDae, before: Point, transition: CompiledTransition,
     if not rate * (before.t - begin.t) > _GRAZING * change + _ROUNDING * terms:
         return None
     return Trigger(-float(part.value[0]) / rate, -part.by[0] / rate)
-
-
-def _grazing(event: Event) -> NoGradient:
-    return NoGradient(
-        f"No gradient at t = {event.time:.9g} s: {event.mode} changes from {event.before} to {event.after} "
-        "where its condition only grazes zero.",
-        where=event.source,
-        why="A small change of a parameter moves the event far, or removes it.",
-        advice="Move the parameters away from this limit.",
-    )
 
 
 def _together(one: Event, other: Event) -> NoGradient:

@@ -236,7 +236,9 @@ class Sides:
     def _noise(self, here: Vector) -> Vector:
         """Errors of what is read."""
         looser = self._here(_LOOSER)
-        return self._errors() + (np.abs(here) if looser is None else np.abs(looser - here))
+        known = _SAFE * self._options(1.0).atol * self.solution.model.nominals
+        rest = [sum(float(np.abs(row[: len(known)]) @ known) for _, row in one.parts) for one in self.readings]
+        return np.array(rest) + (np.abs(here) if looser is None else np.abs(looser - here))
 
     def error(self, candidate: Candidate) -> NoGradient | None:
         """Return the error if the derivatives by a parameter are other ones on a side; None if they are not."""
@@ -267,13 +269,6 @@ class Sides:
         """Slopes to a side, shape (outputs,); nan if there is no run."""
         there = self._read({by.name: by.value + change})
         return np.full(len(here), np.nan) if there is None else (there - here) / change
-
-    def _errors(self) -> Vector:
-        """Errors of what is read of states at rest, which are known to the absolute tolerance, shape (outputs,)."""
-        known = _SAFE * self._options(1.0).atol * self.solution.model.nominals
-        return np.array(
-            [sum(float(np.abs(row[: len(known)]) @ known) for _, row in one.parts) for one in self.readings]
-        )
 
     def _options(self, looser: float) -> Options:
         options = self.solution.options

@@ -72,16 +72,17 @@ def arguments_of(check: Any) -> dict[str, Argument]:
     kinds = hints(check)
     if dataclasses.is_dataclass(check):
         return {
-            field.name: Argument(field.name, kinds[field.name], _required(field)) for field in dataclasses.fields(check)
+            field.name: Argument(
+                field.name,
+                kinds[field.name],
+                field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING,
+            )
+            for field in dataclasses.fields(check)
         }
     return {
         name: Argument(name, kinds[name], parameter.default is parameter.empty, parameter.default)
         for name, parameter in inspect.signature(check).parameters.items()
     }
-
-
-def _required(field: dataclasses.Field[Any]) -> bool:
-    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
 def is_result(kind: Any) -> bool:

@@ -103,18 +103,14 @@ def size(path: str | Path, runs: Mapping[Path, Solution] | None = None) -> Sizin
     run = _Run(document, Simulations(Path(path).parent, runs))
     checks = tuple(run.checked(name) for name in document.checks)
     for heading, names in document.compare.items():
-        _comparable(heading, names, run, document)
+        place = document.lines.source("compare", heading)
+        for check in names:
+            if check not in run.done:
+                hint = did_you_mean(check, run.done) or "."
+                raise UnknownName(f"compare.{heading}: there is no check '{check}'{hint}", where=place)
+        if len({type(run.done[check].result) for check in names}) != 1:
+            raise NetlistError(f"compare.{heading} must name checks of one kind.", where=place)
     return Sizing(document.name, document.description, checks, document.compare)
-
-
-def _comparable(heading: str, names: list[str], run: _Run, document: SizingDocument) -> None:
-    place = document.lines.source("compare", heading)
-    for name in names:
-        if name not in run.done:
-            hint = did_you_mean(name, run.done) or "."
-            raise UnknownName(f"compare.{heading}: there is no check '{name}'{hint}", where=place)
-    if len({type(run.done[name].result) for name in names}) != 1:
-        raise NetlistError(f"compare.{heading} must name checks of one kind.", where=place)
 
 
 class _Run:

@@ -36,7 +36,10 @@ class Checkpoint:
     def __init__(self, path: str | Path, job: Job, plan: Plan, size: int) -> None:
         zarr = extra_module("zarr", "analyse")
         self.path = Path(path)
-        key = _fingerprint(job, plan, size)
+        text = json.dumps([job.names, job.outputs, sorted(map(str, job.settings.items())), size])
+        key = hashlib.sha256(
+            job.identity.encode() + text.encode() + np.ascontiguousarray(plan.points).tobytes()
+        ).hexdigest()
         if (self.path / "zarr.json").exists():
             self._group = zarr.open_group(self.path, mode="r+")
             if self._group.attrs.get("sweep") != key:
@@ -87,10 +90,3 @@ def _begin(group: Any, runs: int, outputs: int, size: int, key: str) -> None:
     group.create_array("values", shape=(runs, outputs), chunks=(size, outputs), dtype="f8", fill_value=np.nan)
     group.create_array("done", shape=(-(-runs // size),), chunks=(1,), dtype="bool", fill_value=False)
     group.attrs["sweep"] = key
-
-
-def _fingerprint(job: Job, plan: Plan, size: int) -> str:
-    text = json.dumps([job.names, job.outputs, sorted(map(str, job.settings.items())), size])
-    return hashlib.sha256(
-        job.identity.encode() + text.encode() + np.ascontiguousarray(plan.points).tobytes()
-    ).hexdigest()

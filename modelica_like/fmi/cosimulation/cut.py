@@ -134,7 +134,13 @@ def _find(assembly: Assembly, wires: Sequence[Wire], name: str) -> tuple[Wire, C
         near = next((end for end in wire.ends if _is_output(assembly, end)), near)
     far = tuple(end for end in wire.ends if end != near)
     if wire.signal:
-        _check_can_open(assembly, far)
+        for opened in far:
+            owner, _, input_name = opened.rpartition(".")
+            if assembly.find(owner).value(input_name) is not None:
+                raise NetlistError(
+                    f"{opened} has a default value, so it does not become an input of an FMU.",
+                    advice="Cut at a shaft, or at a signal whose inputs have no default.",
+                )
     return wire, Cut(as_name(name), near, far, wire.signal, wire.source)
 
 
@@ -185,17 +191,6 @@ def _nowhere(assembly: Assembly, name: str, connected: Sequence[str]) -> Excepti
         why="A name is a part (it is cut behind it), one of its ends (shaft.flange_a), or an entry of [connect].",
         advice=_places(assembly),
     )
-
-
-def _check_can_open(assembly: Assembly, ends: Sequence[str]) -> None:
-    """Refuse inputs with a default value: they would not become inputs of an FMU."""
-    for end in ends:
-        owner, _, name = end.rpartition(".")
-        if assembly.find(owner).value(name) is not None:
-            raise NetlistError(
-                f"{end} has a default value, so it does not become an input of an FMU.",
-                advice="Cut at a shaft, or at a signal whose inputs have no default.",
-            )
 
 
 def _is_output(assembly: Assembly, path: str) -> bool:

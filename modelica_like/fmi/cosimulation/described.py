@@ -85,13 +85,14 @@ def described(path: Path) -> DescribedFmu:
             reason = printable(str(error)).rstrip(".")
             raise FmuRefused(f"The description of {path.name} cannot be read: {reason}.") from error
     scalars = [one for one in read.modelVariables if not one.shape]
-    variables = {one.name: FmuVariable(one.name, one.type, one.causality or "local", _unit(one)) for one in scalars}
+    variables = {
+        one.name: FmuVariable(
+            one.name, one.type, one.causality or "local", one.unit or getattr(one.declaredType, "unit", None) or ""
+        )
+        for one in scalars
+    }
     units = {one.name: _definition(one) for one in read.unitDefinitions or ()}
     return DescribedFmu(read.fmiVersion, read.coSimulation is not None, variables, units)
-
-
-def _unit(variable: Any) -> str:
-    return variable.unit or getattr(variable.declaredType, "unit", None) or ""
 
 
 def _definition(unit: Any) -> UnitDefinition:

@@ -29,17 +29,17 @@ def system_of_netlist(path: Path, work: Path) -> System:
     FMU with the netlist's name.
     """
     document = parse(read_text(path), str(path))
-    fmus = {name: entry for name, entry in document.parts.items() if _is_fmu(entry)}
+    fmus = {
+        name: entry
+        for name, entry in document.parts.items()
+        if any(table["is"] == FMU_PART for table in (entry if isinstance(entry, list) else [entry]))
+    }
     if not fmus:
         raise NetlistError(
             f"{document.name} has no FMU among its parts, so there is nothing to co-simulate.",
             advice="Simulate it, or cut it into FMUs with `modelica-like split`.",
         )
     return _Joiner(document, fmus, path).system(work)
-
-
-def _is_fmu(entry: Any) -> bool:
-    return any(table["is"] == FMU_PART for table in (entry if isinstance(entry, list) else [entry]))
 
 
 @dataclass(frozen=True)

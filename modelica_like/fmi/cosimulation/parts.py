@@ -130,20 +130,17 @@ class Maker:
         queue = [name for part in parts for name in _names(part)]
         for name in queue:
             if "." in name:
-                self._check_inside(group, name)
+                if part_of(name) in self.assembly._parts and part_of(name) not in self.found.groups[group]:
+                    raise NetlistError(
+                        f"A formula needs {name}, which the cut puts into another FMU.",
+                        why=f"It is in one of {', '.join(self.found.groups[group])}.",
+                        advice="Give both parts a parameter of the netlist: [parameters].",
+                    )
             elif name in self.assembly.fields and name not in needed:
                 needed[name] = None
                 value = self.assembly.value(name)
                 queue += value.formula.names() if value is not None and value.formula is not None else ()
         return {name: value_text(self.assembly, name) for name in self.assembly.fields if name in needed}
-
-    def _check_inside(self, group: int, path: str) -> None:
-        if part_of(path) in self.assembly._parts and part_of(path) not in self.found.groups[group]:
-            raise NetlistError(
-                f"A formula needs {path}, which the cut puts into another FMU.",
-                why=f"It is in one of {', '.join(self.found.groups[group])}.",
-                advice="Give both parts a parameter of the netlist: [parameters].",
-            )
 
 
 def _names(part: Component | list[Component]) -> list[str]:

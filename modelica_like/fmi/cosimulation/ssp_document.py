@@ -47,8 +47,15 @@ def ssd(system: System, fmus: Mapping[str, DescribedFmu], sources: Mapping[str, 
     for unit in system.units:
         _component(parts, unit, fmus[unit.name], sources[unit.name], ports, version)
     if system.links:
-        _connections(inside, system)
-    _units(top, [(fmus[port.unit], port.variable) for port in _with_parameters(ports, system)])
+        group = element(inside, "ssd:Connections")
+        for joint in system.links:
+            for target in joint.targets:
+                element(
+                    group, "ssd:Connection", description=joint.name, startElement=joint.source.unit,
+                    startConnector=joint.source.variable, endElement=target.unit, endConnector=target.variable,
+                )  # fmt: skip
+    ports = [*ports, *(Port(unit.name, name) for unit in system.units for name in unit.parameters)]
+    _units(top, [(fmus[port.unit], port.variable) for port in ports])
     if system.settings.until is not None:
         element(top, "ssd:DefaultExperiment", startTime=0.0, stopTime=system.settings.until)
     _annotation(top, system)
@@ -94,20 +101,6 @@ def _kind(kind: str, version: Version) -> str | None:
     if kind == "Boolean" or version == "2.0":
         return kind
     return "Real" if kind in _REAL else "Integer"
-
-
-def _connections(inside: Element, system: System) -> None:
-    group = element(inside, "ssd:Connections")
-    for link in system.links:
-        for target in link.targets:
-            element(
-                group, "ssd:Connection", description=link.name, startElement=link.source.unit,
-                startConnector=link.source.variable, endElement=target.unit, endConnector=target.variable,
-            )  # fmt: skip
-
-
-def _with_parameters(ports: list[Port], system: System) -> list[Port]:
-    return [*ports, *(Port(unit.name, name) for unit in system.units for name in unit.parameters)]
 
 
 def _units(top: Element, used: list[tuple[DescribedFmu, str]]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import chain, count
 from math import isfinite
@@ -142,7 +142,9 @@ class _Reader:
             said = targets[taken[0]][0].description
             is_name = said != "" if own else said.isidentifier()
             chosen = said if is_name else _word(_text(source))
-            links.append(Link(_unused(chosen, links), self._port(source), tuple(map(self._port, taken))))
+            used = [link.name for link in links]
+            name = next(one for one in chain([chosen], (f"{chosen}_{k}" for k in count(2))) if one not in used)
+            links.append(Link(name, self._port(source), tuple(map(self._port, taken))))
         return tuple(links)
 
     def _port(self, target: Target) -> Port:
@@ -210,11 +212,6 @@ def _is_identity(transformation: Any) -> bool:
 
 def _bond(xml: Any) -> Bond:
     return Bond(needed(xml, "name"), needed(xml, "flow"), needed(xml, "rate"))
-
-
-def _unused(name: str, links: Sequence[Link]) -> str:
-    used = [link.name for link in links]
-    return next(one for one in chain([name], (f"{name}_{k}" for k in count(2))) if one not in used)
 
 
 def _flat_names(components: list[Element]) -> dict[ElementPath, str]:

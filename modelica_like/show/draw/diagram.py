@@ -169,16 +169,14 @@ def _joined(component: Component) -> Iterator[list[Connector | Symbol]]:
     sets: list[dict[tuple[int, str], Connector | Symbol]] = []
     for statement in component.equations():
         if isinstance(statement, Connection):
-            new = {_identity(end): end for end in statement.ends}
+            new = {
+                (id(end.owner), end.name) if isinstance(end, Symbol) else (id(end), ""): end for end in statement.ends
+            }
             for old in [one for one in sets if one.keys() & new.keys()]:
                 new = old | new
                 sets.remove(old)
             sets.append(new)
     yield from (list(one.values()) for one in sets)
-
-
-def _identity(end: Connector | Symbol) -> tuple[int, str]:
-    return (id(end.owner), end.name) if isinstance(end, Symbol) else (id(end), "")
 
 
 def _port(end: Connector | Symbol, scope: Component, nodes: dict[str, Node], outer: dict[str, Node]) -> Port:

@@ -161,7 +161,9 @@ def _order(layers: Layers) -> None:
             for n in numbers if east else reversed(numbers):
                 _sort(layers, n, east)
             _swap(layers)
-            found.append((_crossings(layers), [list(column) for column in layers.columns]))
+            places = _places(layers)
+            crossings = sum(_crossings_in(channel, places) for channel in layers.channels)
+            found.append((crossings, [list(column) for column in layers.columns]))
     layers.columns[:] = min(found, key=lambda one: one[0])[1]
 
 
@@ -205,11 +207,6 @@ def _port_shift(end: End) -> float:
 
 def _places(layers: Layers) -> dict[Slot, float]:
     return {slot: float(k) for column in layers.columns for k, slot in enumerate(column)}
-
-
-def _crossings(layers: Layers) -> float:
-    places = _places(layers)
-    return sum(_crossings_in(channel, places) for channel in layers.channels)
 
 
 def _crossings_in(channel: Channel, places: dict[Slot, float]) -> float:

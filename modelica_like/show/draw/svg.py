@@ -39,11 +39,14 @@ def svg(
     width, below = drawn.width + 2 * _MARGIN, drawn.height + 2 * _MARGIN
     height = below + _STRIP * len(shapes)
     strokes = {item.stroke.name: item.stroke for _, item in drawn.everything() if isinstance(item, Line)}
+    dark = _DARK | {name: colour for name, (_, colour) in _LOOKS.items() if run.modes}
+    rules = [f".{key}{{fill:{colour}}}.{key}-line{{stroke:{colour}}}" for key, colour in dark.items()]
+    rules += [f".{_css(one)}{{stroke:{one.dark}}}.{_css(one)}-dot{{fill:{one.dark}}}" for one in strokes.values()]
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{_n(width)}" height="{_n(height)}" '
         f'viewBox="0 0 {_n(width)} {_n(height)}" font-family="{_FONT}">',
         f"<title>{escape(title)}</title>",
-        _dark(strokes, looks=bool(run.modes)),
+        f"<style>@media (prefers-color-scheme: dark){{{''.join(rules)}}}</style>",
     ]
     if background:
         parts.append(f'<rect class="paper" width="{_n(width)}" height="{_n(height)}" fill="{_PAPER}"/>')
@@ -63,13 +66,6 @@ def svg(
 
 def _n(value: float) -> str:
     return f"{round(value, 2) + 0.0:g}"
-
-
-def _dark(strokes: dict[str, Stroke], *, looks: bool) -> str:
-    dark = _DARK | {name: colour for name, (_, colour) in _LOOKS.items() if looks}
-    rules = [f".{key}{{fill:{colour}}}.{key}-line{{stroke:{colour}}}" for key, colour in dark.items()]
-    rules += [f".{_css(one)}{{stroke:{one.dark}}}.{_css(one)}-dot{{fill:{one.dark}}}" for one in strokes.values()]
-    return f"<style>@media (prefers-color-scheme: dark){{{''.join(rules)}}}</style>"
 
 
 def _css(stroke: Stroke) -> str:

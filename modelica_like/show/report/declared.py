@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from modelica_like.language import Component, Connector, Discrete, Input, Output, Parameter, Variable
 from modelica_like.language.fields import Field
@@ -63,7 +63,11 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
     described = {name: one.description for name, one in kind._tables.items()}
     described |= {name: words for name, words in texts_of_fields(kind).items() if words}
     structure = (
-        (code(name), code(str(default)) if has_default(default) else "required", text(described.get(name, "")))
+        (
+            code(name),
+            code(str(default)) if isinstance(default, bool | int | float | str | tuple | None) else "required",
+            text(described.get(name, "")),
+        )
         for name, default in kind._structural.items()
     )
     made.append(filled("structure", ("name", "default", "description"), structure))
@@ -73,11 +77,6 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
     )
     made.append(filled("modes", ("name", "one of (number)", "start", "description"), modes))
     return [one for one in made if one.rows]
-
-
-def has_default(default: Any) -> bool:
-    """Return whether a structural field has a default."""
-    return isinstance(default, bool | int | float | str | tuple | None)
 
 
 def _sort_of(field: Field) -> type[Field]:

@@ -178,20 +178,15 @@ def cosimulation_report(solution: CosimSolution) -> RenderableType:
     """Return mode changes, energies at the couplings and communication steps of a run."""
     parts = _head(solution, solution.notices)
     if solution.couplings:
-        parts += ["", couplings_table(solution)]
+        rows = [
+            (one.name, float(one.throughput), float(one.residual),
+             float(one.residual / one.throughput) if one.throughput else Shown("", None), float(one.mismatch))
+            for one in solution.couplings
+        ]  # fmt: skip
+        heads = "coupling", "through>.6g", "created>.3g", "share>.1e", "mismatch>.3g"
+        parts += ["", table("energy at the couplings in J", *heads, rows=rows)]
     parts += ["", f"[dim]{steps_line(solution)}[/]"]
     return Group(*parts)
-
-
-def couplings_table(solution: CosimSolution) -> Listed:
-    """Return the energies at the couplings; the difference of sent and received energy is lost in the coupling."""
-    rows = [
-        (one.name, float(one.throughput), float(one.residual),
-         float(one.residual / one.throughput) if one.throughput else Shown("", None), float(one.mismatch))
-        for one in solution.couplings
-    ]  # fmt: skip
-    heads = "coupling", "through>.6g", "created>.3g", "share>.1e", "mismatch>.3g"
-    return table("energy at the couplings in J", *heads, rows=rows)
 
 
 def steps_line(solution: CosimSolution) -> str:

@@ -59,13 +59,9 @@ def _check_tables(check: CheckedResult) -> Iterator[RenderableType]:
 def _published(check: CheckedResult, line: str) -> list[str]:
     if line not in check.published:
         return ["", ""]
-    shown = _as_shown(check.result, line, check.published[line])
+    changed = dataclasses.replace(check.result, **{line: check.published[line]})
+    shown = next(other.value for other in changed.lines() if other.name == line)
     return [shown, f"{100 * check.deviation(line):+.3f} %"]
-
-
-def _as_shown(result: Any, line: str, value: float) -> str:
-    changed = dataclasses.replace(result, **{line: value})
-    return next(other.value for other in changed.lines() if other.name == line)
 
 
 def _rows(title: str, rows: tuple[Any, ...]) -> Listed:

@@ -60,12 +60,13 @@ def page(kind: type[Component], file: Path, examples: Sequence[Example] = ()) ->
     definitions = written(source.definitions())
     listings = {title: table("", head, rows) for title, head, rows in declared(kind, _notation(_optional(source)))}
     first = {title: listings.pop(title) for title in _FIRST if title in listings}
+    lines = [one.line for one in examples if one.line]
     sections = [
         f"# {kind.__name__}",
         f"[All components](../README.md) · {module_title(kind.__module__)} · {source_link(kind, file)}",
         f"![symbol of {kind.__name__}]({symbol_file(file).name})",
         markdown(inspect.cleandoc(kind.__doc__ or "")),
-        *_example_line(examples),
+        *([f"```toml\n{min(lines, key=simplicity)}\n```"] if lines else []),
         *(f"## {title.capitalize()}\n\n{text}" for title, text in {**first, **listings}.items()),
         *_parts(kind),
         _folded("Equations", equations and (f"{equations}\n\nwhere\n\n{definitions}" if definitions else equations)),
@@ -89,12 +90,6 @@ def _folded(title: str, text: str) -> str:
     opened = "" if len(text) > _LONG else " open"
     name = title.lower().replace(" ", "-")
     return f'<details id="{name}" markdown="1"{opened}>\n<summary>{title}</summary>\n\n{text}\n\n</details>'
-
-
-def _example_line(examples: Sequence[Example]) -> list[str]:
-    """Return the shortest part that shows values of its own."""
-    lines = [one.line for one in examples if one.line]
-    return [f"```toml\n{min(lines, key=simplicity)}\n```"] if lines else []
 
 
 def simplicity(line: str) -> tuple[bool, bool, int]:

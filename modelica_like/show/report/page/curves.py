@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modelica_like.runs.display import Display
 from modelica_like.runs.signals import evaluated
@@ -32,7 +31,14 @@ def curves(run: Trajectories, patterns: Sequence[str] = ()) -> dict[str, Any]:
         UnitError: the units in a formula do not fit together.
     """
     signals, left = for_page(run, patterns)
-    rows, shown, curve = _thinned(run), Display(run.model), evaluated(run, signals)
+    # Evenly spread results, and both sides of every event.
+    count = len(run.time)
+    spread = np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(int))
+    times = np.unique([event.time for event in run.events][:_POINTS])
+    sides = np.concatenate([np.searchsorted(run.time, times, side) for side in ("left", "right")])
+    beside = np.clip(np.concatenate([sides, sides - 1]), 0, count - 1)
+    rows = np.unique(np.concatenate([spread, beside])).astype(np.intp)
+    shown, curve = Display(run.model), evaluated(run, signals)
     panels: dict[str, dict[str, Any]] = {}
     for one in signals:
         unit = one.shown_in(shown)
@@ -40,27 +46,12 @@ def curves(run: Trajectories, patterns: Sequence[str] = ()) -> dict[str, Any]:
         values = one.driving * shown.converted(curve[one.name][rows], one.unit, unit)
         told = {"name": one.label, "path": one.name if one.plain else "", "values": [float(f"{v:.6g}") for v in values]}
         panels.setdefault(title, {"title": title, "curves": []})["curves"].append(told)
+    hidden = {one.path for one in run.model.flat_discretes if one.hidden}
+    modes = dict.fromkeys(event.mode for event in run.events if event.mode not in hidden)
     return {
         "times": [float(f"{t:.9g}") for t in run.time[rows]],
         "panels": list(panels.values()),
         "left": left,
-        "modes": _bands(run),
+        "modes": [{"name": mode, "bands": mode_spans(run, mode)[:_MOST_BANDS]} for mode in modes],
         "events": sorted({float(f"{event.time:.9g}") for event in run.events}),
     }
-
-
-def _thinned(run: Trajectories) -> NDArray[np.intp]:
-    """Positions of the drawn results: evenly spread ones, and both sides of every event."""
-    count = len(run.time)
-    spread = np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(int))
-    times = np.unique([event.time for event in run.events][:_POINTS])
-    sides = np.concatenate([np.searchsorted(run.time, times, side) for side in ("left", "right")])
-    beside = np.clip(np.concatenate([sides, sides - 1]), 0, count - 1)
-    return np.unique(np.concatenate([spread, beside])).astype(np.intp)
-
-
-def _bands(run: Trajectories) -> list[dict[str, Any]]:
-    """Time spans of the values of each mode that changes."""
-    hidden = {one.path for one in run.model.flat_discretes if one.hidden}
-    modes = dict.fromkeys(event.mode for event in run.events if event.mode not in hidden)
-    return [{"name": mode, "bands": mode_spans(run, mode)[:_MOST_BANDS]} for mode in modes]

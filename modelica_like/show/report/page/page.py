@@ -93,9 +93,14 @@ def _of_equations(drive: Component, run: Solution, ends: Sequence[str]) -> Itera
     yield "Design checks", _attempt(lambda: design_checks(drive, run))
     yield "What matters", _attempt(lambda: ranking(run, ends))
     yield "Small motions at the end", _attempt(lambda: small_motions(drive, run))
-    yield "Parameters", _parameters(run)
+    values = zip(run.model.flat_parameters, run.model.p, strict=True)
+    rows = [(one.path, f"{value:.6g}", str(one.unit), one.description) for one, value in values]
+    yield "Parameters", details(table(("parameter", "value>", "unit", "description"), rows))
     yield "Start", _attempt(lambda: _start(drive, run))
-    yield "How it was computed", _computed(run)
+    packages = f"{tool()}, CasADi {ca.__version__}, Python {platform.python_version()}"
+    options = f"rtol = {run.options.rtol:g}, atol = {run.options.atol:g}"
+    lines = run.model.summary, f"{statistics_line(run)}; {options}.", f"{packages}."
+    yield "How it was computed", "".join(f"<p>{escape(line)}</p>" for line in lines)
     yield "Netlist", _netlist(drive)
 
 
@@ -186,25 +191,10 @@ def _energy(drive: Component | None, run: Trajectories) -> str:
     return f'{along}<table class="energy"><thead>{heads}</thead><tbody>{lines}</tbody></table><p>{closes}</p>{said}'
 
 
-def _parameters(run: Solution) -> str:
-    values = zip(run.model.flat_parameters, run.model.p, strict=True)
-    return details(table(
-        ("parameter", "value>", "unit", "description"),
-        [(one.path, f"{value:.6g}", str(one.unit), one.description) for one, value in values],
-    ))  # fmt: skip
-
-
 def _start(drive: Component, run: Solution) -> str:
     rows = start_values(drive, run.model, run.start)
     cells = [(row.path, f"{row.value:.6g}", row.unit, row.origin) for row in rows]
     return details(table(("variable", "value>", "unit", "where from"), cells))
-
-
-def _computed(run: Solution) -> str:
-    packages = f"{tool()}, CasADi {ca.__version__}, Python {platform.python_version()}"
-    options = f"rtol = {run.options.rtol:g}, atol = {run.options.atol:g}"
-    lines = run.model.summary, f"{statistics_line(run)}; {options}.", f"{packages}."
-    return "".join(f"<p>{escape(line)}</p>" for line in lines)
 
 
 def _netlist(drive: Component) -> str:
