@@ -13,6 +13,13 @@ Takes = Literal["flow", "potential"]
 """Quantity that open ends take from outside."""
 Modes = Literal["output", "local", "integer"]
 """Variables of modes in an FMU."""
+Platforms = Annotated[
+    list[str] | None,
+    Option("--platform", metavar="NAME", help="E.g. x86_64-windows, all, or none; by default native: this one."),
+]
+FixedStep = Annotated[
+    str | None, Option(metavar="TIME", help="Co-Simulation with fixed steps and bounded work, e.g. 1ms.")
+]
 
 
 def export(
@@ -23,10 +30,7 @@ def export(
     ] = None,
     fmi: Fmi = "2.0",
     kind: Annotated[Literal["both", "me", "cs"], Option(help="Model Exchange, Co-Simulation, or both.")] = "both",
-    platforms: Annotated[
-        list[str] | None,
-        Option("--platform", metavar="NAME", help="E.g. x86_64-windows, all, or none; by default native: this one."),
-    ] = None,
+    platforms: Platforms = None,
     outputs: Annotated[
         list[str] | None, Option("--show", metavar="PATTERN", help="Additional outputs, e.g. '*.w'; in a page: curves.")
     ] = None,
@@ -38,9 +42,7 @@ def export(
         bool, Option("--embed", help="Compile the model into the binary, for importers that do not locate resources.")
     ] = False,
     modes: Annotated[Modes, Option(help="Modes as outputs, local variables, or integer outputs.")] = "output",
-    fixed_step: Annotated[
-        str | None, Option(metavar="TIME", help="Co-Simulation with fixed steps and bounded work, e.g. 1ms.")
-    ] = None,
+    fixed_step: FixedStep = None,
     tables: Annotated[
         list[str] | None, Option("--table", metavar="PATTERN", help="Tables with tunable numbers, e.g. '*.mu_pos'.")
     ] = None,
@@ -59,9 +61,9 @@ def export(
             if html is not None:
                 from modelica_like.show.browser.page import export_html
 
-                say(str(export_html(assembly, html, show=(outputs or ()), report=status.update)))
-            if html is not None and output is None:
-                return
+                say(str(export_html(assembly, html, show=outputs or (), report=status.update)))
+                if output is None:
+                    return
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, ("me", "cs") if kind == "both" else (kind,),
                 () if platforms == ["none"] else platforms or ("native",),

@@ -21,7 +21,7 @@ from modelica_like.language.units import ANY, ONE, Unit, parse_unit
 _SECOND = parse_unit("s")
 _PAIR = 2
 """Fewer values cannot disagree."""
-_WATT, _JOULE = parse_unit("W"), parse_unit("J")
+_ENERGY_UNITS = {"stored_energy": parse_unit("J"), "loss_power": parse_unit("W"), "source_power": parse_unit("W")}
 
 
 def unit_of_field(owner: Declared, name: str) -> Unit:
@@ -96,11 +96,9 @@ def check_units(
     Raises:
         UnitMismatch, LanguageError: all errors, reported together.
     """
-    inferred: dict[str, Unit] = {}
-
+    inferred, errors, wrong = dict[str, Unit](), list[ModelicaLikeError](), set[Source]()
     dimensions = Dimensions(lambda leaf: _unit_of_leaf(component, inferred, leaf, dimensions))
     kind = type(component).__name__
-    errors: list[ModelicaLikeError] = []
 
     def attempt(check: Any, *arguments: Any) -> None:
         try:
@@ -109,7 +107,6 @@ def check_units(
             if str(error) not in map(str, errors):  # both directions of a relation have the same one
                 errors.append(error)
 
-    wrong: set[Source] = set()
     for equation in equations:
         before = len(errors)
         attempt(_infer, component, equation, dimensions, inferred)
@@ -123,17 +120,13 @@ def check_units(
             attempt(check_expression, event.at, _SECOND, dimensions, f"{kind}, time of an event", event.source)
         for target, value in getattr(event, "reset", {}).items():
             attempt(check_equation, target, ca.SX(value), dimensions, kind, event.source)
-    for one in updates:
-        attempt(check_expression, one.active, ONE, dimensions, f"{kind}, condition", one.source)
-        attempt(check_equation, ca.SX(one.target), ca.SX(one.value), dimensions, kind, one.source)
-    for one, source in delays:
-        attempt(check_expression, one.offset, _SECOND, dimensions, f"{kind}, delay", source)
-    for label, term, unit in (
-        ("stored_energy", component.stored_energy(), _JOULE),
-        ("loss_power", component.loss_power(), _WATT),
-        ("source_power", component.source_power(), _WATT),
-    ):
-        attempt(check_expression, term, unit, dimensions, f"{kind}.{label}")
+    for update in updates:
+        attempt(check_expression, update.active, ONE, dimensions, f"{kind}, condition", update.source)
+        attempt(check_equation, ca.SX(update.target), ca.SX(update.value), dimensions, kind, update.source)
+    for delay, source in delays:
+        attempt(check_expression, delay.offset, _SECOND, dimensions, f"{kind}, delay", source)
+    for label, unit in _ENERGY_UNITS.items():
+        attempt(check_expression, getattr(component, label)(), unit, dimensions, f"{kind}.{label}")
     if errors:
         raise _by_any_units(component, errors) or raise_together_or_one(errors)
     return inferred

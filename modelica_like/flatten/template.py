@@ -232,12 +232,7 @@ def _build(component: Component) -> Template:
     sources = tuple(e.source for e in (*equations, *initial))
     residuals += [honest(one - (e.left - e.right)) for one, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
-    # Stored energy, loss, source power, then the power into each connector, without those of parts.
-    passed_on = {id(end) for one in wiring if isinstance(one, Connection) for end in one.ends}
-    terms: list[Any] = [component.stored_energy(), component.loss_power(), component.source_power()]
-    own = [c for c in component.connectors.values() if c.used and id(c) not in passed_on]
-    terms += [connector.power() for connector in own]
-    energy, energy_terms = Names(component), [ca.SX(cast(Any, term)) for term in terms]
+    energy, energy_terms = Names(component), _energy_terms(component, wiring)
     others = [*zip(residuals, sources, strict=True), *((term, NOWHERE) for term in energy_terms)]
     discrete = DiscreteEquations(component, determined, events, others)
     checked = [*equations, *initial], discrete.events, discrete.updates, discrete.delays
@@ -356,6 +351,14 @@ class _Changes:
 
     def _path(self, symbol: Symbol) -> str:
         return path_of(symbol, self.component)
+
+
+def _energy_terms(component: Component, wiring: Iterable[Connection | FreeEnd]) -> list[Any]:
+    """Stored energy, loss, source power, then the power into each connector, without those of parts."""
+    passed_on = {id(end) for joint in wiring if isinstance(joint, Connection) for end in joint.ends}
+    terms: list[Any] = [component.stored_energy(), component.loss_power(), component.source_power()]
+    terms += [c.power() for c in component.connectors.values() if c.used and id(c) not in passed_on]
+    return [ca.SX(cast(Any, term)) for term in terms]
 
 
 def _rows(sparsity: ca.Sparsity) -> tuple[tuple[int, ...], ...]:

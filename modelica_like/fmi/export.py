@@ -99,8 +99,7 @@ def export_fmu(
         modes: `output` (enumerations), `local` (enumerations without output), or `integer` (outputs).
         fixed_step: step size of Co-Simulation in s, or such as "1 ms", for hardware in the loop: the work of a step is
             bounded, and a communication step is a whole number of them. By default accuracy chooses the steps.
-        tables: patterns of tables whose numbers become tunable parameters, such as `clutch.mu_pos`: arrays in FMI 3,
-            scalars `clutch.mu_pos[2,1]` in FMI 2.
+        tables: patterns of tables with tunable numbers, such as `*.mu_pos`: arrays in FMI 3, scalars in FMI 2.
         check: run the FMU, if it has a binary for this machine, against IDAS; a picture shows where they differ.
         strict: do not write an FMU that differs from IDAS.
         report: called with the present activity.

@@ -22,7 +22,7 @@ from modelica_like.fmi.interface import FmuVariable, Interface
 from modelica_like.fmi.sources import Version, runtime_sources
 from modelica_like.fmi.start_tables import StartTables
 from modelica_like.fmi.tables import Tables, make_tables
-from modelica_like.fmi.tape import OPERATIONS
+from modelica_like.fmi.tape import OPERATIONS, Tape
 
 ABSOLUTE_TO_RELATIVE = 1e-2
 """Absolute tolerance, in nominal values, over the relative one."""
@@ -225,11 +225,7 @@ def _contents(
     for name, pattern in (("step", tables.step), ("start", tables.start_pattern)):
         contents |= {f"{name}.{field}": pattern[field] for field in _QR}
     for tape in tables.tapes.values():
-        contents |= {
-            f"tapes.{tape.name}.runs": [(_CODES[name], count) for name, count in tape.runs],
-            f"tapes.{tape.name}.operands": [(left, right) for _, left, right in tape.operations],
-            f"tapes.{tape.name}.outputs": tape.outputs,
-        }
+        contents |= _tape(tape)
     return contents
 
 
@@ -339,3 +335,11 @@ def _variable(one: FmuVariable, text: _Text) -> tuple[int, ...]:
     if count:
         of_type, start = _ARRAY, one.elements[0]
     return (one.reference, of_type, _KINDS.index(kind), index, start, tunable, text(one.name), count or 1)
+
+
+def _tape(tape: Tape) -> dict[str, Any]:
+    return {
+        f"tapes.{tape.name}.runs": [(_CODES[name], count) for name, count in tape.runs],
+        f"tapes.{tape.name}.operands": [(left, right) for _, left, right in tape.operations],
+        f"tapes.{tape.name}.outputs": tape.outputs,
+    }

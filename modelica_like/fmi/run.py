@@ -33,23 +33,18 @@ def run_fmu(
     """Run an FMU of FMI 1.0, 2.0 or 3.0 with FMPy, in a separate process.
 
     Mode changes of a Co-Simulation are located inside its communication steps, by event mode (FMI 3.0) or by repeating
-    a step from a saved state, unless a mode comes and goes within one step. If an FMU supports neither, they are known
-    to one communication step.
+    a step from a saved state, unless a mode comes and goes within one step; otherwise they are known to one step.
 
     Args:
         path: the FMU.
         inputs: a number, or pairs (time in s, value), by name; linear in between, with jumps where a time is repeated.
             A Co-Simulation gets their slopes if it supports them (FMI 2.0, `canInterpolateInputs`), otherwise their
-            means over steps in which no input changes by more than a five-hundredth of its range, or over its own fixed
-            steps.
-        parameters: start values of parameters and variables by name, in the FMU's units: numbers, and for arrays
-            (FMI 3.0) nested sequences of the array's shape, or all its numbers, row by row.
-        start: start time in s.
-        stop: end time in s; by default that of the FMU.
+            means over its own fixed steps, or over steps in which none changes by more than 1/500 of its range.
+        parameters: start values by name, in the FMU's units; those of an array nested in its shape, or row by row.
+        start, stop: times in s; the end is by default that of the FMU.
         kind: `me` (Model Exchange) or `cs` (Co-Simulation); by default `cs` if the FMU has it.
         tolerance: relative tolerance.
-        step: communication step, or interval of the results, in s; by default that suggested by the
-            FMU, or a five-hundredth of the run.
+        step: communication step, or interval of the results, in s; by default the FMU's, or 1/500 of the run.
         points: number of equal steps instead.
         outputs: variables to record; by default all that are not parameters.
         timeout: time limit in s.
@@ -60,8 +55,8 @@ def run_fmu(
 
     Raises:
         FmuRefused: the file is not an FMU, is unsafe to unpack, or lacks what was requested.
-        FmuFailed: the FMU reported an error, or a result is not finite; FmuCrashed: it crashed its process; FmuTimeout:
-            it did not finish.
+        FmuFailed: it reported an error, or a result is not finite.
+        FmuCrashed, FmuTimeout: it crashed its process, or did not finish.
         UnknownName: it has no such variable.
         MissingValue: a reading still changes with 100,000 results.
         ValueOutOfRange: an array has another shape, or a time is wrong.
@@ -73,18 +68,22 @@ def run_fmu(
         "solver": solver, "outputs": list(outputs) if outputs else None, "parameters": _plain(parameters or {}),
         "inputs": {name: _series(name, value) for name, value in (inputs or {}).items()},
     }  # fmt: skip
-    if stop is not None and stop <= start:
-        raise ValueOutOfRange(f"{path.name}: the end time {stop:g} s is not after the start time {start:g} s.")
-    if step is not None and step <= 0:
-        raise ValueOutOfRange(f"{path.name}: the step must be positive, not {step:g} s.")
-    if timeout <= 0:
-        raise ValueOutOfRange(f"{path.name}: the time limit must be positive, not {timeout:g} s.")
+    _check_times(path.name, start, stop, step, timeout)
     run = _run(path, job, timeout)
     if readings:
         intervals, needed = int(np.count_nonzero(np.diff(run.time))), needed_outputs(run, readings)
         again = lambda times: _run(path, job | {"points": times * intervals, "outputs": needed}, timeout)  # noqa: E731
         run.readings = settled(run, again, readings)
     return run
+
+
+def _check_times(name: str, start: float, stop: float | None, step: float | None, timeout: float) -> None:
+    if stop is not None and stop <= start:
+        raise ValueOutOfRange(f"{name}: the end time {stop:g} s is not after the start time {start:g} s.")
+    if step is not None and step <= 0:
+        raise ValueOutOfRange(f"{name}: the step must be positive, not {step:g} s.")
+    if timeout <= 0:
+        raise ValueOutOfRange(f"{name}: the time limit must be positive, not {timeout:g} s.")
 
 
 def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:

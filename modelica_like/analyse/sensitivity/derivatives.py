@@ -141,31 +141,39 @@ def _differentiate(
         size = abs(chosen[k][1].value) or natural_size(chain, outputs, positions[k])
         if np.isfinite(size) and _at_a_kink(at_kink, of_kinks[:, k] * size):
             candidates[Candidate(chosen[k][1], size, of_outputs[ends, k])] = k
-    for one in sides.suspects([*candidates]):
-        error = sides.error(one)
-        if error is not None and (named or len(kept) == 1):
-            raise error
-        if error is not None:
-            kept = [k for k in kept if k != candidates[one]]
-            left_out[one.by.name] = f"{error.what} {error.why}"
+    kept, left_at_kinks = _by_sides(sides, candidates, kept, named)
     derivatives, chosen = of_outputs[:, kept], [chosen[k] for k in kept]
     if freed.slopes:
         derivatives = derivatives @ freed.taken_along([quantity.name for _, quantity in chosen])
     # The same name has the same number everywhere, though the replay is more precise.
     values = solution.read(*(one.name for one in plain))
-    count = len(plain)
-    rows = derivatives[count:].reshape(len(series), len(nodes), len(chosen))
+    rows = derivatives[len(plain) :].reshape(len(series), len(nodes), len(chosen))
     return Sensitivities(
         chain.model.name,
         tuple(Quantity(one.name, float(value), one.unit) for one, value in zip(plain, values, strict=True)),
         tuple(quantity for _, quantity in chosen),
-        derivatives[:count],
+        derivatives[: len(plain)],
         way,
         np.array([node.t for node in nodes]),
         {one.name: table for one, table in zip(series, rows, strict=True)},
-        left_out,
+        left_out | left_at_kinks,
         (*_of_rounding(solution, plain, values), *sides.remark([*candidates])),
     )
+
+
+def _by_sides(
+    sides: Sides, candidates: dict[Candidate, int], kept: list[int], named: bool
+) -> tuple[list[int], dict[str, str]]:
+    """Positions of the parameters whose derivatives are the same on both sides; names and reasons of the others."""
+    left_out: dict[str, str] = {}
+    for candidate in sides.suspects([*candidates]):
+        error = sides.error(candidate)
+        if error is not None and (named or len(kept) == 1):
+            raise error
+        if error is not None:
+            kept = [k for k in kept if k != candidates[candidate]]
+            left_out[candidate.by.name] = f"{error.what} {error.why}"
+    return kept, left_out
 
 
 def _of_rounding(solution: Solution, outputs: Sequence[Output], values: Sequence[float]) -> Iterator[str]:

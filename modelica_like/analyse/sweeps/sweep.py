@@ -86,17 +86,22 @@ def sweep(
     """
     model = build(drive, free=over).with_parameters(dict(parameters or {}))
     plan = make_plan(model, over, sampling)
-    if not outputs or any(number is not None and number < 1 for number in (processes, chunk)):
-        raise ValueOutOfRange(
-            "A sweep needs at least one output, and positive numbers of processes and runs in a chunk."
-        )
-    count = chunk or min(max(len(plan) // _PARTS, _CHUNK[0]), _CHUNK[1])
-    chunks = [(first, plan.points[first : first + count]) for first in range(0, len(plan), count)]
+    chunks = _chunks(plan, outputs, processes, chunk)
     job = Job.of(model, plan.names, outputs, {"until": until, "points": _POINTS, **settings, "solver": solver})
     job, why = _solvable(job) if scheduler is None else (job, "")
     done = _collect(job, plan, chunks, checkpoint, progress, _workers(job, processes, scheduler, len(plan)))
     _check_extremes(job, plan, done)
     return _dataset(model, plan, job, done, why)
+
+
+def _chunks(plan: Plan, outputs: Sequence[str], processes: int | None, chunk: int | None) -> list[Chunk]:
+    """Divide the runs among workers."""
+    if not outputs or any(number is not None and number < 1 for number in (processes, chunk)):
+        raise ValueOutOfRange(
+            "A sweep needs at least one output, and positive numbers of processes and runs in a chunk."
+        )
+    count = chunk or min(max(len(plan) // _PARTS, _CHUNK[0]), _CHUNK[1])
+    return [(first, plan.points[first : first + count]) for first in range(0, len(plan), count)]
 
 
 def _solvable(job: Job) -> tuple[Job, str]:

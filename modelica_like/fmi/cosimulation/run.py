@@ -92,14 +92,7 @@ def cosim(
                 readings=readings,
             )  # fmt: skip
     check_system(system)
-    given = parameters or {}
-    units = {unit.name: unit for unit in system.units}
-    for name, value in given.items():
-        unit, _, variable = name.partition(".")
-        if unit not in units:
-            raise UnknownName(f"{system.name} has no FMU '{unit}'{did_you_mean(unit, units) or '.'}")
-        units[unit] = replace(units[unit], parameters={**units[unit].parameters, variable: float(value)})
-    system = replace(system, units=tuple(units.values()))
+    system = _with_parameters(system, parameters or {})
     settings = _settings(system, until, step, master, inputs, tolerance)
     if timeout <= 0:
         raise ValueOutOfRange(f"{system.name}: the time limit must be positive, not {timeout:g} s.")
@@ -164,6 +157,16 @@ def _left(folder: Path, columns: str) -> tuple[dict[str, Any], Any]:
     about, numbers = json.loads((folder / columns).read_text()), np.fromfile(folder / "rows")
     width = about["width"]
     return about, numbers[: len(numbers) // width * width].reshape(-1, width)
+
+
+def _with_parameters(system: System, given: Mapping[str, float]) -> System:
+    units = {unit.name: unit for unit in system.units}
+    for name, value in given.items():
+        unit, _, variable = name.partition(".")
+        if unit not in units:
+            raise UnknownName(f"{system.name} has no FMU '{unit}'{did_you_mean(unit, units) or '.'}")
+        units[unit] = replace(units[unit], parameters={**units[unit].parameters, variable: float(value)})
+    return replace(system, units=tuple(units.values()))
 
 
 def _settings(

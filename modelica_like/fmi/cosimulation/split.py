@@ -86,18 +86,11 @@ def split(
     assembly = _assembly(drive)
     found = cut_netlist(assembly, [at] if isinstance(at, str) else at)
     titles = _titles(found, names)
-    until = assembly.__dict__["_simulate"].get("until")
-    until_s, size = (
-        None if value is None else seconds(value, name) for name, value in (("until", until), ("step", step))
-    )
-    settings = Settings(until_s, size, master or "jacobi")
+    settings = _settings(assembly.__dict__["_simulate"].get("until"), step, master)
     maker = Maker(assembly, found)
     tell("choosing the causality")
     chosen = orient(maker)
-    whole = build(assembly)
-    point = initialize(whole, 0.0, whole.settings.get("start", "given"))
-    column = whole.variables(point.t, point.x, point.z, whole.p, whole.u, point.d).full().ravel()
-    values = {one.path: float(value) for one, value in zip(whole.flat_variables, column, strict=True)}
+    values = _start_values(assembly)
     target.mkdir(parents=True, exist_ok=True)
     units, notes = list[Unit](), list[str]()
     for k, title in enumerate(titles):
@@ -141,6 +134,11 @@ def _export(part: Assembly, title: str, file: Path, version: str, *, check: bool
     return export_fmu(part, file, version, {"cs"}, check=check).check.sentence
 
 
+def _settings(until: float | str | None, step: float | str | None, master: str | None) -> Settings:
+    end, size = (None if value is None else seconds(value, name) for name, value in (("until", until), ("step", step)))
+    return Settings(end, size, master or "jacobi")
+
+
 def _assembly(drive: Component | str | Path) -> Assembly:
     if isinstance(drive, str | Path):
         return load(drive)
@@ -151,9 +149,7 @@ def _titles(found: CutNetlist, names: Sequence[str]) -> list[str]:
     if not names:
         return [group[0] for group in found.groups]
     if len(names) != len(found.groups):
-        groups = "; ".join(
-            ", ".join(group if len(group) < 4 else [group[0], f"{group[1]} … {group[-1]}"]) for group in found.groups
-        )
+        groups = "; ".join(_some(group) for group in found.groups)
         raise NetlistError(
             f"There are {len(found.groups)} FMUs, but {len(names)} name{'s' if len(names) > 1 else ''}.",
             why=f"They are: {groups}.",
@@ -164,6 +160,18 @@ def _titles(found: CutNetlist, names: Sequence[str]) -> list[str]:
     if len(set(names)) < len(names):
         raise DuplicateName(f"Two FMUs cannot have the same name: {', '.join(names)}.")
     return list(names)
+
+
+def _some(group: Sequence[str]) -> str:
+    return ", ".join(group) if len(group) < 4 else f"{group[0]}, {group[1]} … {group[-1]}"
+
+
+def _start_values(assembly: Assembly) -> dict[str, float]:
+    """Return all variables of the whole drive at its start, in SI units."""
+    whole = build(assembly)
+    point = initialize(whole, 0.0, whole.settings.get("start", "given"))
+    column = whole.variables(point.t, point.x, point.z, whole.p, whole.u, point.d).full().ravel()
+    return {one.path: float(value) for one, value in zip(whole.flat_variables, column, strict=True)}
 
 
 def _couplings(
