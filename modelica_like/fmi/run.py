@@ -41,7 +41,8 @@ def run_fmu(
             A Co-Simulation gets their slopes if it supports them (FMI 2.0, `canInterpolateInputs`), otherwise their
             means over its own fixed steps, or over steps in which none changes by more than 1/500 of its range.
         parameters: start values by name, in the FMU's units; those of an array nested in its shape, or row by row.
-        start, stop: times in s; the end is by default that of the FMU.
+        start: start time in s.
+        stop: end time in s; by default that of the FMU.
         kind: `me` (Model Exchange) or `cs` (Co-Simulation); by default `cs` if the FMU has it.
         tolerance: relative tolerance.
         step: communication step, or interval of the results, in s; by default the FMU's, or 1/500 of the run.
@@ -57,8 +58,7 @@ def run_fmu(
         FmuRefused: the file is not an FMU, is unsafe to unpack, or lacks what was requested.
         FmuFailed: it reported an error, or a result is not finite.
         FmuCrashed, FmuTimeout: it crashed its process, or did not finish.
-        UnknownName: it has no such variable.
-        MissingValue: a reading still changes with 100,000 results.
+        UnknownName, MissingValue: it has no such variable; a reading still changes with 100,000 results.
         ValueOutOfRange: an array has another shape, or a time is wrong.
         OSError: the file cannot be read.
     """

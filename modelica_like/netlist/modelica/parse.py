@@ -134,13 +134,14 @@ class _Parser(Expressions):
                 self.annotation(made)
                 self.need(";")
             elif self.kind in ("initial", "equation", "algorithm"):
+                initial = bool(self.take("initial"))
                 if self.take("algorithm"):
                     if made.kind != "function":
                         made.unsupported.append(("an algorithm outside a function", line))
                     made.algorithm += self.statements()
                 else:
                     self.need("equation")
-                    (made.initial_equations if bool(self.take("initial")) else made.equations).extend(self.statements())
+                    (made.initial_equations if initial else made.equations).extend(self.statements())
             elif self.take("external"):
                 made.unsupported.append(("external functions", line))
                 while self.kind not in (";", "end of file"):
