@@ -43,8 +43,8 @@ def modes(
         start = when(at) if at else None
         loop = open_loop(assembly, opened, start) if opened else None
         linear = loop or linearize(assembly, start, inputs=inputs, outputs=outputs)
-        found = linear.modes()
-        page.print(modes_report(found))
+        mode_shapes = linear.modes()
+        page.print(modes_report(mode_shapes))
         if loop:
             page.print("", escape(str(loop.margins())))
         if shapes:
@@ -53,9 +53,9 @@ def modes(
                 for one in linear.model.flat_variables
                 if (str(one.unit), one.path.rpartition(".")[2]) in (("rad/s", "w"), ("m/s", "v"))
             ]
-            save_plot(found.plot(show or speeds), shapes)
+            save_plot(mode_shapes.plot(show or speeds), shapes)
         if draw:
-            save_schematic(assembly, draw, modes=found)
+            save_schematic(assembly, draw, modes=mode_shapes)
         if bode:
             save_plot(linear.bode(), bode)
         if nyquist:
@@ -121,18 +121,18 @@ def sweep(
         from modelica_like.show.report.progress import Bar
 
         with Bar(title="runs") as bar:
-            found = run(
+            dataset = run(
                 assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
                 processes=processes, scheduler=scheduler, progress=bar, solver=solver,
             )  # fmt: skip
-        page.print(sweep_report(found))
+        page.print(sweep_report(dataset))
         if output:
-            write_dataset(found, output)
+            write_dataset(dataset, output)
         if plot:
             from modelica_like.analyse.sweeps.pictures import plot_sweep
             from modelica_like.show.plot import save_plot
 
-            save_plot(plot_sweep(found), plot)
+            save_plot(plot_sweep(dataset), plot)
 
 
 def sensitivity(

@@ -94,17 +94,17 @@ def cosim(
         from modelica_like.simulation import seconds
 
         values = _numbers(assignments or ())
-        with opened(system) as known, Bar(until or known.settings.until) as bar:
+        with opened(system) as loaded, Bar(until or loaded.settings.until) as bar:
             if show:
-                read_signals(described_model(known), show)
-            made = Outcome(
+                read_signals(described_model(loaded), show)
+            outcome = Outcome(
                 lambda: run(
-                    known, until, step=step, master=master, inputs=inputs, tolerance=rtol,
+                    loaded, until, step=step, master=master, inputs=inputs, tolerance=rtol,
                     parameters=values, timeout=seconds(timeout, "timeout"), progress=bar,
                 ), debug=debug,
             )  # fmt: skip
-        made.tell(cosimulation_report, page)
-        made.write(csv, units=units, show=show or (), pictures=[(plot, lambda one: draw(one, show or ()))])
+        outcome.tell(cosimulation_report, page)
+        outcome.write(csv, units=units, show=show or (), pictures=[(plot, lambda one: draw(one, show or ()))])
 
 
 def _numbers(assignments: list[str] | tuple[str, ...]) -> dict[str, float]:

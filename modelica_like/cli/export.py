@@ -90,5 +90,5 @@ def runtimes(
         with Console(stderr=True).status("loading") as status:
             for name in chosen_platforms(platforms or (), RUNTIMES):
                 runtime_library(name, status.update)
-        found = ((name, str(found_runtime(name) or "not compiled")) for name in RUNTIMES)
-        page.print(table("run-times", "platform", "library", rows=found))
+        libraries = ((name, str(found_runtime(name) or "not compiled")) for name in RUNTIMES)
+        page.print(table("run-times", "platform", "library", rows=libraries))

@@ -22,15 +22,15 @@ def from_modelica(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Write a model of Modelica text as a netlist."""
-    made = output or text.parent / f"{text.stem or 'model'}.toml"
-    with told(debug, files=[made]):
+    target = output or text.parent / f"{text.stem or 'model'}.toml"
+    with told(debug, files=[target]):
         from modelica_like.netlist.modelica.netlist_form import netlist_text
         from modelica_like.netlist.modelica.read import read_modelica
 
         model, notes = read_modelica(text, name)
-        write_text(made, netlist_text(model, made.parent, notes))
+        write_text(target, netlist_text(model, target.parent, notes))
         note(*notes)
-        say(f"{made}: {len(model.parts)} parts; next, modelica-like simulate {made}")
+        say(f"{target}: {len(model.parts)} parts; next, modelica-like simulate {target}")
 
 
 def to_modelica(
@@ -41,9 +41,9 @@ def to_modelica(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Write a netlist as Modelica text on classes of the Modelica Standard Library."""
-    made = output or netlist.parent / f"{netlist.stem or 'model'}.mo"
-    with told(debug, files=[made]):
+    target = output or netlist.parent / f"{netlist.stem or 'model'}.mo"
+    with told(debug, files=[target]):
         from modelica_like.netlist.modelica.write import modelica_text
 
-        write_text(made, modelica_text(load_netlist(netlist, assignments)))
-        say(str(made))
+        write_text(target, modelica_text(load_netlist(netlist, assignments)))
+        say(str(target))

@@ -118,14 +118,14 @@ def simulate(
         Display(model, shown)
         how: dict[str, Any] = {"start": start, "rtol": rtol, "points": points, "on_chattering": on_chattering}
         with Bar(until or model.settings.get("until")) as bar:
-            made = Outcome(lambda: run(model, until, progress=bar, solver=solver, **how), debug=debug)
-        energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
-        made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown, show=show or ()), page)
-        made.attempt("The notes", lambda: note(*notes(assembly, made.solution, energy=energy)))
+            outcome = Outcome(lambda: run(model, until, progress=bar, solver=solver, **how), debug=debug)
+        energy = energy and outcome.stopped is None and outcome.attempt("The energy balance", outcome.solution.energy)
+        outcome.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown, show=show or ()), page)
+        outcome.attempt("The notes", lambda: note(*notes(assembly, outcome.solution, energy=energy)))
         again = partial(run, model, until, **how)
         curves = (plot, lambda one: _drawn(one, variants, files, again, show or (), shown))
         pictures = curves, (sankey, lambda one: one.energy().sankey(model.name))
-        made.write(csv, units=units or bool(display), display=shown, pictures=pictures, show=show or ())
+        outcome.write(csv, units=units or bool(display), display=shown, pictures=pictures, show=show or ())
 
 
 def _beside(texts: Sequence[str], plot: Path | None) -> tuple[list[tuple[str, Sequence[Any]]], list[Path]]:

@@ -58,8 +58,8 @@ class Parameter:
     def read(self, text: str) -> Any:
         """Read one value."""
         if self.choices and text not in self.choices:
-            known = ", ".join(f"'{one}'" for one in self.choices)
-            raise argparse.ArgumentTypeError(f"'{text}' is not one of {known}.")
+            choices = ", ".join(f"'{one}'" for one in self.choices)
+            raise argparse.ArgumentTypeError(f"'{text}' is not one of {choices}.")
         try:
             return text if self.choices else self.kind(text)
         except ValueError:
@@ -67,16 +67,16 @@ class Parameter:
 
     def add(self, group: Any) -> None:
         """Declare it to argparse."""
-        told: dict[str, Any] = {"default": None if self.required else self.default}
+        keywords: dict[str, Any] = {"default": None if self.required else self.default}
         if self.kind is bool:
             kind = "store_true" if self.declared.names else argparse.BooleanOptionalAction  # with --no-…
-            action = group.add_argument(self.words()[0], dest=self.name, action=kind, **told)
+            action = group.add_argument(self.words()[0], dest=self.name, action=kind, **keywords)
         elif self.option:
-            told |= {"required": self.required, "action": "append" if self.many else None}
-            action = group.add_argument(*self.words(), dest=self.name, metavar=self.value, type=self.read, **told)
+            keywords |= {"required": self.required, "action": "append" if self.many else None}
+            action = group.add_argument(*self.words(), dest=self.name, metavar=self.value, type=self.read, **keywords)
         else:
             nargs = "*" if self.many else None if self.required else "?"
-            action = group.add_argument(self.name, metavar=self.value, nargs=nargs, type=self.read, **told)
+            action = group.add_argument(self.name, metavar=self.value, nargs=nargs, type=self.read, **keywords)
         required = " Required." if self.option and self.required else ""
         default = f" Default: {self.shown}." if self.shown else ""
         action.help = f"{self.declared.help}{required}{default}".replace("%", "%%")
@@ -85,8 +85,8 @@ class Parameter:
 def parameters(command: Callable[..., None]) -> list[Parameter]:
     """Return the parameters of a command."""
     hints = get_type_hints(command, include_extras=True)
-    known = inspect.signature(command).parameters.values()
-    return [Parameter(one.name, hints[one.name], one.default) for one in known]
+    arguments = inspect.signature(command).parameters.values()
+    return [Parameter(one.name, hints[one.name], one.default) for one in arguments]
 
 
 def paragraphs(command: Callable[..., None]) -> list[str]:
@@ -96,15 +96,15 @@ def paragraphs(command: Callable[..., None]) -> list[str]:
 
 def reader(name: str, command: Callable[..., None]) -> Reader:
     """Return the reader of a command."""
-    known = parameters(command)
-    places, options = [one for one in known if not one.option], [one for one in known if one.option]
-    made = Reader(name, " ".join(["[OPTIONS]", *(one.place() for one in places)]), paragraphs(command))
+    declared = parameters(command)
+    places, options = [one for one in declared if not one.option], [one for one in declared if one.option]
+    result = Reader(name, " ".join(["[OPTIONS]", *(one.place() for one in places)]), paragraphs(command))
     for title, those in ("Arguments", places), ("Options", options):
-        group = made.add_argument_group(title)
+        group = result.add_argument_group(title)
         for one in those:
             one.add(group)
     group.add_argument("--help", action="help", help="Show this page.")
-    return made
+    return result
 
 
 class Reader(argparse.ArgumentParser):
@@ -135,23 +135,23 @@ class Reader(argparse.ArgumentParser):
 
     def _ordered(self, words: Sequence[str]) -> Iterator[str]:
         """Yield options as single words, because values may begin with a dash, and then the places."""
-        known, places, rest = self._option_string_actions, [], iter(words)
+        actions, places, rest = self._option_string_actions, [], iter(words)
         for word in rest:
             name, equals, value = word.partition("=") if word.startswith("--") else (word[:2], word[2:], word[2:])
             if word == "--":
                 places += rest
             elif word in ("", "-") or word[0] != "-":
                 places.append(word)
-            elif name not in known:
-                self.error(f"No such option '{name}'{did_you_mean(name, known) or '.'}")
-            elif known[name].nargs == 0 and equals:
+            elif name not in actions:
+                self.error(f"No such option '{name}'{did_you_mean(name, actions) or '.'}")
+            elif actions[name].nargs == 0 and equals:
                 self.error(f"Option '{name}' does not take a value.")
-            elif known[name].nargs == 0:
+            elif actions[name].nargs == 0:
                 yield word
             elif (value := value if equals else next(rest, None)) is None:
                 self.error(f"Option '{name}' requires a value.")
             else:
-                yield f"{known[name].option_strings[0]}={value}"
+                yield f"{actions[name].option_strings[0]}={value}"
         yield from [*(["--"] if any(one.startswith("-") for one in places) else ()), *places]
 
     def error(self, message: str) -> NoReturn:

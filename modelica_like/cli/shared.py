@@ -202,9 +202,9 @@ def values(assignments: list[str] | None) -> dict[str, Any]:
 
 def _value(text: str) -> Any:
     """Read a value of the command line: true, false, a number, or a text with a unit."""
-    known: dict[str, Any] = {"true": True, "false": False}
-    if text in known:
-        return known[text]
+    words: dict[str, Any] = {"true": True, "false": False}
+    if text in words:
+        return words[text]
     readers: tuple[Callable[[str], Any], ...] = (int, float)
     for reader in readers:
         try:

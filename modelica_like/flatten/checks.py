@@ -44,8 +44,8 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
     Raises:
         ComponentUnbalanced: it does not.
     """
-    own = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
-    unknowns = [n for n in own if n not in joined]
+    variables = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
+    unknowns = [n for n in variables if n not in joined]
     used = {name: one for name, one in component.connectors.items() if one.used and name not in joined}
     unknowns += [f"{name}.{n}" for name, one in used.items() for n, f in one.quantities.items() if f.is_flow]
     if len(equations) == len(unknowns):
@@ -75,9 +75,9 @@ def _driven_input(component: Component, equations: list[Equation]) -> str:
     """Return an input of a part that occurs in an equation, relative to the component, or an empty text."""
     leaves = (symbol for e in equations for side in (e.left, e.right) for symbol in symbols_in(side))
     foreign = (one for one in leaves if isinstance(one.owner, Component) and one.owner is not component)
-    own = component.path
+    prefix = component.path
     paths = (f"{one.owner.path}.{one.name}" for one in foreign if isinstance(one.owner.fields.get(one.name), Input))
-    return next((path.removeprefix(f"{own}.") for path in paths), "")
+    return next((path.removeprefix(f"{prefix}.") for path in paths), "")
 
 
 def check_units(
@@ -138,8 +138,8 @@ def _by_any_units(component: Component, errors: Sequence[ModelicaLikeError]) -> 
              if isinstance(field, Parameter) and field.unit_text == "*" and name in component._values]  # fmt: skip
     if len(given) < _PAIR or not all(isinstance(one, UnitMismatch) for one in errors):
         return None
-    told = ", ".join(f"{name} in {unit}" for name, unit in given)
-    return UnitMismatch(f"{component.label} ({type(component).__name__}): its units do not fit together: {told}.",
+    units = ", ".join(f"{name} in {unit}" for name, unit in given)
+    return UnitMismatch(f"{component.label} ({type(component).__name__}): its units do not fit together: {units}.",
                         where=component.place_of(), why=errors[0].what)  # fmt: skip
 
 

@@ -181,8 +181,8 @@ def check_expression(
     with _told(label, where, label, source):
         unit = dimensions.unit(expression)
     if not same_dimension(unit, expected):
-        found = "has no unit" if unit == ONE else f"is {unit}"
-        raise UnitMismatch(f"{label} expects {expected}; the expression {found}.", where=where)
+        actual = "has no unit" if unit == ONE else f"is {unit}"
+        raise UnitMismatch(f"{label} expects {expected}; the expression {actual}.", where=where)
 
 
 @contextmanager

@@ -93,8 +93,8 @@ class DiscreteEquations:
                 self.updates += self._of_when(one)
             elif isinstance(one, Assertion):
                 self._write_assertion(one, f"assertion[{number}]")
-        told = [(expression, one.source) for one in self.events for expression in _expressions(one)]
-        for expression, source in told:
+        expressions = [(expression, one.source) for one in self.events for expression in _expressions(one)]
+        for expression, source in expressions:
             for symbol in symbols_in(expression) if is_expression(expression) else ():
                 if isinstance(symbol, Pre):
                     raise LanguageError(
@@ -104,7 +104,9 @@ class DiscreteEquations:
                         advice=f"Write {symbol.of.name}: in a reset it is the value before. For an edge, write "
                         "once=True.",
                     )
-        self._write_markers([*others, *told, *((e, u.source) for u in self.updates for e in (u.active, u.value))])
+        self._write_markers(
+            [*others, *expressions, *((e, u.source) for u in self.updates for e in (u.active, u.value))]
+        )
 
     def forms(self, path: Any) -> tuple[UpdateForm, ...]:
         """Return the updates without their expressions; `path` names a symbol from the component."""
@@ -124,21 +126,21 @@ class DiscreteEquations:
         return Update(target, _ONE, value, equation.source, at_start=True)
 
     def _of_when(self, one: When) -> list[Update]:
-        found: dict[int, tuple[Symbol, Any, Any]] = {}
+        targets: dict[int, tuple[Symbol, Any, Any]] = {}
         for active, values in reversed(one.branches):
             for key, value in values.items():
                 target = key if isinstance(key, Ending) else _target(key)
                 if target is None:
                     what = f"{self._kind}: a `when` gives {key} a value, which is neither a variable nor discrete."
                     raise LanguageError(what, where=one.source, advice="Name variables, as in {self.n: pre(self.n)}.")
-                _, before, later = found.get(id(target), (target, 0, 0))
+                _, before, later = targets.get(id(target), (target, 0, 0))
                 flag: Any = active
-                chosen = ca.SX(value) if id(target) not in found else ca.if_else(flag, ca.SX(value), later)
-                found[id(target)] = target, ca.logic_or(flag, before), chosen
-        for target, *_ in reversed(found.values()):
+                chosen = ca.SX(value) if id(target) not in targets else ca.if_else(flag, ca.SX(value), later)
+                targets[id(target)] = target, ca.logic_or(flag, before), chosen
+        for target, *_ in reversed(targets.values()):
             if isinstance(target, Ending):
                 self._write_ending(target, one.source)
-        return [Update(*parts, one.source, at_start=False) for parts in found.values()]
+        return [Update(*parts, one.source, at_start=False) for parts in targets.values()]
 
     def check_determined(self, used: Iterable[str]) -> None:
         """Check that every discrete variable of the component is determined once; a number by its start value at least.
@@ -161,9 +163,9 @@ class DiscreteEquations:
             if id(target) in places and not isinstance(target, Marker) and is_a(target, Discrete):
                 what = f"{self._kind}: {target.name} is set by a transition and determined by an equation or a `when`."
                 raise LanguageError(what, where=[places[id(target)], transition.source], advice="Keep one of the two.")
-        known = {id(target) for target, _ in resets} | {*places}
+        determined = {id(target) for target, _ in resets} | {*places}
         for name, field in self._component.fields.items():
-            if not isinstance(field, Discrete) or id(getattr(self._component, name)) in known:
+            if not isinstance(field, Discrete) or id(getattr(self._component, name)) in determined:
                 continue
             if field.kind != "number" or (name in used and field.default == 0.0):
                 what = f"{self._kind}: nothing determines the discrete variable {name}."
@@ -195,7 +197,7 @@ class DiscreteEquations:
 
     def _write_marker(self, one: Marker, source: Source) -> Iterable[Any]:
         """Write what determines a marker; return further expressions."""
-        own: Any = one.of
+        argument: Any = one.of
         if one.kind == "relation":
             mode, opposite = self._mode(one.name, str(one.of), one, ("false", "true")), cast(Expr, ca.logic_not(one.of))
             self.events += [
@@ -204,11 +206,11 @@ class DiscreteEquations:
                 replace(mode.initially("true", when=one.of), source=source),
             ]
             return ()
-        self.hidden.append(Hidden(one.name, f"{one.kind} {own}"))
+        self.hidden.append(Hidden(one.name, f"{one.kind} {argument}"))
         if one.kind in ("floor", "clock"):
             (self._write_floor if one.kind == "floor" else self._write_clock)(one, source)
             return ()
-        value = own if one.kind == "was" else edge(own)
+        value = argument if one.kind == "was" else edge(argument)
         self.updates.append(Update(one, _ONE, value, source, at_start=one.kind == "was"))
         return (value,)
 

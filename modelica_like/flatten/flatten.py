@@ -96,9 +96,9 @@ class _Flattener:
                 # What is left of an initial equation is zero at the start.
                 full_path, node = f"{component.path}.{path}".lstrip("."), len(self.variables)
                 self.variable_of[id(component), path] = node
-                told = f"{INITIAL_EQUATION} `{text}`"
+                description = f"{INITIAL_EQUATION} `{text}`"
                 self.variables.append(
-                    FlatVariable(full_path, ONE, told, "local", "avoid", 0.0, 1.0, None, None, hidden=True)
+                    FlatVariable(full_path, ONE, description, "local", "avoid", 0.0, 1.0, None, None, hidden=True)
                 )
                 self.starts.append(StartValue(node, 0.0, "fixed"))
             for one in template.hidden:
@@ -131,18 +131,18 @@ class _Flattener:
 
     def _elaborate(self) -> list[tuple[Component, Template]]:
         """Find all templates, owners first: an owner's connections decide which optional connectors its parts have."""
-        found: list[tuple[Component, Template]] = []
+        elaborated: list[tuple[Component, Template]] = []
         for component in self.root.walk():
             for part in component.parts.values():
                 for connector in part.connectors.values():
                     connector.__dict__["_used"] = not connector.optional
             template = template_of(component)
-            found.append((component, template))
+            elaborated.append((component, template))
             for statement in template.connections:
                 self.wiring.add(component, statement)
             for name, unit in template.inferred.items():
                 self.wiring.inferred[id(component), name] = unit
-        return found
+        return elaborated
 
     # -- declarations ------------------------------------------------------------------------------------------------
 

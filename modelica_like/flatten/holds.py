@@ -66,10 +66,10 @@ def ideal_forms(component: Component, residuals: list[Any]) -> tuple[IdealForm, 
         symbol = symbol_of(component, mode.name)
         zeros = [_variable(component, mode, mode.ideal[name], "variable") for name in mode.names]
         for row, residual in enumerate(residuals):
-            own = [ca.substitute(residual, symbol, ca.SX(k)) for k in range(2)]
+            cases = [ca.substitute(residual, symbol, ca.SX(k)) for k in range(2)]
             if all(
                 _only(one, zero) and _number(ca.jacobian(one, zero)) != 0.0
-                for one, zero in zip(own, zeros, strict=True)
+                for one, zero in zip(cases, zeros, strict=True)
             ):
                 forms.append(IdealForm(mode.name, (zeros[0].name, zeros[1].name), row))
                 break
@@ -133,9 +133,9 @@ def _value(component: Component, name: str) -> Any:
 
 
 def _variable(component: Component, mode: Mode, name: str, role: str) -> Symbol:
-    found = _value(component, name) if hasattr(component, name) else None
-    if isinstance(found, Symbol) and _is_variable(found) and found.owner is component and not found.order:
-        return found
+    symbol = _value(component, name) if hasattr(component, name) else None
+    if isinstance(symbol, Symbol) and _is_variable(symbol) and symbol.owner is component and not symbol.order:
+        return symbol
     raise LanguageError(
         f"{mode.label} holds the {role} '{name}', which is not a variable of {type(component).__name__}.",
         advice="Name a variable, or a property that returns one.",

@@ -112,8 +112,10 @@ class Parameters:
         if value.formula is None:
             return value.number
         expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scope, path, label), self._quantity))
-        found = [one for one in ca.symvar(expression) if leaf_id(one) in self._quantities]
-        result = ca.substitute(expression, column(found), column(self._quantities[leaf_id(one)][1] for one in found))
+        quantities = [one for one in ca.symvar(expression) if leaf_id(one) in self._quantities]
+        result = ca.substitute(
+            expression, column(quantities), column(self._quantities[leaf_id(one)][1] for one in quantities)
+        )
         if result.is_constant() and not math.isfinite(float(result)):
             raise ValueOutOfRange(f"{label} must be a finite number, not {float(result):g}.")
         if getattr(scope, "units_checked", True):
@@ -139,11 +141,11 @@ class Parameters:
         owner = scope.find(owner_path)
         field = owner.fields.get(name)
         if not isinstance(field, Parameter | Input):
-            known = [key for key, one in owner.fields.items() if isinstance(one, Parameter)]
-            raise unknown("parameter", f"{label}: {owner.label}", path, known, {path: owner.renamed.get(name, "")})
-        found = self._q[self.position(owner, name)]
+            names = [key for key, one in owner.fields.items() if isinstance(one, Parameter)]
+            raise unknown("parameter", f"{label}: {owner.label}", path, names, {path: owner.renamed.get(name, "")})
+        value = self._q[self.position(owner, name)]
         # A constant has a unit, too.
-        return self._constant(path, float(found), unit_of_field(owner, name)) if found.is_constant() else found
+        return self._constant(path, float(value), unit_of_field(owner, name)) if value.is_constant() else value
 
     def position(self, component: Component, name: str) -> int:
         """Return the position of a parameter in q.

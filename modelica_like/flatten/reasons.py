@@ -30,9 +30,9 @@ def reason(transition: Transition, path: Callable[[Symbol], str]) -> str:
     """
     if transition.because or transition.when is None:
         return transition.because or "its time is reached"
-    told = _condition(transition.when, path)
-    if len(told) <= _LONGEST and "…" not in told:
-        return told
+    text = _condition(transition.when, path)
+    if len(text) <= _LONGEST and "…" not in text:
+        return text
     named = dict.fromkeys(path(one) for one in symbols_in(transition.when) if not isinstance(_field(one), Parameter))
     return f"its condition on {', '.join(named)} holds"
 
@@ -69,16 +69,16 @@ def _side(expression: Any, path: Callable[[Symbol], str]) -> str:
     symbols = symbols_in(expression)
     named = [ca.SX.sym(path(one) if not one.order else f"der({path(one)})") for one in symbols]
     (plain,) = ca.substitute([expression], [ca.vertcat(*symbols)], [ca.vertcat(*named)])
-    told = re.sub(r"(?<![\w.])\d[\d.]*(e[+-]?\d+)?", lambda number: f"{float(number[0]):g}", str(plain))
-    told = re.sub(r"\(([\w.]+[*/][\w.]+)\)", r"\1", re.sub(r"fabs\(([^()]*)\)", r"|\1|", told))
-    told = re.sub(r"^\((.*)\)$", r"\1", told)
+    text = re.sub(r"(?<![\w.])\d[\d.]*(e[+-]?\d+)?", lambda number: f"{float(number[0]):g}", str(plain))
+    text = re.sub(r"\(([\w.]+[*/][\w.]+)\)", r"\1", re.sub(r"fabs\(([^()]*)\)", r"|\1|", text))
+    text = re.sub(r"^\((.*)\)$", r"\1", text)
     field = _field(symbols[0])
     if plain.is_symbolic() and isinstance(field, Parameter):
-        return f"{{{told}}}"
-    lone = len(symbols) == 1 and not symbols[0].order and told.strip("|") == path(symbols[0])
+        return f"{{{text}}}"
+    lone = len(symbols) == 1 and not symbols[0].order and text.strip("|") == path(symbols[0])
     words = re.split(r"[,;:(]", getattr(field, "description", ""))[0].split() if lone else []
-    told = " ".join([*words, told]) if len(words) <= _WORDS else told
-    return told if len(told) <= _TERM and not set(told) & set("@?") else "…"
+    text = " ".join([*words, text]) if len(words) <= _WORDS else text
+    return text if len(text) <= _TERM and not set(text) & set("@?") else "…"
 
 
 def _field(symbol: Symbol) -> Any:

@@ -158,7 +158,7 @@ def _is_within(end: Connector | Symbol, scope: Component) -> bool:
 def _givers(scope: Component, ends: Iterable[Connector | Symbol]) -> list[Symbol]:
     """Return what gives a connection its signal: an own input, a part's output, or an own output without these."""
     kinds = [(one, one.owner is scope, one.owner.fields[one.name]) for one in ends if isinstance(one, Symbol)]
-    first = [one for one, own, kind in kinds if isinstance(kind, Input if own else Output)]
+    first = [one for one, kind_of, kind in kinds if isinstance(kind, Input if kind_of else Output)]
     return first or [one for one, _, kind in kinds if isinstance(kind, Output)]
 
 
@@ -166,8 +166,8 @@ def taken(scope: Component, connection: Connection) -> list[str]:
     """Return the own signals that a connection determines, and the own connectors in it."""
     connectors = [one._name for one in connection.ends if isinstance(one, Connector) and one._owner is scope]
     givers = [id(one) for one in _givers(scope, connection.ends)]
-    own = [one for one in connection.ends if isinstance(one, Symbol) and one.owner is scope]
-    return connectors + [one.name for one in own if id(one) not in givers]
+    signals = [one for one in connection.ends if isinstance(one, Symbol) and one.owner is scope]
+    return connectors + [one.name for one in signals if id(one) not in givers]
 
 
 def _name(end: Connector | Symbol) -> str:
@@ -190,8 +190,8 @@ def _fitting(first: Connector, second: Connector) -> str:
     """Return the connection that is meant where a part has one other end of the kind."""
     for end, other in ((first, second), (second, first)):
         owner = other._owner
-        own = owner.connectors.values() if isinstance(owner, Component) else ()
-        ends = [one for one in own if type(one) is type(end) and not one.optional]
+        connectors = owner.connectors.values() if isinstance(owner, Component) else ()
+        ends = [one for one in connectors if type(one) is type(end) and not one.optional]
         if len(ends) == 1:
             meant = [end.label, ends[0].label] if end is first else [ends[0].label, end.label]
             return f'To join them, write in [connect]: joint = ["{meant[0]}", "{meant[1]}"]'

@@ -98,10 +98,10 @@ class _Writer:
     def write(self) -> Element:
         """Write all parts in the order of the schema."""
         about, face = self.about, self.face
-        own = {"guid": about.token, "numberOfEventIndicators": len(face.indicators)}
+        token = {"guid": about.token, "numberOfEventIndicators": len(face.indicators)}
         top = Element("fmiModelDescription", {
             "fmiVersion": about.version, "modelName": self.model.name,
-            **(own if self.second else {"instantiationToken": about.token}), "description": about.description or None,
+            **(token if self.second else {"instantiationToken": about.token}), "description": about.description or None,
             "generationTool": about.tool, "variableNamingConvention": "structured",
         })  # fmt: skip
         (self._kinds2 if self.second else self._kinds3)(top)
@@ -126,11 +126,11 @@ class _Writer:
             "modelIdentifier": identifier(self.model.name), "canGetAndSetFMUstate": True, "canSerializeFMUstate": True,
             "providesDirectionalDerivative": True,
         }  # fmt: skip
-        own = {
+        attributes = {
             "canHandleVariableCommunicationStepSize": not self.about.fixed_step, "canInterpolateInputs": True,
             "maxOutputDerivativeOrder": 3,
         }  # fmt: skip
-        for kind, tag, more in (("me", "ModelExchange", {}), ("cs", "CoSimulation", own)):
+        for kind, tag, more in (("me", "ModelExchange", {}), ("cs", "CoSimulation", attributes)):
             if kind in self.about.kinds:
                 files = element(element(top, tag, **common, **more), "SourceFiles")
                 for name in self.about.sources:
@@ -210,11 +210,11 @@ class _Writer:
 
     def _structure(self, structure: Element) -> None:
         face = self.face
-        own = {*face.states, *face.derivatives, *face.outputs}
+        listed = {*face.states, *face.derivatives, *face.outputs}
         initial = (
             one.reference
             for one in face.variables
-            if (one.reference in own and one.initial != "exact") or one.causality == "calculatedParameter"
+            if (one.reference in listed and one.initial != "exact") or one.causality == "calculatedParameter"
         )
         groups = (
             ("Output", "Outputs", face.outputs), ("ContinuousStateDerivative", "Derivatives", face.derivatives),
@@ -225,18 +225,24 @@ class _Writer:
                 continue
             parent = element(structure, group) if self.second else structure
             for one in (face.variables[k] for k in references):
-                known = self._known(one, tag == "InitialUnknown")
+                dependencies = self._known(one, tag == "InitialUnknown")
                 place = {"index": one.reference + 1} if self.second else {"valueReference": one.reference}
-                kinds = None if known is None else ["dependent"] * len(known)
-                element(parent, "Unknown" if self.second else tag, **place, dependencies=known, dependenciesKind=kinds)
+                kinds = None if dependencies is None else ["dependent"] * len(dependencies)
+                element(
+                    parent,
+                    "Unknown" if self.second else tag,
+                    **place,
+                    dependencies=dependencies,
+                    dependenciesKind=kinds,
+                )
 
     def _known(self, one: FmuVariable, initial: bool) -> list[int] | None:
         """On what an unknown depends; None for all, where a list would be longer than useful."""
         if one.slot[0] == "discrete" and not initial:
             return None  # in event mode a mode depends on more than states and inputs
-        found = self.dependencies.initial(one) if initial else self.dependencies.continuous(one)
-        if len(found) > _MOST_DEPENDENCIES:
+        references = self.dependencies.initial(one) if initial else self.dependencies.continuous(one)
+        if len(references) > _MOST_DEPENDENCIES:
             return None
         if self.second:
-            return [k + 1 for k in found]
-        return list(dict.fromkeys(self.arrays[k].reference if k in self.arrays else k for k in found))
+            return [k + 1 for k in references]
+        return list(dict.fromkeys(self.arrays[k].reference if k in self.arrays else k for k in references))

@@ -48,9 +48,9 @@ def index_page(interface: Interface, description: str, tool: str, equations: Lis
         f"{escape(tool)} from an acausal model; the C sources are in <code>sources/</code>.</p>",
     ]  # fmt: skip
     for heading, causalities in _GROUPS:
-        found = [one for one in interface.variables if one.causality in causalities and one.slot[0] != "guard"]
-        if found:
-            parts += [f"<h2>{heading}</h2>", _table(found)]
+        variables = [one for one in interface.variables if one.causality in causalities and one.slot[0] != "guard"]
+        if variables:
+            parts += [f"<h2>{heading}</h2>", _table(variables)]
     if equations:
         parts += ["<h2>Equations</h2>", *(_component(*one) for one in equations)]
     return "\n".join([*(part for part in parts if part), "</body>", "</html>", ""])

@@ -133,22 +133,22 @@ def silent(_: str) -> None:
 # -- what is asked for -------------------------------------------------------------------------------------------------
 
 
-def _modes(asked: str) -> ModesAs:
+def _modes(modes: str) -> ModesAs:
     for one in get_args(ModesAs):
-        if asked == one:
+        if modes == one:
             return one
-    raise UnknownName(f"Modes cannot be exported as '{asked}'.", advice=f"There are {', '.join(get_args(ModesAs))}.")
+    raise UnknownName(f"Modes cannot be exported as '{modes}'.", advice=f"There are {', '.join(get_args(ModesAs))}.")
 
 
 def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
-    asked = {kind} if isinstance(kind, str) else set(kind)
-    for one in sorted(asked - set(get_args(Kind))):
+    kinds = {kind} if isinstance(kind, str) else set(kind)
+    for one in sorted(kinds - set(get_args(Kind))):
         raise UnknownName(
             f"There is no kind of FMU '{one}'.", advice="There are me (Model Exchange) and cs (Co-Simulation)."
         )
-    if not asked:
+    if not kinds:
         raise ExportError("An FMU needs a kind.", advice="Ask for me (Model Exchange), cs (Co-Simulation) or both.")
-    return tuple(one for one in get_args(Kind) if one in asked)
+    return tuple(one for one in get_args(Kind) if one in kinds)
 
 
 def _fixed_step(step: float | str | None, kinds: tuple[Kind, ...]) -> float:
@@ -261,16 +261,16 @@ def _binaries(
     """Return the run-time for each platform, or one with the model compiled in, by path in the FMU."""
     home = "sources/"
     sources = {place.removeprefix(home): text.decode() for place, text in files.items() if place.startswith(home)}
-    own = {file: text for file, text in sources.items() if file.endswith((".c", ".h"))}
-    found: dict[str, bytes] = {}
+    c_sources = {file: text for file, text in sources.items() if file.endswith((".c", ".h"))}
+    binaries: dict[str, bytes] = {}
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
         for one in platforms:
             if embed:
                 tell(f"compiling for {one}")
-            library = build(own, one, Path(folder)) if embed else runtime_library(one, tell)
+            library = build(c_sources, one, Path(folder)) if embed else runtime_library(one, tell)
             place = PLATFORMS[one].fmi2 if version == "2.0" else one
-            found[f"binaries/{place}/{name}{library.suffix}"] = library.read_bytes()
-    return found
+            binaries[f"binaries/{place}/{name}{library.suffix}"] = library.read_bytes()
+    return binaries
 
 
 def _written(
@@ -279,10 +279,10 @@ def _written(
     """Write an FMU that passes its checks, after a comparison with IDAS; draw curves that differ next to it."""
     with replacing(target) as draft:
         write_archive(draft, files)
-        found = problems(draft)
-        if found:
+        faults = problems(draft)
+        if faults:
             raise ExportError(
-                f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is an error of the exporter."
+                f"The FMU does not pass its checks: {'; '.join(faults[:3])}.", why="This is an error of the exporter."
             )
         kind = "cs" if "cs" in about.kinds else "me"
         check = compare_with_idas(draft, model, kind, about.fixed_step) if run else Check()

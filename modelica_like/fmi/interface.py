@@ -140,11 +140,11 @@ class _Builder:
         self.indicators: dict[int, int] = {}
         paths, chosen = [one.path for one in model.flat_variables], set[str]()
         for pattern in outputs:
-            found = [path for path in paths if fnmatchcase(path, pattern.replace("[", "[[]"))]
-            if not found:
+            matches = [path for path in paths if fnmatchcase(path, pattern.replace("[", "[[]"))]
+            if not matches:
                 hint = did_you_mean(pattern, paths) or "."
                 raise UnknownName(f"{model.name} has no variable '{pattern}' that could be an output{hint}")
-            chosen.update(found)
+            chosen.update(matches)
         self.wanted = lambda one: one.kind == "output" or one.path in chosen
         self.starts = _Starts(model)
         self.reach = Reach(model.variables)
@@ -247,9 +247,9 @@ class _Builder:
             mode = self.model.flat_discretes[one.mode]
             every = len(one.sources) == len(mode.names)
             leaving = "any mode" if every else " or ".join(mode.names[k] for k in one.sources)
-            told = f"{mode.path}: {leaving} → {mode.names[one.target]} above zero"
+            description = f"{mode.path}: {leaving} → {mode.names[one.target]} above zero"
             name = f"event_indicator[{one.index + 1}]"
-            self.indicators[one.index] = self.add(name, ("guard", one.index), description=told)
+            self.indicators[one.index] = self.add(name, ("guard", one.index), description=description)
 
     def arrays(self) -> Iterator[FmuVariable]:
         """Tables: parameters `clutch.mu_pos[2,1]` belong together."""

@@ -271,10 +271,10 @@ def _place(model: CompiledDae, reset: Reset) -> int:
 
 def _counted(counts: Iterable[int]) -> list[tuple[int, int]]:
     """Pairs of first entry and count."""
-    found: list[tuple[int, int]] = []
+    result: list[tuple[int, int]] = []
     for count in counts:
-        found.append((sum(found[-1]) if found else 0, count))
-    return found
+        result.append((sum(result[-1]) if result else 0, count))
+    return result
 
 
 def _holds(model: CompiledDae, text: _Text) -> dict[str, Any]:
@@ -310,8 +310,8 @@ def _moved_from_outside(model: CompiledDae) -> set[int]:
 
 def _notice(path: str, notice: str) -> str:
     """Put the component's name before a notice, and names of parameters in place of their values."""
-    told = re.sub(r"\{(.*?)\}", r"\1", notice)
-    return f"{path.rpartition('.')[0]} {told}".strip() if notice else ""
+    sentence = re.sub(r"\{(.*?)\}", r"\1", notice)
+    return f"{path.rpartition('.')[0]} {sentence}".strip() if notice else ""
 
 
 def _starts(start: StartTables, n_x: int, n_z: int, n_y: int) -> dict[str, Any]:

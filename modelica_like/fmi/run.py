@@ -93,8 +93,8 @@ def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:
         tell_error(folder, {"": path.name})
         table = np.load(folder / "result.npy", max_header_size=_HEADER)  # names of all columns
         meta = json.loads((folder / "meta.json").read_text())
-    known = (RecordedVariable(**{**one, "names": dict(one["names"])}) for one in meta["variables"])
-    columns = [one for one in known if one.path in table.dtype.names]
+    variables = (RecordedVariable(**{**one, "names": dict(one["names"])}) for one in meta["variables"])
+    columns = [one for one in variables if one.path in table.dtype.names]
     parts = [tuple(one for one in columns if (one.kind == "discrete") is modes) for modes in (False, True)]
     constants = {name: float(job["parameters"].get(name, value)) for name, value in meta["constants"].items()}
     model = RecordedModel(meta["name"], parts[0], parts[1], constants)

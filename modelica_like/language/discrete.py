@@ -67,18 +67,18 @@ def marker(kind: MarkerKind, of: Expr, offset: Scalar = 0.0) -> Marker:
     """Return the marker for an expression, the same one for equal expressions."""
     wanted: Any = ca.vertcat(of, offset)
     owner = _owner_in(of)
-    known: list[Marker] = _timed if owner is None else owner.__dict__.setdefault("_markers", [])
-    same = (one for one in known if one.kind == kind and ca.is_equal(ca.vertcat(one.of, one.offset), wanted, 99))
-    found = next(same, None)
-    if found is None:
-        known.append(found := Marker(kind, of, offset))
-    return found
+    markers: list[Marker] = _timed if owner is None else owner.__dict__.setdefault("_markers", [])
+    same = (one for one in markers if one.kind == kind and ca.is_equal(ca.vertcat(one.of, one.offset), wanted, 99))
+    match = next(same, None)
+    if match is None:
+        markers.append(match := Marker(kind, of, offset))
+    return match
 
 
 def _owner_in(expression: Expr) -> Any:
     """Return the owner of a symbol in an expression, or None where time decides alone."""
-    found = (_owner_in(one.of) if isinstance(one, Marker) else one.owner for one in symbols_in(expression))
-    return next((owner for owner in found if owner is not None), None)
+    owners = (_owner_in(one.of) if isinstance(one, Marker) else one.owner for one in symbols_in(expression))
+    return next((owner for owner in owners if owner is not None), None)
 
 
 def moves(expression: Expr) -> bool:
@@ -188,8 +188,8 @@ def edge(condition: Expr) -> Expr:
         LanguageError: it is no condition.
     """
     plain = isinstance(condition, Symbol) and condition.owner is not None and not moves(condition)
-    known = condition if plain else marker("was", eventful(condition))
-    return ca.logic_and(cast(Any, known), ca.logic_not(cast(Any, pre(known))))
+    before = condition if plain else marker("was", eventful(condition))
+    return ca.logic_and(cast(Any, before), ca.logic_not(cast(Any, pre(before))))
 
 
 def change(value: Expr) -> Expr:

@@ -148,14 +148,14 @@ class Formula(Arithmetic):
             return self.operands[0] if outer <= 3 else f"({self.operands[0]})"
         if self.operation in _FUNCTIONS:
             return f"{self.operation}({', '.join(str(operand) for operand in self.operands)})"
-        own = _PRECEDENCE[self.operation]
+        precedence = _PRECEDENCE[self.operation]
         if self.operation == "neg":
-            text = f"-{self.operands[0]._text(own)}"
+            text = f"-{self.operands[0]._text(precedence)}"
         elif self.operation == "**":
-            text = f"{self.operands[0]._text(own + 1)}**{self.operands[1]._text(own)}"
+            text = f"{self.operands[0]._text(precedence + 1)}**{self.operands[1]._text(precedence)}"
         else:
-            text = f"{self.operands[0]._text(own)} {self.operation} {self.operands[1]._text(own + 1)}"
-        return f"({text})" if own < outer else text
+            text = f"{self.operands[0]._text(precedence)} {self.operation} {self.operands[1]._text(precedence + 1)}"
+        return f"({text})" if precedence < outer else text
 
 
 def as_formula(value: Any) -> Formula:
@@ -202,10 +202,10 @@ def _without_quantities(text: str) -> tuple[str, dict[str, str]]:
 
     def name(match: re.Match[str]) -> str:
         try:
-            known = match.group(2) not in _CONSTANTS and parse_unit(match.group(2)).factor
+            is_name = match.group(2) not in _CONSTANTS and parse_unit(match.group(2)).factor
         except UnitError:
-            known = False
-        if not known:
+            is_name = False
+        if not is_name:
             return match.group()
         placeholder = _PLACEHOLDER.format(len(quantities))
         quantities[placeholder] = match.group()

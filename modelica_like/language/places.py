@@ -148,11 +148,11 @@ def _without_comments(lines: list[str]) -> str:
 
 def texts_of_fields(kind: type) -> dict[str, str]:
     """Return the texts below the annotated fields in the bodies of a component class and its bases."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         if not (base is object or base.__module__.startswith("modelica_like.language")):
-            found |= _own_texts(base)
-    return found
+            texts |= _own_texts(base)
+    return texts
 
 
 @cache

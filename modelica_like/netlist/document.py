@@ -195,8 +195,8 @@ def read_sections(
     for key, value in data.items():
         try:
             if key not in readers:
-                known = ", ".join(readers)
-                raise UnknownName(f"{what} has no entry '{key}'{did_you_mean(key, readers) or '.'} It has {known}.")
+                sections = ", ".join(readers)
+                raise UnknownName(f"{what} has no entry '{key}'{did_you_mean(key, readers) or '.'} It has {sections}.")
             read[key] = readers[key](key, value, lines, errors)
         except ModelicaLikeError as error:
             errors.append(_placed(error, lines.source(key)))

@@ -30,8 +30,8 @@ class Quantities:
     """
 
     def __init__(self, units: Iterable[str]) -> None:
-        known = {parse_unit(text) for text in (*units, *_USUAL)} | {parse_unit(name) for name in ATOMS}
-        self._patterns = {unit: _pattern(unit) for unit in sorted(known, key=str) if unit.atoms and unit != ANY}
+        named_units = {parse_unit(text) for text in (*units, *_USUAL)} | {parse_unit(name) for name in ATOMS}
+        self._patterns = {unit: _pattern(unit) for unit in sorted(named_units, key=str) if unit.atoms and unit != ANY}
         self._used: dict[str, Unit] = {}
 
     def text(self, unit: Unit) -> dict[str, Any]:
@@ -44,17 +44,17 @@ class Quantities:
 
     def definitions(self) -> dict[str, Any]:
         """Return the schemas to which those of `text` refer."""
-        found = {
+        schemas = {
             name: {"type": "string", "anyOf": [{"pattern": self._of(unit)}, {"$ref": f"#/definitions/{_UNKNOWN}"}]}
             for name, unit in self._used.items()
         }
-        return {_UNKNOWN: {"not": {"pattern": _whole([*self._patterns.values(), _WRONG])}}} | found
+        return {_UNKNOWN: {"not": {"pattern": _whole([*self._patterns.values(), _WRONG])}}} | schemas
 
     def _of(self, unit: Unit) -> str:
         return _whole(
             pattern
-            for known, pattern in self._patterns.items()
-            if same_dimension(known, unit) and not counts_turns(known, unit)
+            for listed, pattern in self._patterns.items()
+            if same_dimension(listed, unit) and not counts_turns(listed, unit)
         )
 
 

@@ -117,11 +117,11 @@ class _Writer:
         for name in part.modes:
             if part.start_mode(name) != reference.start_mode(name):
                 self.start[f"{path}.{name}"] = part.start_mode(name)
-        known = reference.parts
+        parts = reference.parts
         for name, inner in part.parts.items():
-            if type(inner) is not type(known[name]):
+            if type(inner) is not type(parts[name]):
                 table[name] = self.entry(f"{path}.{name}", inner)
-            elif change := self.changes(f"{path}.{name}", inner, known[name]):
+            elif change := self.changes(f"{path}.{name}", inner, parts[name]):
                 table[name] = change
         return table
 

@@ -93,10 +93,10 @@ class Collector:
                 self._values[k] = fitted.first(row)
 
     def _take(self, k: int, value: float, time: float) -> None:
-        known = self._values[k]
-        if not value <= known + SAME * abs(known):
+        previous = self._values[k]
+        if not value <= previous + SAME * abs(previous):
             self._times[k] = time
-        self._values[k] = np.fmax(known, value)
+        self._values[k] = np.fmax(previous, value)
 
     def finish(self, record: Recorder | Solution) -> list[Number]:
         """Return the numbers, with both sides of every event of the run and with its end."""
@@ -139,14 +139,14 @@ class Collector:
     def _change(self, record: Recorder | Solution, part: Part) -> float:
         before, after, number = part.change
         names = self._model.flat_discretes[self._model.discrete_position[part.text]].names
-        found = [
+        times = [
             one.time
             for one in record.events
             if one.mode == part.text
             and (before < 0 or one.before == names[before])
             and (after < 0 or one.after == names[after])
         ]
-        return found[number - 1] if len(found) >= number else np.nan
+        return times[number - 1] if len(times) >= number else np.nan
 
 
 def collector(model: CompiledDae, names: Sequence[str], atol: float) -> Collector:

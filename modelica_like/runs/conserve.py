@@ -82,8 +82,8 @@ def conserving(run: Solution, repeat: Callable[[Options], Solution]) -> Solution
         run = repeat(replace(run.options, max_step=step))
         left = find_astray(run)
         if left is None:
-            told = f"{first.told}: the run was repeated with steps of at most {step:.3g} s."
-            return replace(run, notices=(*run.notices, told), _cache={})
+            notice = f"{first.told}: the run was repeated with steps of at most {step:.3g} s."
+            return replace(run, notices=(*run.notices, notice), _cache={})
         astray = left
     error = EnergyDrift(
         f"{astray.told}, also with steps of at most {step:.3g} s.",

@@ -123,10 +123,14 @@ class Curves(Shown):
         ours, theirs = (run.together(*names) for run in (self.first, self.second))
         # After the events at the start: what writes a table may leave out the values before.
         k, n = (int(np.searchsorted(run.time, run.time[0], "right")) - 1 for run in (self.first, self.second))
-        found = (StartDifference(r.signal, r.unit, float(ours[r.signal][k]), float(theirs[r.signal][n])) for r in rows)
+        differences = (
+            StartDifference(r.signal, r.unit, float(ours[r.signal][k]), float(theirs[r.signal][n])) for r in rows
+        )
         scales = (row.largest / row.relative for row in rows)
         return tuple(
-            one for one, scale in zip(found, scales, strict=True) if abs(one.second - one.first) > _SAME_START * scale
+            one
+            for one, scale in zip(differences, scales, strict=True)
+            if abs(one.second - one.first) > _SAME_START * scale
         )
 
     def __getitem__(self, signal: str) -> Deviation:
@@ -204,11 +208,11 @@ def compare_solutions(
     return Curves(first, second, ordered, events, labels, grid.interpolated)
 
 
-def _instants(events: Sequence[Event], start: float, known: set[str]) -> dict[str, list[tuple[float, str]]]:
+def _instants(events: Sequence[Event], start: float, modes: set[str]) -> dict[str, list[tuple[float, str]]]:
     """Return time and last mode of every instant after the start, by mode."""
     by_mode: dict[str, list[tuple[float, str]]] = {}
     for event in events:
-        if event.mode in known and event.time > start + _SAME_INSTANT:
+        if event.mode in modes and event.time > start + _SAME_INSTANT:
             instants = by_mode.setdefault(event.mode, [])
             if instants and event.time - instants[-1][0] < _SAME_INSTANT:
                 instants.pop()
@@ -218,22 +222,22 @@ def _instants(events: Sequence[Event], start: float, known: set[str]) -> dict[st
 
 def _match_events(first: Trajectories, second: Trajectories) -> list[EventDifference]:
     """Pair the changes of each mode that both have, in their order."""
-    known = set(first.model.discrete_position) & set(second.model.discrete_position)
-    ours, theirs = (_instants(run.events, float(run.time[0]), known) for run in (first, second))
-    found: list[EventDifference] = []
+    modes = set(first.model.discrete_position) & set(second.model.discrete_position)
+    ours, theirs = (_instants(run.events, float(run.time[0]), modes) for run in (first, second))
+    differences: list[EventDifference] = []
     for mode in {**ours, **theirs}:
         left, right = list(ours.get(mode, ())), list(theirs.get(mode, ()))
         while left or right:
             if left and right and left[0][1] == right[0][1]:
                 (t, after), (u, _) = left.pop(0), right.pop(0)
-                found.append(EventDifference(mode, after, t, u))
+                differences.append(EventDifference(mode, after, t, u))
             elif left and (not right or left[0][0] <= right[0][0]):
                 t, after = left.pop(0)
-                found.append(EventDifference(mode, after, t, None))
+                differences.append(EventDifference(mode, after, t, None))
             else:
                 u, after = right.pop(0)
-                found.append(EventDifference(mode, after, None, u))
-    return sorted(found, key=lambda event: min(t for t in (event.first, event.second) if t is not None))
+                differences.append(EventDifference(mode, after, None, u))
+    return sorted(differences, key=lambda event: min(t for t in (event.first, event.second) if t is not None))
 
 
 @dataclass(frozen=True)

@@ -89,10 +89,10 @@ def _rows(drive: Assembly, path: str, times: Any, values: Any, unit: str) -> lis
     owner, _, name = path.rpartition(".")
     fields = drive.find(owner).fields if owner == "" or _has(drive, owner) else {}
     if not isinstance(fields.get(name), Input):
-        known = [f"{one.path}.{key}".lstrip(".") for one in drive.walk() for key, field in one.fields.items()
+        paths = [f"{one.path}.{key}".lstrip(".") for one in drive.walk() for key, field in one.fields.items()
                  if isinstance(field, Input)]  # fmt: skip
-        raise UnknownName(f"{drive.label} has no input '{path}'{did_you_mean(path, known) or '.'}")
-    own = fields[name].unit
+        raise UnknownName(f"{drive.label} has no input '{path}'{did_you_mean(path, paths) or '.'}")
+    si_unit = fields[name].unit
     try:
         moments = [float(t) for t in times]
     except (TypeError, ValueError):
@@ -104,7 +104,7 @@ def _rows(drive: Assembly, path: str, times: Any, values: Any, unit: str) -> lis
             f"The times of the input '{path}' do not rise.", advice="For a jump, write two times close to each other."
         )
     numbers = [
-        to_si(f"{float(one)!r} {unit}" if unit else one.item() if isinstance(one, np.generic) else one, own, path)
+        to_si(f"{float(one)!r} {unit}" if unit else one.item() if isinstance(one, np.generic) else one, si_unit, path)
         for one in values
     ]
     return [list(row) for row in zip(moments, numbers, strict=True)]

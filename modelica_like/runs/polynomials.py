@@ -78,9 +78,9 @@ class Fitted:
         near = np.flatnonzero(tops + _RISE * np.ptp(grid, axis=1) >= best)
         same = best - SAME * abs(best)
         near = near[np.argsort(-np.minimum(tops[near], same), kind="stable")][:_CANDIDATES]
-        found = [self._top(row, piece, grid[piece]) for piece in near.tolist()]
-        best = max(value for value, _ in found)
-        return best, min(time for value, time in found if value >= best - SAME * abs(best))
+        peaks = [self._top(row, piece, grid[piece]) for piece in near.tolist()]
+        best = max(value for value, _ in peaks)
+        return best, min(time for value, time in peaks if value >= best - SAME * abs(best))
 
     def _top(self, row: int, piece: int, grid: Vector) -> tuple[float, float]:
         same = SAME * float(np.abs(grid).max())
@@ -94,16 +94,16 @@ class Fitted:
     def turning(self, row: int) -> Vector:
         """Return the values of an expression at its turning points and at the ends of pieces, in order."""
         grid = self._grid(row)
-        found: list[float] = []
+        places: list[float] = []
         for piece, line in enumerate(grid):
             rises = np.diff(line)
-            found.append(float(line[0]))
+            places.append(float(line[0]))
             for k in np.flatnonzero(rises[:-1] * rises[1:] < 0) + 1:
                 series = _TO_SERIES @ self.values[row, piece] * np.sign(rises[k - 1])
                 place = _climbed(series, _GRID[k - 1], _GRID[k], _GRID[k + 1])
-                found.append(float(np.sign(rises[k - 1]) * legendre.legval(place, series)))
-            found.append(float(line[-1]))
-        return np.array(found)
+                places.append(float(np.sign(rises[k - 1]) * legendre.legval(place, series)))
+            places.append(float(line[-1]))
+        return np.array(places)
 
     def within(self, begin: float, end: float) -> Fitted:
         """Return what lies between two times in s."""

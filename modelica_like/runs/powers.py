@@ -115,10 +115,10 @@ def _together(model: CompiledDae, segments: list[Segment]) -> Results:
     whole[2::2, count:] *= 1.0 - _DIGITS * _SIGNS
     d = np.array([segment.d for segment in segments]).T[:, np.append(owner, owner[some])]
     function = model.along("energy terms", lambda: _terms(model))
-    found = function(whole[0], whole[1 : 1 + nx], whole[1 + nx :], model.p, model.u, d)[0]
-    found, whole = found.reshape(-1, len(model.components), count + 3), whole[:, :count]
-    terms, first, last = found[..., :count], (ends - sizes)[owner], (ends - 1)[owner]
-    shaken = np.abs(found[..., count:] - terms[..., some])
+    columns = function(whole[0], whole[1 : 1 + nx], whole[1 + nx :], model.p, model.u, d)[0]
+    columns, whole = columns.reshape(-1, len(model.components), count + 3), whole[:, :count]
+    terms, first, last = columns[..., :count], (ends - sizes)[owner], (ends - 1)[owner]
+    shaken = np.abs(columns[..., count:] - terms[..., some])
     return Results(whole[0], whole[1 : 1 + nx], whole[1 + nx :], d[:, :count], first, last, terms, shaken)
 
 
@@ -273,14 +273,16 @@ class Powers:
             for rule, more in zip((best, lower), bends, strict=True):
                 rule[:, bent] += _mixed(more.reshape(POWERS, terms.shape[1], -1))
         near, far = np.abs(best - lower), np.abs(lower - lowest)
-        known = np.maximum(*np.abs(stored[:, ends[1]] - stored[:, ends[0]] - best[2:]))
+        change = np.maximum(*np.abs(stored[:, ends[1]] - stored[:, ends[0]] - best[2:]))
         smooth = np.maximum(*near[2:])
-        gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(known, smooth))
-        errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(known, smooth))
+        gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(change, smooth))
+        errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(change, smooth))
         allowed = self.options.rtol * max(self.moved, self.cancelled)
         # A weight that exactly balances a motion leaves nothing but rounding, which no finer result makes smaller.
         noise = self._noise[0] + self._noise[1] * np.abs(weights[:, 0].sum(axis=1))
-        return ~((errors <= np.maximum(self._share * allowed, noise)) & (known <= np.maximum(_ASTRAY * allowed, noise)))
+        return ~(
+            (errors <= np.maximum(self._share * allowed, noise)) & (change <= np.maximum(_ASTRAY * allowed, noise))
+        )
 
 
 def _summed(powers: Vector, places: Places, weights: Vector) -> Vector:

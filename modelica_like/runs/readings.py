@@ -124,10 +124,10 @@ def listed(names: str | Sequence[str], what: str) -> list[str]:
     Raises:
         ValueOutOfRange: there is none.
     """
-    found = [names] if isinstance(names, str) else list(names)
-    if not found:
+    result = [names] if isinstance(names, str) else list(names)
+    if not result:
         raise ValueOutOfRange(f"There is no {what}: give at least one name.")
-    return found
+    return result
 
 
 def is_series(name: str) -> bool:
@@ -196,9 +196,9 @@ def _plain(model: CompiledDae, name: str) -> Output:
     if last in _ENERGY and owner in model.components:
         return Output(name, _JOULE, "integral", name)
     if last in ("lock_time", "unlock_time"):
-        found = _holding_mode(model, owner)
-        if found is not None:
-            mode, held = found
+        holding = _holding_mode(model, owner)
+        if holding is not None:
+            mode, held = holding
             return Output(name, _SECOND, "time", mode, change=("", held, 1) if last == "lock_time" else (held, "", 1))
     return Output(name, expression_of(model, name)[1], "end", name)
 
@@ -268,11 +268,11 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
         rows = [model.components.index(owner)] if owner else list(range(len(model.components)))
         unit = _JOULE if last in (*_ENERGY, "stored_energy") else _WATT
         return lambda: ca.sum1(model.energy(*arguments)[rows, columns[last]]), unit
-    known = [*model.position, *(f"{one}.{last}" for one in model.components if last in columns)]
+    words = [*model.position, *(f"{one}.{last}" for one in model.components if last in columns)]
     if owner in model.components:
-        known += [f"{owner}.{word}" for word in (*columns, "lock_time", "unlock_time")]
+        words += [f"{owner}.{word}" for word in (*columns, "lock_time", "unlock_time")]
     raise UnknownName(
-        f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}",
+        f"{model.name} has no variable '{path}'{did_you_mean(path, words) or '.'}",
         advice="Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(…), at(…, time), first(… > …), "
         "duration(mode: name), series(…), time(mode: before -> after), and of components loss_energy, source_energy, "
         "lock_time, unlock_time.",

@@ -119,12 +119,12 @@ class RecordedSolution(Trajectories):
             return self._discretes[model.discrete_position[path]]
         if path in model.parameters:
             return np.full(len(self._time), model.parameters[path])
-        known = [*self.names, *model.parameters]
-        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
+        names = [*self.names, *model.parameters]
+        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, names) or '.'}")
 
     def __contains__(self, key: object) -> bool:
         path, model = self.path(key), self.model
-        return any(path in known for known in (model.position, model.discrete_position, model.parameters))
+        return any(path in positions for positions in (model.position, model.discrete_position, model.parameters))
 
     def at(self, t: float) -> Values:
         """Return all variables at a time, interpolated between the results (after an event at that time).

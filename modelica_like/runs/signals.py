@@ -62,8 +62,8 @@ class Signal:
         symbols = {name: ca.SX.sym(name) for name in names}
         value = self.formula.evaluate(symbols.__getitem__, lambda text: ca.SX(si_value(text)))
         columns = run.together(*names)
-        made: Any = ca.Function("shown", list(symbols.values()), [value])(*(columns[name][None] for name in names))
-        return np.asarray(made.full())[0]
+        result: Any = ca.Function("shown", list(symbols.values()), [value])(*(columns[name][None] for name in names))
+        return np.asarray(result.full())[0]
 
 
 def read_signals(model: Any, words: Iterable[str]) -> list[Signal]:
@@ -78,11 +78,11 @@ def read_signals(model: Any, words: Iterable[str]) -> list[Signal]:
         NetlistError: a text is no formula.
         UnitError: the units in a formula do not fit together.
     """
-    known = _units(model)
+    unit_of_path = _units(model)
     terms = {f"{one}.{term}" for one in getattr(model, "components", ()) for term in ENERGY_TERMS}
     names = [one.path for one in (*model.flat_variables, *model.flat_discretes) if not one.hidden]
     signs = {one.path: getattr(one, "driving", 1) for one in model.flat_variables}
-    found: dict[str, Signal] = {}
+    signals: dict[str, Signal] = {}
     for word in words:
         pool = sorted(terms) if word.rpartition(".")[2] in ENERGY_TERMS else names
         try:
@@ -91,11 +91,11 @@ def read_signals(model: Any, words: Iterable[str]) -> list[Signal]:
             formula = formula_of(word)
             if formula is None:
                 raise error from None
-            found[word] = Signal(word, unit_of(formula, known | _energies(terms), model.name), formula)
+            signals[word] = Signal(word, unit_of(formula, unit_of_path | _energies(terms), model.name), formula)
         else:
-            units = known | _energies(terms)
-            found |= {path: Signal(path, units[path], Formula("name", (path,)), signs.get(path, 1)) for path in paths}
-    return list(found.values())
+            units = unit_of_path | _energies(terms)
+            signals |= {path: Signal(path, units[path], Formula("name", (path,)), signs.get(path, 1)) for path in paths}
+    return list(signals.values())
 
 
 def named(model: Any, paths: Sequence[str]) -> list[Signal]:
@@ -148,10 +148,13 @@ def unit_of(formula: Formula, units: dict[str, str], model: str) -> str:
             raise UnknownName(f"'{formula}': {model} has no variable '{name}'{did_you_mean(name, units) or '.'}")
         return parse_unit(units[name])
 
-    found = formula.unit(unit)
-    if str(found) in QUANTITIES:
-        return str(found)
-    return next((one for one in QUANTITIES if one not in _KEPT and same_dimension(parse_unit(one), found)), str(found))
+    formula_unit = formula.unit(unit)
+    if str(formula_unit) in QUANTITIES:
+        return str(formula_unit)
+    return next(
+        (one for one in QUANTITIES if one not in _KEPT and same_dimension(parse_unit(one), formula_unit)),
+        str(formula_unit),
+    )
 
 
 def si_value(text: str) -> float:

@@ -97,14 +97,14 @@ class Solution(Trajectories):
         owner, _, term = path.rpartition(".")
         if term in ENERGY_TERMS and owner in model.components:
             return energy_term(model, self.segments, model.components.index(owner), ENERGY_TERMS.index(term))
-        known = [*model.position, *model.discrete_position, *model.parameter_position, *model.derived_position]
-        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
+        names = [*model.position, *model.discrete_position, *model.parameter_position, *model.derived_position]
+        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, names) or '.'}")
 
     def __contains__(self, key: object) -> bool:
         path = self.path(key)  # type: ignore[arg-type]
         model = self.model
-        known = (model.position, model.discrete_position, model.parameter_position, model.derived_position)
-        return any(path in one for one in known) or differentiated(path) in model.position
+        positions = (model.position, model.discrete_position, model.parameter_position, model.derived_position)
+        return any(path in one for one in positions) or differentiated(path) in model.position
 
     @property
     def _small(self) -> bool:
@@ -122,10 +122,10 @@ class Solution(Trajectories):
             UnknownName: there is no such variable.
         """
         paths = [self.path(key) for key in keys]
-        found = list(dict.fromkeys(path for path in paths if path in self.model.position and not self._small))
-        rows = [self.model.position[path] for path in found]
-        known = dict(zip(found, variables(self.model, self.segments, rows), strict=True)) if found else {}
-        return {path: known[path] if path in known else self[path] for path in paths}
+        names = list(dict.fromkeys(path for path in paths if path in self.model.position and not self._small))
+        rows = [self.model.position[path] for path in names]
+        columns = dict(zip(names, variables(self.model, self.segments, rows), strict=True)) if names else {}
+        return {path: columns[path] if path in columns else self[path] for path in paths}
 
     def at(self, t: float) -> Values:
         """Return all variables at a time, integrated from the result before (after an event at that time).

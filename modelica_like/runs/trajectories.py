@@ -181,8 +181,8 @@ class Trajectories(Shown, ABC):
         from modelica_like.runs.results import read_after  # which has trajectories as results
 
         more = [name for name in names if name not in self.readings]
-        known = {**self.readings, **(dict(zip(more, read_after(self, more), strict=True)) if more else {})}
-        return [known[name] for name in names]
+        values = {**self.readings, **(dict(zip(more, read_after(self, more), strict=True)) if more else {})}
+        return [values[name] for name in names]
 
     def _check_within(self, t: float) -> None:
         first, last = float(self.time[0]), float(self.time[-1])
@@ -245,17 +245,17 @@ def matching(model: Any, patterns: Sequence[str]) -> list[str]:
     return fitting((*model.position, *model.discrete_position), patterns, f"{model.name} has no variable")
 
 
-def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
+def fitting(candidates: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
     """Return the names that match patterns, a name itself before all; `missing` begins the message where none does.
 
     Raises:
         UnknownName: nothing matches a pattern.
     """
     names: dict[str, None] = {}
-    every = set(known)
+    every = set(candidates)
     for pattern in patterns:
-        some = [pattern] if pattern in every else [name for name in known if fnmatchcase(name, pattern)]
+        some = [pattern] if pattern in every else [name for name in candidates if fnmatchcase(name, pattern)]
         if not some:
-            raise UnknownName(f"{missing} '{pattern}'{did_you_mean(pattern, known) or '.'}")
+            raise UnknownName(f"{missing} '{pattern}'{did_you_mean(pattern, candidates) or '.'}")
         names.update(dict.fromkeys(some))
     return list(names)

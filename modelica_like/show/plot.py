@@ -52,17 +52,17 @@ def plot(
     """
     shown = Display(solution.model, display)
     modes = {one.path for one in solution.model.flat_discretes if one.names}
-    asked = read_signals(solution.model, patterns)
+    chosen = read_signals(solution.model, patterns)
     units = [one for one in _USUAL if one in (*_on_page(solution), *_BESIDE)]
-    curves = [one for one in asked if one.name not in modes] if asked else usual(solution, units)
+    curves = [one for one in chosen if one.name not in modes] if chosen else usual(solution, units)
     values = evaluated(solution, curves)
     groups: dict[tuple[str, str], list[Signal]] = {}
     for one in curves:
         groups.setdefault((quantity_of(one), one.shown_in(shown)), []).append(one)
-    panels, left = _panels(groups, 0 if asked else _MOST_PANELS[0])
-    bands, unbanded = bands_of(solution, [one.name for one in asked if one.name in modes])
+    panels, left = _panels(groups, 0 if chosen else _MOST_PANELS[0])
+    bands, unbanded = bands_of(solution, [one.name for one in chosen if one.name in modes])
     marks, unmarked = marks_of(solution, [band.mode for band in bands])
-    left += [] if asked else _quantities_left(solution, units)
+    left += [] if chosen else _quantities_left(solution, units)
     notes = [f"Not drawn: {', '.join(left)}; name them to draw them."] if left else []
 
     def draw(axes: Any, signals: Sequence[Signal]) -> None:
@@ -71,9 +71,9 @@ def plot(
             style = {"linestyle": "-" if k < len(COLOURS) else "--", "color": COLOURS[k % len(COLOURS)]}
             axes.plot(solution.time, curve, label=one.label, **style)
 
-    made = [Panel(name, unit, [one.label for one in some], lambda axes, some=some: draw(axes, some))
+    drawn = [Panel(name, unit, [one.label for one in some], lambda axes, some=some: draw(axes, some))
             for (name, unit), some in panels]  # fmt: skip
-    return draw_panels(title or solution.model.name, solution.time, made, bands, marks, [*notes, *unbanded, *unmarked])
+    return draw_panels(title or solution.model.name, solution.time, drawn, bands, marks, [*notes, *unbanded, *unmarked])
 
 
 def _panels(
@@ -102,9 +102,9 @@ def check_picture(path: Path) -> None:
     """
     from matplotlib.backend_bases import FigureCanvasBase
 
-    known = FigureCanvasBase.get_supported_filetypes()
-    if path.suffix.lower().lstrip(".") not in known:
-        raise NetlistError(f"'{path.name}': a picture can be {', '.join(sorted(known))}.")
+    formats = FigureCanvasBase.get_supported_filetypes()
+    if path.suffix.lower().lstrip(".") not in formats:
+        raise NetlistError(f"'{path.name}': a picture can be {', '.join(sorted(formats))}.")
     check_writable(path)
 
 
@@ -154,20 +154,20 @@ def for_page(solution: Trajectories, words: Sequence[str] = ()) -> tuple[list[Si
         modes = {one.path for one in solution.model.flat_discretes if one.names}
         return [one for one in read_signals(solution.model, words) if one.name not in modes], ""
     units = _on_page(solution)
-    found = {unit: usual(solution, [unit], slips=True) for unit in units}
+    signals = {unit: usual(solution, [unit], slips=True) for unit in units}
     left = [
         f"{len(some) - _MOST} of {len(some)} {_plural(quantity(unit))} ({listed([one.name for one in some[_MOST:]])})"
-        for unit, some in found.items()
+        for unit, some in signals.items()
         if len(some) > _MOST
     ]
     left += _quantities_left(solution, units)
-    told = f"Not drawn: {', '.join(left)}; --show draws them." if left else ""
-    return [one for some in found.values() for one in some[:_MOST]], told
+    note = f"Not drawn: {', '.join(left)}; --show draws them." if left else ""
+    return [one for some in signals.values() for one in some[:_MOST]], note
 
 
 def _on_page(solution: Trajectories) -> tuple[str, ...]:
-    known = {str(one.unit) for one in _of_parts(solution)}
-    return next((units for units in _ON_PAGES if known.intersection(units)), ())
+    part_units = {str(one.unit) for one in _of_parts(solution)}
+    return next((units for units in _ON_PAGES if part_units.intersection(units)), ())
 
 
 def usual(solution: Trajectories, units: Sequence[str], *, slips: bool = False) -> list[Signal]:
@@ -178,7 +178,7 @@ def usual(solution: Trajectories, units: Sequence[str], *, slips: bool = False) 
         units: coherent SI units.
         slips: also relative positions and angles.
     """
-    model, found = solution.model, dict[bytes, str]()
+    model, signals = solution.model, dict[bytes, str]()
     wanted = getattr(model, "settings", {}).get("display", {})
     for unit in units:
         some = [one.path for one in _of_parts(solution) if str(one.unit) == unit]
@@ -188,8 +188,8 @@ def usual(solution: Trajectories, units: Sequence[str], *, slips: bool = False) 
                 scale = float(np.abs(values).max())
                 curve = np.round(signs[path] * values / scale, 6) + 0.0
                 key = curve.tobytes() + f"{unit}{scale:.6g}".encode()
-                found[key] = path if key not in found or path in wanted else found[key]
-    return named(model, list(found.values()))
+                signals[key] = path if key not in signals or path in wanted else signals[key]
+    return named(model, list(signals.values()))
 
 
 def quantity_of(signal: Signal) -> str:

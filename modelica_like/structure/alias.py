@@ -75,9 +75,9 @@ class _Elimination:
                 if affected not in queued and affected not in used:
                     queued.add(affected)
                     queue.append(affected)
-        found = [self.find(node) for node in range(len(self.model.nodes))]
+        roots = [self.find(node) for node in range(len(self.model.nodes))]
         return Aliases(
-            root=[root for root, _ in found], factor=[factor for _, factor in found], known=self.known,
+            root=[root for root, _ in roots], factor=[factor for _, factor in roots], known=self.known,
             derivative={n: self._derivative(n) for n in self.derivative if self.parent[n] == n},
             remaining=sorted(self.remaining), contradictions=self.contradictions,
         )  # fmt: skip
@@ -107,11 +107,11 @@ class _Elimination:
         terms: dict[int, float | None] = {}
         sizes: dict[int, float] = {}
         products: list[tuple[Any, Any]] = []
-        find, known = self.find, self.known
+        find, values = self.find, self.known
         for node, coefficient in equation.terms:
             root, factor = find(node)
-            if root in known:
-                products.append((coefficient, factor * known[root]))
+            if root in values:
+                products.append((coefficient, factor * values[root]))
                 continue
             before = terms.get(root, 0.0)
             if before is None or isinstance(coefficient, Coefficient):
@@ -158,13 +158,13 @@ class _Elimination:
 
     def _causes(self, number: int) -> tuple[int, ...]:
         """Follow the values of the unknowns of an equation back to the equations that gave them."""
-        found = [number]
-        for one in found:
+        causes = [number]
+        for one in causes:
             for node, _ in self.model.linear[one].terms:
                 cause = self.cause.get(self.find(node)[0])
-                if cause is not None and cause not in found:
-                    found.append(cause)
-        ends = [one for one in found if len(self.model.linear[one].terms) == 1]
+                if cause is not None and cause not in causes:
+                    causes.append(cause)
+        ends = [one for one in causes if len(self.model.linear[one].terms) == 1]
         return tuple(ends if len(ends) > 1 else dict.fromkeys([number, *ends]))
 
     def _learn(self, root: int, value: Any) -> set[int]:
@@ -200,10 +200,10 @@ class _Elimination:
         return self.find(self.integral[root])[0]
 
     def _integrals(self, root: int) -> set[int]:
-        found: set[int] = set()
-        while root in self.integral and (root := self._integral_root(root)) not in found:
-            found.add(root)
-        return found
+        integrals: set[int] = set()
+        while root in self.integral and (root := self._integral_root(root)) not in integrals:
+            integrals.add(root)
+        return integrals
 
     def _merge(self, first: int, second: int, ratio: float) -> set[int]:
         """First = ratio * second."""

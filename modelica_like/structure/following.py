@@ -115,7 +115,7 @@ def singular_groups(system: System, counts: list[int], states: list[int]) -> tup
         counts: number of differentiations of each equation.
         states: chosen levels.
     """
-    entries, found = _entries(system, counts), list[Group]()
+    entries, groups = _entries(system, counts), list[Group]()
     for together in _connected(system, entries):
         count = max(counts[row] for row in together)
         part = {row: entries[row] for row in together if counts[row] == count}
@@ -124,8 +124,8 @@ def singular_groups(system: System, counts: list[int], states: list[int]) -> tup
         moves = any(moving for row in part.values() for level, moving in row.items() if level not in chosen)
         always = any(system.levels[level].preference == _ALWAYS for level in chosen)
         if moves and chosen and not always and _vanishes(system, [*part], sorted(levels - chosen)):
-            found.append(_group(system, part, count))
-    return tuple(found)
+            groups.append(_group(system, part, count))
+    return tuple(groups)
 
 
 def moving_chains(system: System, counts: list[int]) -> set[int]:
@@ -153,8 +153,8 @@ def _connected(system: System, entries: dict[int, dict[int, bool]]) -> list[list
     """Constraints that share chains."""
     chains = {row: {system.levels[level].chain for level in levels} for row, levels in entries.items()}
     users: dict[int, list[int]] = {}
-    for row, own in chains.items():
-        for chain in own:
+    for row, chains_of in chains.items():
+        for chain in chains_of:
             users.setdefault(chain, []).append(row)
     groups: list[list[int]] = []
     while chains:
@@ -183,23 +183,25 @@ def _vanishes(system: System, rows: list[int], dependent: list[int]) -> bool:
     points = nominal * spread(-np.pi, np.pi, (len(nominal), _SAMPLES))
     times = np.logspace(*_TIMES, _SAMPLES)[None]
     values = function.map(_SAMPLES)(points, *system.constants, times).full().T.reshape(_SAMPLES, len(rows), -1)
-    found = np.linalg.det(values[[bool(np.isfinite(one).all()) for one in values]])
-    sizes = np.abs(found)
-    return bool(len(found) and (found.min() < 0 < found.max() or sizes.min() < _VANISHES * sizes.max()))
+    determinants = np.linalg.det(values[[bool(np.isfinite(one).all()) for one in values]])
+    sizes = np.abs(determinants)
+    return bool(
+        len(determinants) and (determinants.min() < 0 < determinants.max() or sizes.min() < _VANISHES * sizes.max())
+    )
 
 
 def _group(system: System, part: dict[int, dict[int, bool]], count: int) -> Group:
     """Set aside constraints with a variable of their own, whose slope is constant; the others are the core."""
-    rows, own = dict(part), list[int]()
+    rows, columns = dict(part), list[int]()
     while True:
         users = Counter(level for levels in rows.values() for level in levels)
         pairs = [(row, level) for row, levels in rows.items() for level in levels
                  if not levels[level] and users[level] == 1]  # fmt: skip
         if not pairs:
-            return Group(tuple(rows), tuple(sorted(users)), count, tuple(own))
+            return Group(tuple(rows), tuple(sorted(users)), count, tuple(columns))
         row, level = min(pairs, key=lambda pair: system.levels[pair[1]].preference)
         del rows[row]
-        own.append(level)
+        columns.append(level)
 
 
 def follow(system: System, groups: tuple[Group, ...]) -> tuple[Following, ...]:
@@ -261,11 +263,11 @@ def _first_weights(system: System, slopes: Any) -> Any:
             p, d = system.constants
             values[placed[0]] = float(ca.Function("start", [model.p, model.d], [start.value])(p, d)) / placed[1]
     function = ca.Function("slopes", [system.everything, model.p, model.d, model.time], [ca.densify(slopes)])
-    found = function(values, *system.constants, 0.0).full()
-    found = np.where(np.isfinite(found), found, 0.0)
-    sizes = np.linalg.norm(found, axis=1, keepdims=True)
-    found += _OFF * np.where(sizes > 0, sizes, 1.0) * spread(-1.0, 1.0, found.shape)
-    return np.linalg.svd(found)[2][len(found) :]
+    weights = function(values, *system.constants, 0.0).full()
+    weights = np.where(np.isfinite(weights), weights, 0.0)
+    sizes = np.linalg.norm(weights, axis=1, keepdims=True)
+    weights += _OFF * np.where(sizes > 0, sizes, 1.0) * spread(-1.0, 1.0, weights.shape)
+    return np.linalg.svd(weights)[2][len(weights) :]
 
 
 def prefer(system: System, groups: tuple[Group, ...], following: tuple[Following, ...]) -> None:

@@ -95,7 +95,7 @@ def add_approaches(system: System) -> tuple[HeldMotion, ...]:
 
 def _find(model: FlatModel) -> tuple[HeldMotion, ...]:
     row_of = {pair: row for row, pair in enumerate(model.general)}
-    found: list[HeldMotion] = []
+    holds: list[HeldMotion] = []
     for number, instance in enumerate(model.instances):
         template = instance.template
         if not template.holds:
@@ -103,14 +103,14 @@ def _find(model: FlatModel) -> tuple[HeldMotion, ...]:
         node = {slot.path: instance.nodes[k] for k, slot in enumerate(template.slots) if slot.order == 0}
         discrete = dict(zip(template.discretes, instance.discretes, strict=True))
         for form in template.holds:
-            found.append(
+            holds.append(
                 HeldMotion(
                     instance.path, discrete[form.mode], form.number, form.loose, node[form.motion],
                     node.get(form.reaction, -1), row_of[number, form.row], form.rigid,
-                    len(model.discretes) + len(found),
+                    len(model.discretes) + len(holds),
                 )
             )  # fmt: skip
-    return tuple(found)
+    return tuple(holds)
 
 
 def hold_terms(model: FlatModel, values: Any) -> Any:
@@ -253,8 +253,8 @@ def held_rates(model: FlatModel, ode: Any, values: Any, holds: tuple[HeldMotion,
     for k, one in enumerate(holds):
         if one.rigid and one.state is not None:
             state, factor = one.state
-            own = ca.logic_and(d[one.mode] == one.number, gain[k] != 0)
+            rate = ca.logic_and(d[one.mode] == one.number, gain[k] != 0)
             if k in switched:
-                own = ca.logic_and(own, d[switched[k]] == 0)
-            rates[state] = ca.if_else(own, d[one.approach] / factor, rates[state])
+                rate = ca.logic_and(rate, d[switched[k]] == 0)
+            rates[state] = ca.if_else(rate, d[one.approach] / factor, rates[state])
     return rates

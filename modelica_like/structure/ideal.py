@@ -73,15 +73,15 @@ class IdealNetwork:
 def find_ideals(model: FlatModel) -> list[IdealElement]:
     """Find the ideal elements of all components."""
     row_of = {pair: row for row, pair in enumerate(model.general)}
-    found: list[IdealElement] = []
+    ideals: list[IdealElement] = []
     for number, instance in enumerate(model.instances):
         template = instance.template
         node = {slot.path: instance.nodes[k] for k, slot in enumerate(template.slots) if slot.order == 0}
         discrete = dict(zip(template.discretes, instance.discretes, strict=True))
         for form in template.ideals:
             zeros = node[form.zeros[0]], node[form.zeros[1]]
-            found.append(IdealElement(instance.path, discrete[form.mode], zeros, row_of[number, form.row]))
-    return found
+            ideals.append(IdealElement(instance.path, discrete[form.mode], zeros, row_of[number, form.row]))
+    return ideals
 
 
 def complete(reduced: ReducedDae, ideals: list[IdealElement], rows: list[int]) -> ReducedDae:
@@ -107,7 +107,7 @@ def complete(reduced: ReducedDae, ideals: list[IdealElement], rows: list[int]) -
         replaced, impulse, is_norm, weights = *ca.vertsplit(table[:HEAD, k]), table[HEAD:, k]
         # The sums one by one: reactions are lost in terms that are a million times as large.
         norm = ca.dot(weights[reacting], ca.vertcat(*reactions)) - _CONDUCTANCE * ca.dot(weights, missed)
-        own = ca.if_else(is_norm, norm, ca.dot(weights, rates) + impulse)
-        alg[one.row] = ca.if_else(replaced, own, alg[one.row])
+        equation = ca.if_else(is_norm, norm, ca.dot(weights, rates) + impulse)
+        alg[one.row] = ca.if_else(replaced, equation, alg[one.row])
     flat = replace(flat, d=ca.vertcat(flat.d, ca.vec(table)))
     return replace(reduced, flat=flat, alg=alg, ideal=network)

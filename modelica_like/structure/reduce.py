@@ -145,8 +145,8 @@ def reduce(flat: FlatModel) -> ReducedDae:
         chosen = _choose(flat, find_aliases(flat), groups)
     system, counts, states, holds, flags = chosen.system, chosen.counts, chosen.states, chosen.holds, chosen.flags
     residual, origins = _differentiate(system, counts)
-    known = {*states, *system.inputs}
-    unknowns = [n for n in range(len(system.levels)) if n not in known]
+    determined = {*states, *system.inputs}
+    unknowns = [n for n in range(len(system.levels)) if n not in determined]
     if flags.settle(residual, unknowns):
         residual, origins = _differentiate(system, counts)
     derivatives = {system.derivative(state) for state in states}
@@ -162,8 +162,8 @@ def reduce(flat: FlatModel) -> ReducedDae:
     if changed is not residual:
         residual = changed
         solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
-    own = len(counts) - sum(len(one.chains) for one in chosen.following)
-    reduced = _assemble(system, counts[:own], states, unknowns, origins, solved)
+    degrees = len(counts) - sum(len(one.chains) for one in chosen.following)
+    reduced = _assemble(system, counts[:degrees], states, unknowns, origins, solved)
     held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
     ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
     choices = tuple(write_choice(one, system, states, reduced.level_values) for one in chosen.following)
@@ -278,7 +278,7 @@ def _assemble(
     place = ca.Function("nodes", [system.everything, model.p], [system.node_values])
     z_levels = [unknowns[k] for k in solved.z]
     rates = [level_values[n] for s in states if (n := system.derivative(s)) is not None]
-    told = [
+    blocks = [
         (tuple(levels[unknowns[k]].name for k in block.unknowns), tuple(origins[k] for k in block.equations))
         for block in solved.blocks
     ]
@@ -301,11 +301,11 @@ def _assemble(
         nominals=tuple(levels[s].nominal for s in states),
         z_guesses=tuple(levels[n].guess for n in z_levels),
         blocks=tuple(solved.blocks),
-        determinants=tuple((*told[number], one) for number, one in zip(numbers, determinants, strict=True)),
+        determinants=tuple((*blocks[number], one) for number, one in zip(numbers, determinants, strict=True)),
         index=max(counts, default=0) + 1,
         differentiated=tuple(system.origins[k] for k, count in enumerate(counts) if count),
         system=system,
-        implicit_blocks=tuple(pair for pair, one in zip(told, solved.blocks, strict=True) if one.kind == "implicit"),
+        implicit_blocks=tuple(pair for pair, one in zip(blocks, solved.blocks, strict=True) if one.kind == "implicit"),
         level_values=level_values,
         explicit=tuple((unknowns[k], expression) for k, expression in solved.order),
     )

@@ -31,14 +31,14 @@ def select_states(
 
     Source: Mattsson and Söderlind, SIAM J. Sci. Comput. 14 (1993) 677-692.
     """
-    known = set(system.inputs)
+    inputs = set(system.inputs)
     dummies: set[int] = set()
     stage = 1
-    candidates = {c for c, chain in enumerate(system.chains) if chain[0] not in known}
+    candidates = {c for c, chain in enumerate(system.chains) if chain[0] not in inputs}
     while rows := [e for e, count in enumerate(counts) if count >= stage]:
         # As a rule a position is a state if its speed is one. A relative angle between two shafts with friction, whose
         # speeds are wanted more than the relative one, is a state all the same: absolute angles grow without bound.
-        ranked = [c for c in _ranked(system, counts, slopes, incidence, stage) if system.chains[c][0] not in known]
+        ranked = [c for c in _ranked(system, counts, slopes, incidence, stage) if system.chains[c][0] not in inputs]
         choices = [_independent(rows, some, slopes) for some in ([c for c in ranked if c in candidates], ranked)]
         chosen = min(
             choices,
@@ -56,7 +56,7 @@ def select_states(
         candidates = set(chosen)
         stage += 1
     highest = {chain[-1] for chain in system.chains}
-    return [n for n in range(len(system.levels)) if n not in dummies and n not in highest and n not in known]
+    return [n for n in range(len(system.levels)) if n not in dummies and n not in highest and n not in inputs]
 
 
 def _ranked(
@@ -92,8 +92,8 @@ def _independent(rows: list[int], columns: list[int], slopes: list[dict[int, flo
         for column, slope in slopes[row].items():
             if column in entries:
                 entries[column][row] = slope
-    found, chosen = Elimination(len(rows)), dict[int, int]()
+    elimination, chosen = Elimination(len(rows)), dict[int, int]()
     for column in columns:
-        if found.add(entries[column]):
-            chosen[column] = found.pivot
+        if elimination.add(entries[column]):
+            chosen[column] = elimination.pivot
     return chosen

@@ -113,7 +113,7 @@ def build_system(model: FlatModel, aliases: Aliases) -> System:
     chains, place = _chains(aliases)
     # Level and factor of every node, None where its value is known.
     pairs = ((place.get(root), factor) for root, factor in zip(aliases.root, aliases.factor, strict=True))
-    node_level = [found and (found[0], factor * found[1]) for found, factor in pairs]
+    node_level = [level and (level[0], factor * level[1]) for level, factor in pairs]
     # A state equals the variable after which its chain is named, with sign.
     ranked = _ranked(model, node_level)
     scale = {level: ranked[chain[0]][0][-1] for chain in chains for level in chain}
@@ -154,7 +154,7 @@ _Named = tuple[tuple[Any, ...], int, FlatVariable, float]
 
 def _ranked(model: FlatModel, node_level: list[tuple[int, float] | None]) -> dict[int, list[_Named]]:
     """Nodes of each level; what should name it comes first."""
-    found: dict[int, list[_Named]] = {}
+    nodes_of: dict[int, list[_Named]] = {}
     for node, placed in enumerate(node_level):
         if placed is not None:
             level, factor = placed
@@ -162,8 +162,8 @@ def _ranked(model: FlatModel, node_level: list[tuple[int, float] | None]) -> dic
             one = model.variables[variable]
             connected, preference = one.kind in ("potential", "flow"), PREFERENCES.index(one.state)
             rank = (order, connected, factor != 1.0, -preference, one.path.count("."))
-            found.setdefault(level, []).append((rank, node, one, factor))
-    return {level: sorted(nodes) for level, nodes in found.items()}
+            nodes_of.setdefault(level, []).append((rank, node, one, factor))
+    return {level: sorted(nodes) for level, nodes in nodes_of.items()}
 
 
 def _levels(model: FlatModel, chains: list[list[int]], ranked: dict[int, list[_Named]]) -> list[Level]:
@@ -172,19 +172,19 @@ def _levels(model: FlatModel, chains: list[list[int]], ranked: dict[int, list[_N
         (_, connected, *_), *_ = ranked[numbers[0]][0]
         for order, number in enumerate(numbers):
             (_, node, named, _), *_ = nodes = ranked[number]
-            own = [(one, factor) for rank, _, one, factor in nodes if rank[0] == 0]
-            preference = max((PREFERENCES.index(one.state) for one, _ in own), default=0)
+            base = [(one, factor) for rank, _, one, factor in nodes if rank[0] == 0]
+            preference = max((PREFERENCES.index(one.state) for one, _ in base), default=0)
             # The name says nothing about the guess: any of them that has one knows more than zero.
-            guess = next((one.guess / factor for one, factor in own if one.guess), 0.0)
+            guess = next((one.guess / factor for one, factor in base if one.guess), 0.0)
             levels.append(Level(chain, order, model.node_name(node), preference, named.nominal, guess, not connected))
     return levels
 
 
 def _node_values(aliases: Aliases, node_level: list[tuple[int, float] | None], symbols: list[Any]) -> Any:
     vector = ca.vertcat(ca.SX(0, 1), *symbols, *aliases.known.values())
-    known = {root: len(symbols) + k for k, root in enumerate(aliases.known)}
+    position = {root: len(symbols) + k for k, root in enumerate(aliases.known)}
     nodes = zip(node_level, aliases.root, aliases.factor, strict=True)
-    placed = [pair or (known[root], factor) for pair, root, factor in nodes]
+    placed = [pair or (position[root], factor) for pair, root, factor in nodes]
     # A vector of one entry, indexed by a list, gives a row.
     return ca.vec(vector[[level for level, _ in placed]]) * ca.SX(ca.DM([factor for _, factor in placed]))
 

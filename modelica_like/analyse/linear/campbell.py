@@ -76,7 +76,7 @@ class Campbell:
 
     def crossings(self) -> tuple[Crossing, ...]:
         """Return the critical speeds, interpolated between the points."""
-        found: list[Crossing] = []
+        crossings: list[Crossing] = []
         for order in self.orders:
             line = order * self.speeds / (2 * np.pi)
             for mode, curve in enumerate(self.frequencies):
@@ -85,8 +85,8 @@ class Campbell:
                     share = gap[k] / (gap[k] - gap[k + 1]) if gap[k] != gap[k + 1] else 0.0
                     speed = float(self.speeds[k] + share * (self.speeds[k + 1] - self.speeds[k]))
                     name = self.modes[mode] if self.modes else ""
-                    found.append(Crossing(order, mode, speed, order * speed / (2 * np.pi), name))
-        return tuple(found)
+                    crossings.append(Crossing(order, mode, speed, order * speed / (2 * np.pi), name))
+        return tuple(crossings)
 
     def plot(self) -> Figure:
         """Draw frequencies over speed with the lines of the orders; crossings have numbers, with their text below."""
@@ -149,8 +149,8 @@ def campbell(
     curves = [ahead[0][np.argsort(ahead[0].imag, kind="stable")]]
     for values in ahead[1:]:
         curves.append(_nearest(curves[-1], values))
-    known = {one.eigenvalue: mode_name(one) for one in linear[order[0]].modes() if one.oscillates}
-    names = tuple(known[min(known, key=lambda value, mode=mode: abs(value - mode))] for mode in curves[0])
+    name_of = {one.eigenvalue: mode_name(one) for one in linear[order[0]].modes() if one.oscillates}
+    names = tuple(name_of[min(name_of, key=lambda value, mode=mode: abs(value - mode))] for mode in curves[0])
     return Campbell(model.name, speed, speeds[order], np.array(curves).T, tuple(map(float, orders)), names)
 
 

@@ -87,8 +87,8 @@ def linearize(
     states = tuple(name for name in model.states if name in model.position)
     y_names = (tuple(top) or states) if outputs is None else tuple(outputs)
     columns, nodes = columns_of(model, u_names), nodes_of(model, y_names)
-    rates, found = slopes(model, point, "ode"), slopes(model, point, "variables", nodes)
-    a, b, c, d = rates.x, rates.theta[:, columns], found.x, found.theta[:, columns]
+    rates, of_outputs = slopes(model, point, "ode"), slopes(model, point, "variables", nodes)
+    a, b, c, d = rates.x, rates.theta[:, columns], of_outputs.x, of_outputs.theta[:, columns]
     motions = free_motions(model, point)
     keep, shape = motions.keep, motions.shape
     if len(keep) < len(a):

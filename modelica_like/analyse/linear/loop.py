@@ -45,11 +45,11 @@ class Margins:
 
     def lines(self) -> list[str]:
         """Return a line for each margin."""
-        found = [f"gain margin {20 * np.log10(factor):.3g} dB at {f:.4g} Hz" for f, factor in self.gain]
-        found += [f"phase margin {lag:.3g}\u00b0 at {f:.4g} Hz" for f, lag in self.phase]
-        found.append(f"nearest to -1 at {self.distance[0]:.4g} Hz, by {self.distance[1]:.3g}")
-        found.append("The closed loop is stable." if self.stable else "The closed loop is not stable.")
-        return [line.replace("-", "\u2212") for line in found]
+        lines = [f"gain margin {20 * np.log10(factor):.3g} dB at {f:.4g} Hz" for f, factor in self.gain]
+        lines += [f"phase margin {lag:.3g}\u00b0 at {f:.4g} Hz" for f, lag in self.phase]
+        lines.append(f"nearest to -1 at {self.distance[0]:.4g} Hz, by {self.distance[1]:.3g}")
+        lines.append("The closed loop is stable." if self.stable else "The closed loop is not stable.")
+        return [line.replace("-", "\u2212") for line in lines]
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
@@ -79,14 +79,14 @@ class Loop(LinearModel):
 
 def _crossings(f: Any, values: Any, at: Callable[[float], float]) -> list[float]:
     """Return where a function of the frequency changes its sign, by bisection between the points of a grid."""
-    found: list[float] = []
+    crossings: list[float] = []
     for k in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
         low, high = np.log(f[k]), np.log(f[k + 1])
         for _ in range(_ROUNDS):
             middle = (low + high) / 2
             low, high = (middle, high) if at(np.exp(middle)) * values[k] > 0 else (low, middle)
-        found.append(float(np.exp((low + high) / 2)))
-    return found
+        crossings.append(float(np.exp((low + high) / 2)))
+    return crossings
 
 
 def open_loop(drive: Component | str | Path, signal: str, at: At = None) -> Loop:

@@ -41,12 +41,12 @@ def bode(linear: LinearModel, f: Any = None) -> Figure:
     gains = linear.response(f)
     curves = _curves(linear, gains)
     modes = [one for one in linear.modes() if one.oscillates and f[0] <= one.frequency <= f[-1]]
-    told = [
+    texts = [
         f"{k}  {one.frequency:.4g} Hz, damping {one.damping:.3g}: {mode_name(one)}" for k, one in enumerate(modes, 1)
     ]
     labels = max((text_width(label, 8.0) for label in curves), default=0.0) + 0.5
     width = max(8.0, 5.0 + labels)
-    below = [margins.lines() if margins else [], told]
+    below = [margins.lines() if margins else [], texts]
     with picture(_title(linear), 2, 4.8, width=width, below=below) as (figure, (size, phase)):
         for (label, (o, i)), colour in zip(curves.items(), cycle(COLOURS), strict=False):
             size.semilogx(f, 20 * np.log10(np.maximum(np.abs(gains[o, i]), 1e-300)), color=colour, label=label)

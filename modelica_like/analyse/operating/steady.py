@@ -58,8 +58,8 @@ class OperatingPoint(Shown, Mapping[str, float]):
     @property
     def losses(self) -> dict[str, float]:
         """Lost power of every component that loses any, in W, the largest first."""
-        found = {path: loss for path, (_, loss) in self.powers.items() if loss}
-        return dict(sorted(found.items(), key=lambda item: -item[1]))
+        losses = {path: loss for path, (_, loss) in self.powers.items() if loss}
+        return dict(sorted(losses.items(), key=lambda item: -item[1]))
 
     @property
     def efficiency(self) -> float:
@@ -151,9 +151,9 @@ class _Target:
 
     def __init__(self, model: CompiledDae, hold: Mapping[str, Any], free: Sequence[str]) -> None:
         if len(hold) != len(free):
-            held, found = ", ".join(hold) or "nothing", ", ".join(free) or "nothing"
+            held, freed = ", ".join(hold) or "nothing", ", ".join(free) or "nothing"
             raise ValueOutOfRange(
-                f"{model.name}: {held} cannot be held by {found}: each held variable needs one parameter.",
+                f"{model.name}: {held} cannot be held by {freed}: each held variable needs one parameter.",
                 advice='Write for example steady(drive, {"motor.w": "3000 rpm"}, by="load.tau_constant").',
             )
         self.paths, self.free = list(hold), list(free)

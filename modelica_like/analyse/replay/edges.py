@@ -63,8 +63,8 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
     for _, jump in chain.jumps:
         apart = jump.when.apart if jump.matters or id(jump.before) in timed else ()
         chances += [(jump.before, one) for one in (*apart, *jump.chances)]
-    found = [Edge(Reading(0.0, ((node, one.by),)), one.size, one.reason) for node, one in chances]
-    return found + _ties(_Later(chain, readings))
+    result = [Edge(Reading(0.0, ((node, one.by),)), one.size, one.reason) for node, one in chances]
+    return result + _ties(_Later(chain, readings))
 
 
 @dataclass(frozen=True)
@@ -77,17 +77,17 @@ class _Later:
     @cached_property
     def multipliers(self) -> dict[int, Vector]:
         """Derivatives of the readings by (x, theta) at the nodes after jumps; shapes (nx + ntheta, readings)."""
-        found = {k + 1: np.zeros(0) for k, _ in self.chain.jumps}
-        self.chain.adjoint(self.readings, found)
-        return found
+        multipliers = {k + 1: np.zeros(0) for k, _ in self.chain.jumps}
+        self.chain.adjoint(self.readings, multipliers)
+        return multipliers
 
 
 def _ties(later: _Later) -> list[Edge]:
     """Guards that are zero all along a segment without firing: a torque that equals the friction limit."""
     chain, model = later.chain, later.chain.model
-    guards, found = Guards(model), list[Edge]()
+    guards, result = Guards(model), list[Edge]()
     if not guards.count:
-        return found
+        return result
     # Guards that cannot fire are -1.
     values, rates = np.array([guards.at(node)[:2] for node in chain.nodes]).transpose(1, 0, 2)
     near = _STILL * np.maximum(1.0, np.abs(values).max(axis=0))
@@ -105,11 +105,11 @@ def _ties(later: _Later) -> list[Edge]:
     for k, event in enumerate(guards.state_events):
         for still, group in groupby(segments, lambda one, k=k: bool(one[2][k])):
             if still and (those := list(group)):
-                found.append(_tie(later, event, those[0][0], those[-1][1]))
+                result.append(_tie(later, event, those[0][0], those[-1][1]))
     # A guard that fires exactly at the end of the run fires on one side only.
     last = len(chain.nodes) - 1
     fires = (np.abs(values[last]) <= near) & ~still_at[last] & (rates[last] > 0.0)
-    return found + [_tie(later, guards.state_events[k], last, last) for k in np.flatnonzero(fires)]
+    return result + [_tie(later, guards.state_events[k], last, last) for k in np.flatnonzero(fires)]
 
 
 def _tie(later: _Later, one: CompiledTransition, first: int, last: int) -> Edge:
@@ -142,9 +142,9 @@ def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
     """
     chain, readings, model = later.chain, later.readings, later.chain.model
     size, end = Sizes.of(model), len(chain.moves)
-    own = [k for k, one in enumerate(model.holds) if one.mode == mode]
+    held = [k for k, one in enumerate(model.holds) if one.mode == mode]
     until = min(last + 1, end)
-    for hold, begin in product(own, dict.fromkeys((last, first))):
+    for hold, begin in product(held, dict.fromkeys((last, first))):
         change = _sliding(model, chain.nodes[begin], hold)
         nominals = model.nominals * np.max(np.abs(change) / model.nominals)
         sizes = [sum(float(np.abs(row[: size.x]) @ nominals) for _, row in one.parts) for one in readings]
@@ -155,7 +155,7 @@ def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
         behind = later.multipliers[until].T @ whole if until > last else 0.0
         if np.any(np.maximum(np.abs(read), np.abs(behind))[:, 0] > _ROUNDING * np.array(sizes)):
             return True
-    return not own
+    return not held
 
 
 def _sliding(model: CompiledDae, point: Point, hold: int) -> Vector:

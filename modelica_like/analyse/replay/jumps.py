@@ -235,9 +235,9 @@ class Work:
         share(model, self.point)
         solve_implicit(model, self.point)
         for circuit in model.circuits:
-            own = circuit.entries
-            self.d[own] = 0.0
-            self.d[own] = share_slopes(model, self.point, circuit, columns, self._total)
+            entries = circuit.entries
+            self.d[entries] = 0.0
+            self.d[entries] = share_slopes(model, self.point, circuit, columns, self._total)
 
     def _stop_motions(self, before: Vector, *, later: bool) -> None:
         """Stop what modes have begun to hold since `before`, also where it stands still already.

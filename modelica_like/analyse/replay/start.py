@@ -63,11 +63,11 @@ def _determined(model: CompiledDae, point: Point, x: Vector, d: Vector) -> Vecto
     places = [(k, one.reset.index) for k, one in enumerate(model.update_rows) if one.at_start]
     if not places:
         return d
-    (rows, own), before = map(list, zip(*places, strict=True)), point.copy()
-    before.d[own] = call(model, model.discrete_starts, point)[own]
+    (rows, variables), before = map(list, zip(*places, strict=True)), point.copy()
+    before.d[variables] = call(model, model.discrete_starts, point)[variables]
     part, fixed = slopes(model, before, "updates"), x.shape[1]
     total = part.x @ x + part.theta[:, :fixed] + part.theta[:, fixed:] @ d
-    d[own] = total[rows]
+    d[variables] = total[rows]
     return d
 
 
@@ -83,8 +83,8 @@ def _follow(
 ) -> None:
     """Add the derivatives of the other states: the implicit function theorem on the start system."""
     by_unknowns, by_fixed, by_d = (one[list(plan.wanted), :] for one in system)
-    known = np.asarray(by_d.full()) @ starts + np.asarray(ca.mtimes(by_unknowns[:, : len(states)], ca.DM(states)))
-    right = plan.targets(values) - np.asarray(by_fixed[:, moved].full()) - known
+    derivatives = np.asarray(by_d.full()) @ starts + np.asarray(ca.mtimes(by_unknowns[:, : len(states)], ca.DM(states)))
+    right = plan.targets(values) - np.asarray(by_fixed[:, moved].full()) - derivatives
     if right.size:
         solved = np.asarray(ca.solve(by_unknowns[:, list(plan.columns)], ca.DM(right)).full())
         of_states = [(row, column) for row, column in enumerate(plan.columns) if column < len(states)]

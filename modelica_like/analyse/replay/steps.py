@@ -88,9 +88,9 @@ class StepFunctions:
 
     def _at_stages(self, function: ca.Function) -> list[Any]:
         """Results of a function at all stages, one list for each."""
-        (t, h, _, W, p, u, d), own = self._symbols, self.nx + self.nz
-        begins = zip(self.tableau.nodes, range(0, self.size, own), strict=True)
-        given = ([t + c * h, W[k : k + self.nx], W[k + self.nx : k + own], p, u, d] for c, k in begins)
+        (t, h, _, W, p, u, d), size = self._symbols, self.nx + self.nz
+        begins = zip(self.tableau.nodes, range(0, self.size, size), strict=True)
+        given = ([t + c * h, W[k : k + self.nx], W[k + self.nx : k + size], p, u, d] for c, k in begins)
         return list(zip(*(function.call(one) for one in given), strict=True))
 
     def _weighted(self, weights: Vector, values: Sequence[Any]) -> Any:
@@ -259,19 +259,19 @@ class StepFunctions:
         if not self._constant:
             by_w = self._residual(*self._names)[1]
             return _solve(by_w, right, self._order, transposed=transposed)
-        own = self.nx + self.nz
+        size = self.nx + self.nz
         basis, blocks = self.tableau.real_form
         back, there = (np.linalg.inv(basis).T, basis.T) if transposed else (basis, np.linalg.inv(basis))
-        mixed = ca.mtimes(ca.kron(ca.DM(there), ca.DM.eye(own)), ca.densify(right))
+        mixed = ca.mtimes(ca.kron(ca.DM(there), ca.DM.eye(size)), ca.densify(right))
         t, h, x, _, p, u, d = self._names
         shifted = self._shifted("shifted", *blocks)(t, h, x, ca.MX(self.nz, 1), p, u, d)
         solved, begin = [], 0
         for block, matrix in zip(blocks, shifted, strict=True):
-            end = begin + own * len(block)
-            order = [k * own + node for node in self._node_order for k in range(len(block))]
+            end = begin + size * len(block)
+            order = [k * size + node for node in self._node_order for k in range(len(block))]
             solved.append(_solve(matrix, mixed[begin:end, :], order, transposed=transposed))
             begin = end
-        return ca.mtimes(ca.kron(ca.DM(back), ca.DM.eye(own)), ca.vertcat(*solved))
+        return ca.mtimes(ca.kron(ca.DM(back), ca.DM.eye(size)), ca.vertcat(*solved))
 
     def forward(self, columns: int) -> Any:
         """Return the function of (t, h, x, W, p, u, d, S, P): S at the end, change of the quadratures.

@@ -67,7 +67,7 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
         return When()
     # A step leaves the implicit unknowns as precise as its states need them; rates of guards need them better.
     solve_implicit(model, before)
-    found: list[tuple[Event, Trigger]] = []
+    triggers: list[tuple[Event, Trigger]] = []
     for event in events:
         if event.round or event.transition < 0:
             continue
@@ -81,16 +81,16 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
                 why="A small change of a parameter moves the event far, or removes it.",
                 advice="Move the parameters away from this limit.",
             ))  # fmt: skip
-        found.append((event, trigger))
-    found = _give_way_together(model, before, found)
-    first, trigger = found[0]
+        triggers.append((event, trigger))
+    triggers = _give_way_together(model, before, triggers)
+    first, trigger = triggers[0]
     theta = np.concatenate([model.p, model.u, before.d])
     weights = np.concatenate([np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)])
     nx = len(before.x)
-    spans = [float(np.max(np.abs(one.by[:nx]) * weights[:nx])) for _, one in found]
+    spans = [float(np.max(np.abs(one.by[:nx]) * weights[:nx])) for _, one in triggers]
     size = SAME * max(before.t - begin.t, abs(before.t), *spans)
     apart: list[Coincidence] = []
-    for other, second in found[1:]:
+    for other, second in triggers[1:]:
         by = _difference(model, before, trigger.by - second.by)
         if np.any(np.abs(by) * weights > size):
             apart.append(Coincidence(by, size, _together(first, other)))
@@ -98,7 +98,7 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
 
 
 def _give_way_together(
-    model: CompiledDae, before: Point, found: list[tuple[Event, Trigger]]
+    model: CompiledDae, before: Point, triggers: list[tuple[Event, Trigger]]
 ) -> list[tuple[Event, Trigger]]:
     """Give elements that share a reaction one time at which all of them give way: when no split can be borne.
 
@@ -106,7 +106,7 @@ def _give_way_together(
     """
     for circuit in model.circuits:
         modes = {model.holds[k].mode for k in circuit.members if before.d[model.holds[k].mode] == model.holds[k].number}
-        fired = [model.transitions[one.transition] for one, _ in found]
+        fired = [model.transitions[one.transition] for one, _ in triggers]
         those = [k for k, one in enumerate(fired) if not one.timed and one.mode in modes]
         shared = circuit.shares(before.d).any(axis=1)
         if len(those) < 2 or not shared.any():
@@ -120,8 +120,8 @@ def _give_way_together(
         rate = float(weights @ part.rate)
         together = Trigger(-float(weights @ part.value) / rate, -(weights @ part.by) / rate)
         for k in those:
-            found[k] = found[k][0], together
-    return found
+            triggers[k] = triggers[k][0], together
+    return triggers
 
 
 def _difference(model: CompiledDae, before: Point, by: Vector) -> Vector:
@@ -193,8 +193,8 @@ def at_rest(model: CompiledDae, point: Point, hold: int, by: Vector) -> Coincide
     one = model.holds[hold]
     mode, motion = model.flat_discretes[one.mode], model.flat_variables[one.motion].path
     held = f"{mode.path} becomes {mode.names[one.number]}"
-    own = slopes(model, point, "variables", [one.motion])
-    size = SAME * float(np.abs(own.x[0]) @ (np.abs(point.x) + model.nominals))
+    speed = slopes(model, point, "variables", [one.motion])
+    size = SAME * float(np.abs(speed.x[0]) @ (np.abs(point.x) + model.nominals))
     error = NoGradient(
         f"No gradient at t = {point.t:.9g} s: {held}, because {motion} is zero.",
         why="A small change of a parameter decides which way it moves first, so the derivatives on both sides differ.",

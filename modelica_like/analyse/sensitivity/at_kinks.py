@@ -52,9 +52,9 @@ def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
 
     def make() -> ca.Function:
         values = [_equations(model, texts), model.guards(*given)]
-        found = {str(one): one for one in arguments_of_kinks(ca.Function("equations", given, values), given)}
+        arguments = {str(one): one for one in arguments_of_kinks(ca.Function("equations", given, values), given)}
         # A guard at zero decides about the modes on one side, which edges judge by accelerations only.
-        return ca.Function("arguments", given, [ca.densify(ca.SX(ca.vertcat(*found.values(), values[1])))])
+        return ca.Function("arguments", given, [ca.densify(ca.SX(ca.vertcat(*arguments.values(), values[1])))])
 
     key = f"arguments of kinks {texts}"
     function = model.once(key, make)
@@ -68,7 +68,7 @@ def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
     still = np.abs(values) <= np.maximum(_STILL * np.abs(values).max(axis=0), _DIGITS * terms)
     ends = [*(k for k, _ in chain.jumps), len(chain.nodes) - 1]
     begins = [0, *(k + 1 for k in ends[:-1])]
-    found: list[Edge] = []
+    result: list[Edge] = []
     for row in np.flatnonzero(still.any(axis=0)):
         pairs = zip(begins, ends, strict=True)
         for at_kink, group in groupby(pairs, lambda pair, row=row: bool(still[pair[0] : pair[1] + 1, row].all())):
@@ -79,8 +79,8 @@ def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
                 sizes = np.abs(np.concatenate([node.x, model.p, model.u, node.d]))
                 least = _ROUNDING * float(np.abs(part.by[0]) @ sizes)
                 reading = Reading(float(part.value[0]), ((node, part.by[0]),))
-                found.append(Edge(reading, least, NoGradient(f"{model.name} is at a kink.")))
-    return found
+                result.append(Edge(reading, least, NoGradient(f"{model.name} is at a kink.")))
+    return result
 
 
 def natural_size(chain: Replay, outputs: Sequence[Output], position: int) -> float:
@@ -236,8 +236,10 @@ class Sides:
     def _noise(self, here: Vector) -> Vector:
         """Errors of what is read."""
         looser = self._here(_LOOSER)
-        known = _SAFE * self._options(1.0).atol * self.solution.model.nominals
-        rest = [sum(float(np.abs(row[: len(known)]) @ known) for _, row in one.parts) for one in self.readings]
+        tolerances = _SAFE * self._options(1.0).atol * self.solution.model.nominals
+        rest = [
+            sum(float(np.abs(row[: len(tolerances)]) @ tolerances) for _, row in one.parts) for one in self.readings
+        ]
         return np.array(rest) + (np.abs(here) if looser is None else np.abs(looser - here))
 
     def error(self, candidate: Candidate) -> NoGradient | None:
@@ -284,13 +286,13 @@ class Sides:
         run, options = self.solution, self._options(looser)
         names = [one.path if one.kind == "series" else one.name for one in self.outputs]
         try:
-            found = quick_run(
+            readings = quick_run(
                 run.model, float(run.time[-1]), t0=float(run.time[0]), start=run.start, options=options,
                 parameters=parameters, readings=names, rtol=options.rtol, atol=options.atol,
             )  # fmt: skip
         except ModelicaLikeError:
             return None
-        return np.array(found.read(*names), float)
+        return np.array(readings.read(*names), float)
 
 
 def _differ(sides: Vector, derivatives: Vector, noise: Vector | float) -> NDArray[np.bool_]:

@@ -72,8 +72,8 @@ def sensitivities(
         start = start or drive.start
     else:
         freed = free_formulas(drive, to, parameters)
-        asked = {"parameters": freed.values, "start": start, "options": options}
-        solution = quick_run(freed.model, until, **asked, readings=[name for name in of if not is_series(name)])
+        settings = {"parameters": freed.values, "start": start, "options": options}
+        solution = quick_run(freed.model, until, **settings, readings=[name for name in of if not is_series(name)])
     model = solution.model
     outputs = [read_output(model, name) for name in of]
     chosen = _chosen(model, to)
@@ -87,26 +87,26 @@ def sensitivities(
 def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantity]]:
     """Positions in (p, u) of parameters and inputs."""
     values = np.concatenate([model.p, model.u])
-    known = model.fixed_position
+    position = model.fixed_position
     fixed = {one.path for one in model.flat_parameters if not one.tunable}
-    found: list[tuple[int, Quantity]] = []
-    for name in names or [name for name in known if name not in fixed]:
+    quantities: list[tuple[int, Quantity]] = []
+    for name in names or [name for name in position if name not in fixed]:
         if name in model.derived_position:
             equal = equal_to(model, name)
             if equal is None:
                 raise bound_by_formula(model, name)
             name = equal
-        if name not in known:
-            near = did_you_mean(name, [*known, *model.derived_position])
+        if name not in position:
+            near = did_you_mean(name, [*position, *model.derived_position])
             raise UnknownName(f"{model.name} has no parameter '{name}'{near or '.'}")
         if name in fixed:
             raise LanguageError(
                 f"{name} cannot change after compilation, so there are no derivatives with respect to it.",
                 advice="Compare runs of models that were built with other values.",
             )
-        k = known[name]
-        found.append((k, Quantity(name, float(values[k]), model.units[name])))
-    return found
+        k = position[name]
+        quantities.append((k, Quantity(name, float(values[k]), model.units[name])))
+    return quantities
 
 
 def _differentiate(

@@ -154,8 +154,8 @@ class Sensitivities(Shown):
         return "\n\n".join([*blocks, *self.notes()])
 
 
-def _position(known: tuple[Quantity, ...], name: str, what: str) -> int:
-    names = [one.name for one in known]
+def _position(quantities: tuple[Quantity, ...], name: str, what: str) -> int:
+    names = [one.name for one in quantities]
     if name not in names:
         raise UnknownName(f"There is no {what} '{name}' in these sensitivities{did_you_mean(name, names) or '.'}")
     return names.index(name)

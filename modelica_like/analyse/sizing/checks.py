@@ -50,11 +50,11 @@ def _checks_of(entry: EntryPoint) -> Iterator[tuple[str, Check]]:
 
 def find_check(name: str) -> Check:
     """Return the design check of an `is` in a sizing file."""
-    known = design_checks()
-    if name not in known:
-        hint = did_you_mean(name, known) or "."
+    checks = design_checks()
+    if name not in checks:
+        hint = did_you_mean(name, checks) or "."
         raise UnknownName(f"There is no design check '{name}'{hint}", advice="`modelica-like size` lists all checks.")
-    return known[name]
+    return checks[name]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,8 +92,8 @@ def is_result(kind: Any) -> bool:
 
 def unit_of_kind(kind: Any) -> Unit | None:
     """Return the unit of a number's annotation, or None for other annotations."""
-    found = quantity(kind)
-    return None if found is None else parse_unit(found.unit)
+    declared = quantity(kind)
+    return None if declared is None else parse_unit(declared.unit)
 
 
 def unit_of_line(result: Any, name: str) -> Unit:

@@ -29,7 +29,7 @@ def schema() -> dict[str, Any]:
     arguments = [one for check in checks.values() for one in arguments_of(check).values()]
     units = {str(unit) for one in arguments if (unit := unit_of_kind(without_none(one.kind)))}
     quantities = Quantities(units)
-    known = {name: _check(check, quantities) for name, check in checks.items()}
+    schemas = {name: _check(check, quantities) for name, check in checks.items()}
     return {
         "$schema": DRAFT,
         "title": "modelica-like sizing file",
@@ -49,7 +49,7 @@ def schema() -> dict[str, Any]:
                 "additionalProperties": {"type": "array", "items": _TEXT},
             },
         },
-        "definitions": {"check": chosen(known), **known, **quantities.definitions()},
+        "definitions": {"check": chosen(schemas), **schemas, **quantities.definitions()},
     }  # fmt: skip
 
 
@@ -61,7 +61,7 @@ def _check(check: Check, quantities: Quantities) -> dict[str, Any]:
     }
     result = hints(check)["return"]
     lines = [one.name for one in dataclasses.fields(result)] if dataclasses.is_dataclass(result) else []
-    own = {
+    common = {
         "is": {"const": check.__name__},
         "note": {**_TEXT, "description": "a remark that is printed"},
         "limits": {"type": "object", "description": f"min and max of {', '.join(lines)}", "additionalProperties": True},
@@ -69,17 +69,17 @@ def _check(check: Check, quantities: Quantities) -> dict[str, Any]:
     }
     return {
         "type": "object", "required": ["is"], "description": text.partition("\n")[0],
-        "properties": {**own, **properties}, "additionalProperties": False,
+        "properties": {**common, **properties}, "additionalProperties": False,
     }  # fmt: skip
 
 
 def _argument(one: Argument, meaning: str, quantities: Quantities) -> dict[str, Any]:
     kind = without_none(one.kind)
     unit = unit_of_kind(kind)
-    made: dict[str, Any] = {"description": meaning + (f" [{unit}]" if unit and unit.atoms else "")}
+    result: dict[str, Any] = {"description": meaning + (f" [{unit}]" if unit and unit.atoms else "")}
     if unit is not None:
         value = {"anyOf": [{"type": "number"}, quantities.text(unit), _RUN]}
-        made |= {"anyOf": [*value["anyOf"], {"type": "array", "items": value}]}
+        result |= {"anyOf": [*value["anyOf"], {"type": "array", "items": value}]}
     if isinstance(one.default, bool | int | float | str):
-        made["default"] = one.default
-    return made
+        result["default"] = one.default
+    return result

@@ -68,17 +68,17 @@ class Checkpoint:
         """Write the results of a chunk."""
         self._group["values"][done.first : done.first + len(done.values)] = done.values
         number = done.first // self._size
-        told = {name: value for name, value in vars(done).items() if name not in ("first", "values")}
-        write_text(self.path / f"told-{number}.json", json.dumps(told))
+        record = {name: value for name, value in vars(done).items() if name not in ("first", "values")}
+        write_text(self.path / f"told-{number}.json", json.dumps(record))
         self._group["done"][number] = True
 
     def results(self) -> Done:
         """Return all finished results."""
-        found = Done(0, self._group["values"][:])
+        results = Done(0, self._group["values"][:])
         for number in np.flatnonzero(self._group["done"][:]):
-            told = json.loads((self.path / f"told-{number}.json").read_text(encoding="utf-8"))
-            found.add(Done(0, None, **told))
-        return found
+            record = json.loads((self.path / f"told-{number}.json").read_text(encoding="utf-8"))
+            results.add(Done(0, None, **record))
+        return results
 
 
 def _made(folder: Path) -> Path:

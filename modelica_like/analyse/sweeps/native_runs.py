@@ -43,10 +43,10 @@ class NativeRuns:
         self._model, self._names, self._outputs, self._begin = model, names, outputs, span[0]
         # The last reading is the time at the end, where a component may end a run earlier.
         parts = [*(one.parts(model) for one in outputs), [Part("end", "time")]]
-        known = _with_expressions(model, [part for some in parts for part in some])
-        readings = [[one for part in some for one in _readings(model, known, part)] for some in parts]
+        extended = _with_expressions(model, [part for some in parts for part in some])
+        readings = [[one for part in some for one in _readings(model, extended, part)] for some in parts]
         self._lasts = np.cumsum([len(some) for some in readings])
-        self._batch = Batch(known, [one for some in readings for one in some], options, span, settings.get("start"))
+        self._batch = Batch(extended, [one for some in readings for one in some], options, span, settings.get("start"))
         self._places = [model.fixed_position[name] for name in names]
 
     def run(self, points: Any, stop: ctypes.c_int | None = None) -> tuple[Vector, dict[int, str], list[int]]:
@@ -83,13 +83,13 @@ class NativeRuns:
         if any(one.min is not None or one.max is not None for one in model.flat_derived):
             for one, values in zip(model.flat_derived, model.derived(p.T).full(), strict=True):
                 fine &= np.isfinite(values) & _within(values, one.min, one.max)
-        told: dict[int, str] = {}
+        refusals: dict[int, str] = {}
         for k in np.flatnonzero(~fine).tolist():
             try:
                 model.with_parameters(dict(zip(self._names, points[k].tolist(), strict=True)))
             except ModelicaLikeError as error:
-                told[k] = str(error)
-        return told
+                refusals[k] = str(error)
+        return refusals
 
 
 def _within(values: Vector, low: float | None, high: float | None) -> Any:
@@ -118,11 +118,11 @@ def _with(model: CompiledDae, more: Mapping[str, Part]) -> CompiledDae:
     return twin
 
 
-def _readings(model: CompiledDae, known: CompiledDae, part: Part) -> list[Reading]:
+def _readings(model: CompiledDae, extended: CompiledDae, part: Part) -> list[Reading]:
     """Return what a part is in the run-time: their sum."""
     if part.kind == "change":
         return [Reading("change", model.discrete_position[part.text], part.change)]
     if part.kind == "impact":
         places = [k for k, one in enumerate(model.holds) if part.text in ("", one.component)]
         return [Reading("impact", k) for k in places]
-    return [Reading(part.kind, known.position[_key(part)], moment=part.moment)]
+    return [Reading(part.kind, extended.position[_key(part)], moment=part.moment)]

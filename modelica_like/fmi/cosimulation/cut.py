@@ -70,10 +70,10 @@ def cut_netlist(assembly: Assembly, at: Sequence[str]) -> CutNetlist:
         cuts.setdefault(wire, cut)
     kept = [wire for wire in wires if wire not in cuts]
     kept += [replace(wire, ends=cut.far) for wire, cut in cuts.items() if len(cut.far) > 1 and not cut.signal]
-    found = CutNetlist(_groups(assembly, kept), tuple(kept), tuple(cuts.values()))
-    for cut in found.cuts:
-        _check_apart(assembly, found, cut)
-    return found
+    result = CutNetlist(_groups(assembly, kept), tuple(kept), tuple(cuts.values()))
+    for cut in result.cuts:
+        _check_apart(assembly, result, cut)
+    return result
 
 
 def _places(assembly: Assembly) -> str:
@@ -92,7 +92,7 @@ def _places(assembly: Assembly) -> str:
 def _wires(assembly: Assembly) -> list[Wire]:
     """Return all connections of the netlist itself, those of series named after their parts."""
     names = {ends: name for name, ends in assembly.wires.items()}
-    found: list[Wire] = []
+    wires: list[Wire] = []
     for statement in assembly.equations():
         if not isinstance(statement, Connection):
             continue
@@ -100,8 +100,8 @@ def _wires(assembly: Assembly) -> list[Wire]:
         if any("." not in end for end in ends):  # the netlist's own outer connector
             continue
         named = names.get(ends, "_".join(part.replace(".", "_") for part in map(_owner, ends)))
-        found.append(Wire(named, ends, not isinstance(statement.ends[0], Connector), statement.source))
-    return found
+        wires.append(Wire(named, ends, not isinstance(statement.ends[0], Connector), statement.source))
+    return wires
 
 
 def _path(end: Connector | Symbol) -> str:
@@ -185,9 +185,9 @@ def _nowhere(assembly: Assembly, name: str, connected: Sequence[str]) -> Excepti
             f"{name} is inside {part_of(name)}; only connections of the netlist itself can be cut.",
             advice=f"Split {part_of(name)}'s own netlist, or cut at one of its ends.",
         )
-    known = [*assembly.parts, *assembly.wires, *connected]
+    paths = [*assembly.parts, *assembly.wires, *connected]
     return UnknownName(
-        f"{assembly.label} has no shaft '{name}'{did_you_mean(name, known) or '.'}",
+        f"{assembly.label} has no shaft '{name}'{did_you_mean(name, paths) or '.'}",
         why="A name is a part (it is cut behind it), one of its ends (shaft.flange_a), or an entry of [connect].",
         advice=_places(assembly),
     )
@@ -217,8 +217,8 @@ def _groups(assembly: Assembly, wires: Iterable[Wire]) -> tuple[tuple[str, ...],
     )
 
 
-def _check_apart(assembly: Assembly, found: CutNetlist, cut: Cut) -> None:
-    inside = [end for end in cut.far if found.group_of(end) == found.group_of(cut.near)]
+def _check_apart(assembly: Assembly, netlist: CutNetlist, cut: Cut) -> None:
+    inside = [end for end in cut.far if netlist.group_of(end) == netlist.group_of(cut.near)]
     if not inside or (cut.signal and len(inside) < len(cut.far)):
         return
     near, far = part_of(cut.near), part_of(inside[0])
@@ -226,7 +226,7 @@ def _check_apart(assembly: Assembly, found: CutNetlist, cut: Cut) -> None:
         raise NetlistError(f"{cut.near} is inside the array {near}, which cannot be cut.", where=cut.source)
     raise NetlistError(
         f"{assembly.label} does not separate between {cut.near} and {inside[0]}.", where=cut.source,
-        why=f"{near} and {far} are also joined by {' – '.join(_way(found.wires, near, far))}.",
+        why=f"{near} and {far} are also joined by {' – '.join(_way(netlist.wires, near, far))}.",
         advice="Cut there as well: --at can be given several times.",
     )  # fmt: skip
 

@@ -77,8 +77,8 @@ def _system(data: Mapping[str, Any], lines: Lines, path: Path) -> System:
 
 def _unit(key: str, entry: Any) -> Unit:
     table, name = {"file": entry} if isinstance(entry, str) else entry, _name(key)
-    known = isinstance(table, dict) and isinstance(table.get("file"), str) and "\0" not in table["file"]
-    if not known or set(table) - {"file", "parameters"}:
+    is_file = isinstance(table, dict) and isinstance(table.get("file"), str) and "\0" not in table["file"]
+    if not is_file or set(table) - {"file", "parameters"}:
         raise NetlistError(f'{key} must be a table: {{ file = "{name}.fmu" }}, optionally with `parameters`.')
     if not name.isidentifier():
         raise NetlistError(f"{key}: the name of an FMU must be a word: letters, digits and _.")
@@ -123,10 +123,10 @@ def _time(key: str, value: Any) -> float:
     return to_si(toml.duration(key, value), parse_unit("s"), key)
 
 
-def _word(known: Sequence[str]) -> toml.Check:
+def _word(words: Sequence[str]) -> toml.Check:
     def check(key: str, value: Any) -> Any:
-        if value not in known:
-            raise UnknownName(f"{key} = {value!r} must be {' or '.join(known)}.")
+        if value not in words:
+            raise UnknownName(f"{key} = {value!r} must be {' or '.join(words)}.")
         return value
 
     return check

@@ -70,8 +70,8 @@ class _Joiner:
         self._stop()
         rest, crossing = self._rest()
         kept: dict[str, list[str]] = {}
-        made = (self._tried("connect", name, self._link, rest, ends, kept) for name, ends in crossing.items())
-        links = [link for link in made if link is not None]
+        crossings = (self._tried("connect", name, self._link, rest, ends, kept) for name, ends in crossing.items())
+        links = [link for link in crossings if link is not None]
         self._stop()
         if rest is not None:
             outputs = [link.source.variable for link in links if link.source.unit == self.title]
@@ -130,10 +130,10 @@ class _Joiner:
         return (to_si(value, unit, f"{fmu}.{key}") - unit.offset) / unit.factor
 
     def _variable(self, fmu: str, name: str) -> Any:
-        known = self.about[fmu].variables
-        if name not in known:
-            raise UnknownName(f"{fmu} has no variable '{name}'{did_you_mean(name, known) or '.'}")
-        return known[name]
+        variables = self.about[fmu].variables
+        if name not in variables:
+            raise UnknownName(f"{fmu} has no variable '{name}'{did_you_mean(name, variables) or '.'}")
+        return variables[name]
 
     def _refuse_other_mentions(self) -> None:
         """Refuse FMUs in sections that join flanges, or that give start values."""
@@ -170,8 +170,8 @@ class _Joiner:
         return assemble(replace(self.document, parts=parts, connect=connect), self.path)
 
     def _link(self, name: str, rest: Assembly | None, ends: list[str], kept: dict[str, list[str]]) -> Link | None:
-        found = [self._end(end, rest) for end in ends]
-        sources, targets = [e for e in found if not e.takes], [e for e in found if e.takes]
+        ports = [self._end(end, rest) for end in ends]
+        sources, targets = [e for e in ports if not e.takes], [e for e in ports if e.takes]
         if len(sources) != 1:
             names = ", ".join(map(str, sources or targets))
             what = "no output drives it" if not sources else "multiple outputs drive it"

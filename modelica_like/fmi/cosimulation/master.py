@@ -82,9 +82,9 @@ class Balance(Energies):
     def add(self, signals: Sequence[Signal], before: Sequence[float], size: float) -> None:
         """Add a step, by the trapezoidal rule."""
         flow, rate = signals[self.flow], signals[self.rate]
-        told = [_moved(flow.used, size), _moved(rate.used, size)]
-        delivered = (before[self.flow] * rate.used[0] + flow.reached * told[1]) * size / 2
-        received = (flow.used[0] * before[self.rate] + told[0] * rate.reached) * size / 2
+        used = [_moved(flow.used, size), _moved(rate.used, size)]
+        delivered = (before[self.flow] * rate.used[0] + flow.reached * used[1]) * size / 2
+        received = (flow.used[0] * before[self.rate] + used[0] * rate.reached) * size / 2
         self.delivered += delivered
         self.received += received
         self.throughput += (abs(delivered) + abs(received)) / 2

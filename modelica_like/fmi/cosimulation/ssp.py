@@ -44,10 +44,10 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
     ports += [(user.name, variable) for user in system.units for variable in user.parameters]
     file_of = {user.name: user.file.name for user in system.units}
     for user, variable in ports:
-        known = fmus[user].variables
-        if variable not in known:
+        variables = fmus[user].variables
+        if variable not in variables:
             raise UnknownName(
-                f"{user} ({file_of[user]}) has no variable '{variable}'{did_you_mean(variable, known) or '.'}"
+                f"{user} ({file_of[user]}) has no variable '{variable}'{did_you_mean(variable, variables) or '.'}"
             )
     homes: dict[Path, str] = {}
     for unit in system.units:

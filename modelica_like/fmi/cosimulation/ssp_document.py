@@ -66,10 +66,10 @@ def _component(
     parts: Element, unit: Unit, fmu: DescribedFmu, source: str, ports: list[Port], version: Version
 ) -> None:  # fmt: skip
     one = element(parts, "ssd:Component", name=unit.name, type=FMU_TYPE, source=source, implementation="CoSimulation")
-    own = [fmu.variables[port.variable] for port in ports if port.unit == unit.name]
-    if own:
+    variables = [fmu.variables[port.variable] for port in ports if port.unit == unit.name]
+    if variables:
         connectors = element(one, "ssd:Connectors")
-        for variable in own:
+        for variable in variables:
             connector = element(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
             _type(connector, "ssc", variable, version)
     if unit.parameters:
@@ -105,18 +105,18 @@ def _kind(kind: str, version: Version) -> str | None:
 
 def _units(top: Element, used: list[tuple[DescribedFmu, str]]) -> None:
     """Write the units of all variables that are mentioned."""
-    known: dict[str, UnitDefinition] = {}
+    units: dict[str, UnitDefinition] = {}
     for fmu, name in used:
         unit = fmu.variables[name].unit
         if not unit:
             continue
         definition = fmu.units.get(unit, UnitDefinition(unit))
-        if known.setdefault(unit, definition) != definition:
+        if units.setdefault(unit, definition) != definition:
             raise NetlistError(f"Two FMUs define the unit '{unit}' differently, which an SSP cannot express.")
-    if known:
+    if units:
         group = element(top, "ssd:Units")
-        for name in sorted(known):
-            one = known[name]
+        for name in sorted(units):
+            one = units[name]
             base: dict[str, object] = dict(one.exponents)
             base |= {} if one.factor == 1.0 else {"factor": one.factor}
             base |= {} if one.offset == 0.0 else {"offset": one.offset}

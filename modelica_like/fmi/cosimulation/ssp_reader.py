@@ -77,9 +77,9 @@ class _Reader:
         parameters = self._parameters(outer)
         units = tuple(Unit(self.names[path], file, parameters[path]) for path, file in self.files_of.items())
         bonds = find_bonds(links) if note is None else tuple(map(_bond, note.iterfind("ml:Bond", NAMES)))
-        own = note is not None and note.get("ownNames") == "true"
+        own_names = note is not None and note.get("ownNames") == "true"
         title = self.top.get("name") or self.root.xml.get("name") or Path(self.files.name).stem
-        system = System(title, units, links, bonds, self._settings(note), own)
+        system = System(title, units, links, bonds, self._settings(note), own_names)
         check_system(system)
         return system
 
@@ -164,28 +164,28 @@ class _Reader:
 
     def _units_of(self, end: Target) -> list[UnitDefinition]:
         path, name = end
-        own = self.fmus[path].unit_of(name) if path in self.fmus else None
-        return [unit for unit in (own, self._unit_of(end)) if unit is not None]
+        own_unit = self.fmus[path].unit_of(name) if path in self.fmus else None
+        return [unit for unit in (own_unit, self._unit_of(end)) if unit is not None]
 
     # -- values ------------------------------------------------------------------------------------------------------
 
     def _parameters(self, outer: Mapping[Target, Target]) -> dict[ElementPath, dict[str, float]]:
         """Return the values of each component: those bound to it, and those bound to its sources outside."""
         bound = ssp.bound_values(self.root, self.files, self.units)
-        found: dict[ElementPath, dict[str, float]] = {path: {} for path in self.fmus}
+        values: dict[ElementPath, dict[str, float]] = {path: {} for path in self.fmus}
         for target in {**bound, **outer}:
             source = outer[target] if outer.get(target) in bound else target
             (path, name), fmu = target, self.fmus.get(target[0])
             if source not in bound or fmu is None or name not in fmu.variables:
                 continue  # the standard ignores values without a receiver
-            given, own = bound[source], fmu.unit_of(name)
+            given, own_unit = bound[source], fmu.unit_of(name)
             # A value that was given for a connector of a system is in the connector's unit if it has none.
             unit = given.unit if source == target else given.unit or self._unit_of(source)
-            value = unit.convert(given.value, own) if unit and own else given.value
+            value = unit.convert(given.value, own_unit) if unit and own_unit else given.value
             if not isfinite(value):
                 raise NetlistError(f"{_text(target)} = {value:g} is not finite.", where=given.place)
-            found[path][name] = value
-        return found
+            values[path][name] = value
+        return values
 
     def _unit_of(self, end: Target) -> UnitDefinition | None:
         """Return the unit that a connector says it has."""

@@ -105,8 +105,8 @@ def pint_registry() -> Any:
     """Return pint's registry of units; the first call creates it, in about half a second."""
     import pint
 
-    found: Any = pint.get_application_registry
-    return found().get()
+    registry: Any = pint.get_application_registry
+    return registry().get()
 
 
 def _ask_pint(name: str) -> Atom:

@@ -130,7 +130,7 @@ def _base_powers(name: str, power: Exponent) -> list[tuple[str, Exponent]]:
     plain = {"bar": "Pa", "degC": "K"}.get(name, name if atom.factor == 1.0 else name[1:])
     if plain in ATOMS and ATOMS[plain].factor == 1.0 and ATOMS[plain].exponents == atom.exponents:
         return [(plain, power)]
-    return [(base, power * own) for base, own in zip(BASE, atom.exponents, strict=True)]
+    return [(base, power * exponent) for base, exponent in zip(BASE, atom.exponents, strict=True)]
 
 
 # --- text -----------------------------------------------------------------------------------------------------------

@@ -122,15 +122,15 @@ class _Builder:
             part = part_of(self.instance, member)
             setattr(self.component, name, self._part(name, member, part, member.given))
             return
-        made = [
+        parts = [
             self._part(f"{name}[{k}]", member, part_of(self.instance, member, k), element(member.given, k))
             for k in range(1, shape[0] + 1)
         ]
-        if made and isinstance(made[0], Connector):
-            for k, one in enumerate(made, 1):
+        if parts and isinstance(parts[0], Connector):
+            for k, one in enumerate(parts, 1):
                 setattr(self.component, f"{name}[{k}]", one)
         else:
-            setattr(self.component, name, made)
+            setattr(self.component, name, parts)
 
     def _part(self, name: str, member: Member, part: Instance | Known | str, given: Given) -> Component | Connector:
         self.instance.classes.spend(50, member.text, member.declaration.line)
@@ -167,11 +167,11 @@ class _Builder:
             self.notes.tell(f"{f'{self.instance.path}.{name}'.lstrip('.')} has no value; its start value is taken.")
         low, high = (self._number(basic.given.inner.get(one)) for one in ("min", "max"))
         fixed = self._known(basic.given.inner.get("fixed")) is not False
-        made = param(self._unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
+        parameter = param(self._unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
         outside = given.scope is not None and given.scope[0] is not self.instance
         if given.value is not None and not outside:
-            made.default = self._value(given, self.instance, "")
-        self.component._declare(name, made)
+            parameter.default = self._value(given, self.instance, "")
+        self.component._declare(name, parameter)
         if given.value is not None and outside:
             self.component.give(name, self._value(given, self.instance.owner, ""))
 
@@ -180,8 +180,8 @@ class _Builder:
         assert given.value is not None
         assert given.scope is not None
         node = Resolver(*given.scope)(given.value)
-        known = as_formula(node, prefix) if given.scope[0] is reader else None
-        if known is None:
+        formula = as_formula(node, prefix) if given.scope[0] is reader else None
+        if formula is None:
             numbers = Resolver(*given.scope, numeric=True)(given.value)
             if numbers.kind != "number":
                 raise refused("this value", given.scope[1], given.value.line)
@@ -190,7 +190,7 @@ class _Builder:
                     f"Line {given.value.line}: the formula is a number now, because a formula cannot have all of it."
                 )
             return numbers.args[0]
-        return known
+        return formula
 
     def _variable(self, path: str, name: str, member: Member, basic: Basic) -> None:
         description = member.declaration.description
@@ -227,21 +227,21 @@ class _Builder:
         self._display(path, basic)
         self._start(path, basic, field_made)
 
-    def _start(self, path: str, basic: Basic, made: Field) -> None:
+    def _start(self, path: str, basic: Basic, declared: Field) -> None:
         """Give the start value; it is fixed, or a first guess."""
         prefix = f"{self.instance.name}." if self.instance.owner is not None else ""
         given = basic.given.inner.get("start")
         fixed = self._known(basic.given.inner.get("fixed")) is True
-        if isinstance(made, Discrete):
+        if isinstance(declared, Discrete):
             before = self.statements.memory.get(path)
-            known = (
+            start = (
                 self._known(given)
                 if before is None
                 else Resolver(self.instance, self.instance.text).known()(before).args[0]
             )
-            made.default = float(known) if isinstance(known, bool | int | float) else 0.0
+            declared.default = float(start) if isinstance(start, bool | int | float) else 0.0
             return
-        if isinstance(made, Input) or basic.kind == "Boolean" or (given is None and not fixed):
+        if isinstance(declared, Input) or basic.kind == "Boolean" or (given is None and not fixed):
             return
         outside = given is not None and given.scope is not None and given.scope[0] is not self.instance
         value = (
@@ -252,7 +252,7 @@ class _Builder:
         if fixed:
             self.component.give(path, value)
         elif not outside and path in self.statements.states:
-            made.default = (
+            declared.default = (
                 self._value(given, self.instance, "") if given is not None and given.value is not None else value
             )
         elif value != 0.0:
@@ -311,11 +311,11 @@ class _Builder:
         )
 
     def _check_ends(self, ends: tuple[str, ...]) -> None:
-        found = [self.component._resolve(end) for end in ends]
-        kinds = {tuple(one.fields) for one in found if isinstance(one, WrittenConnector)}
+        connectors = [self.component._resolve(end) for end in ends]
+        kinds = {tuple(one.fields) for one in connectors if isinstance(one, WrittenConnector)}
         if len(kinds) > 1:
             raise ModelicaTextError(f"The connectors {', '.join(ends)} differ.")
-        for end, one in zip(ends, found, strict=True):
+        for end, one in zip(ends, connectors, strict=True):
             if not isinstance(one, Connector) and one.name in getattr(one.owner, "_instants", ()):
                 raise ModelicaTextError(
                     f"{end} is true for instants only, which a connection does not carry here.",
@@ -333,7 +333,7 @@ def _elements(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:
 
 
 def _connector(instance: Instance) -> WrittenConnector:
-    made = WrittenConnector(instance.text.description, free=True)
+    connector = WrittenConnector(instance.text.description, free=True)
     for name, member in instance.members.items():
         basic = basic_type(instance, member)
         if basic is None or basic.kind != "Real" or member.declaration.dimensions:
@@ -342,6 +342,6 @@ def _connector(instance: Instance) -> WrittenConnector:
         unit = builder._unit(basic)
         one = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
         one.owner, one.name = instance.text.name, name
-        made.__dict__["_own_fields"] = {**made._own_fields, name: one}
-    made.__dict__["kind"] = instance.text.path
-    return made
+        connector.__dict__["_own_fields"] = {**connector._own_fields, name: one}
+    connector.__dict__["kind"] = instance.text.path
+    return connector

@@ -55,15 +55,15 @@ class Classes:
         every = [inner for one in self.own for inner in one.walk()]
         models = [one for one in every if one.kind in ("model", "block", "class") and not one.partial]
         outermost = [one for one in models if one.owner is None] or models
-        found = [one for one in every if one.path == name or one.name == name] if name else outermost[-1:]
-        elsewhere = self.full(name) if name and not found else None
+        matches = [one for one in every if one.path == name or one.name == name] if name else outermost[-1:]
+        elsewhere = self.full(name) if name and not matches else None
         if isinstance(elsewhere, ClassText):
             return elsewhere
-        if not found:
+        if not matches:
             names = ", ".join(one.name for one in models) or "none"
             what = f"no class '{name}'" if name else "no model"
             raise ModelicaTextError(f"'{self.file.name}' has {what}. Its models: {names}.", where=self.own[0].place(1))
-        return found[0]
+        return matches[0]
 
     @property
     def spent(self) -> bool:
@@ -100,15 +100,17 @@ class Classes:
         level: ClassText | None = scope
         outermost = scope
         while level is not None:
-            found = self._inside(level, name) or self._imported(level, head, rest) or _tabled(f"{level.path}.{name}")
-            if found is not None:
-                return found
+            class_text = (
+                self._inside(level, name) or self._imported(level, head, rest) or _tabled(f"{level.path}.{name}")
+            )
+            if class_text is not None:
+                return class_text
             outermost, level = level, level.owner
         package = outermost.within
         while package:
-            found = self.full(f"{package}.{name}")
-            if found is not None:
-                return found
+            class_text = self.full(f"{package}.{name}")
+            if class_text is not None:
+                return class_text
             package = package.rpartition(".")[0]
         return self.full(f"Modelica.Units.SI.{rest}" if head in _SI else name)
 
@@ -120,9 +122,9 @@ class Classes:
             if not one.names and one.alias == head:
                 return self.full(one.path + after)
             if head in one.names or "*" in one.names:
-                found = self.full(f"{one.path}.{head}{after}")
-                if found is not None:
-                    return found
+                class_text = self.full(f"{one.path}.{head}{after}")
+                if class_text is not None:
+                    return class_text
         return None
 
     def _inside(self, level: ClassText, name: str) -> Found | None:
@@ -140,9 +142,9 @@ class Classes:
             for one in bases:
                 base = self.find(one.base, level)
                 if isinstance(base, ClassText) and base is not level:
-                    found = self._inside(base, name)
-                    if found is not None:
-                        return found
+                    class_text = self._inside(base, name)
+                    if class_text is not None:
+                        return class_text
             return None
         finally:
             self.open.remove(key)
@@ -161,8 +163,8 @@ class Classes:
             return _tabled(path) or path
         head, _, rest = path.partition(".")
         built = built_in().get(head)
-        found = self._inside(built, rest) if built is not None and rest else None
-        return found if found is not None else self._on_disk(path)
+        inner = self._inside(built, rest) if built is not None and rest else None
+        return inner if inner is not None else self._on_disk(path)
 
     def _on_disk(self, path: str) -> ClassText | Known | str | None:
         """Return a class of the package that the file belongs to."""
@@ -172,10 +174,10 @@ class Classes:
         for k, name in enumerate(names):
             for file in (place / f"{name}.mo", place / name / "package.mo"):
                 if file.is_file():
-                    found = self._of_file(file, name)
-                    if found is not None and k + 1 == len(names):
-                        return found
-                    inner = self._inside(found, ".".join(names[k + 1 :])) if found is not None else None
+                    class_text = self._of_file(file, name)
+                    if class_text is not None and k + 1 == len(names):
+                        return class_text
+                    inner = self._inside(class_text, ".".join(names[k + 1 :])) if class_text is not None else None
                     if inner is not None:
                         return inner
             place = place / name

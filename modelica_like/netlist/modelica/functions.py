@@ -35,10 +35,10 @@ def _line(args: tuple[Expr, ...], line: int) -> Expr:
 
 
 def _product(args: tuple[Expr, ...], line: int) -> Expr:
-    made = fold.number(1, line)
+    product = fold.number(1, line)
     for one in args[0].args:
-        made = fold.operation("*", (made, one), line)
-    return made
+        product = fold.operation("*", (product, one), line)
+    return product
 
 
 def _identity(args: tuple[Expr, ...], line: int) -> Expr:
@@ -66,11 +66,11 @@ OF_ARRAYS: dict[str, Callable[[tuple[Expr, ...], int], Expr]] = {
 
 def size(items: Expr, dimension: int, line: int) -> Expr:
     """Return the size of an array in one dimension, or in all as an array."""
-    made: list[Expr] = []
+    numbers: list[Expr] = []
     while items.kind == "array":
-        made.append(fold.number(len(items.args), line))
+        numbers.append(fold.number(len(items.args), line))
         items = items.args[0] if items.args else fold.number(0)
-    return made[dimension - 1] if 0 < dimension <= len(made) else Expr("array", tuple(made), line)
+    return numbers[dimension - 1] if 0 < dimension <= len(numbers) else Expr("array", tuple(numbers), line)
 
 
 def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named: Mapping[str, Expr]) -> Expr:
@@ -95,9 +95,9 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
         raise refused(f"the record {name}(…) as a value", resolver.text, line)
     if resolver.depth > _DEEPEST:
         raise refused(f"{name}, which calls itself,", resolver.text, line)
-    made = _Call(resolver, text).result(given, named, line)
-    known = made.kind in (*fold.KNOWN, "array")
-    return made if known else Expr("call", ("noEvent", (made,), ()), line)
+    result = _Call(resolver, text).result(given, named, line)
+    is_constant = result.kind in (*fold.KNOWN, "array")
+    return result if is_constant else Expr("call", ("noEvent", (result,), ()), line)
 
 
 class _Call:
@@ -163,9 +163,9 @@ class _Call:
         if not branches:
             return
         condition, statements = branches[0]
-        known = Expr("boolean", (True,)) if condition is None else self.here()(condition)
-        if known.kind == "boolean":
-            if known.args[0]:
+        holds = Expr("boolean", (True,)) if condition is None else self.here()(condition)
+        if holds.kind == "boolean":
+            if holds.args[0]:
                 self.run(statements)
             else:
                 self.branch(branches[1:], line)
@@ -176,7 +176,7 @@ class _Call:
         self.branch(branches[1:], line)
         for name, other in self.local.items():
             if taken[name] != other:
-                self.local[name] = _either(known, taken[name], other, line)
+                self.local[name] = _either(holds, taken[name], other, line)
 
     def loop(self, iterators: list[tuple[str, Expr | None]], statements: list[Statement]) -> None:
         (name, over), rest = iterators[0], iterators[1:]

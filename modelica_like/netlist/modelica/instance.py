@@ -52,7 +52,7 @@ class Given:
 
 def given(modification: Modification, scope: tuple[Instance, ClassText], line: int) -> Given:
     """Return a modification with its scope."""
-    made = Given(modification.value, scope if modification.value is not None else None, {}, None, line)
+    entry = Given(modification.value, scope if modification.value is not None else None, {}, None, line)
     for one in modification.arguments:
         inner = given(one.modification, scope, one.line)
         inner.each = one.each
@@ -62,8 +62,8 @@ def given(modification: Modification, scope: tuple[Instance, ClassText], line: i
         for name in reversed(one.name.split(".")[1:]):
             inner = Given(inner={name: inner}, line=one.line)
         name = one.name.split(".")[0]
-        made.inner[name] = inner.over(made.inner[name]) if name in made.inner else inner
-    return made
+        entry.inner[name] = inner.over(entry.inner[name]) if name in entry.inner else inner
+    return entry
 
 
 @dataclass(slots=True)
@@ -151,21 +151,21 @@ class Instance:
         for word in ("inner", "outer", "stream"):
             if word in one.prefixes:
                 raise refused(f"'{word}' before {one.name}", text, one.line)
-        made = given(one.modification, (self, text), one.line)
+        entry = given(one.modification, (self, text), one.line)
         from_outside = outer.inner.get(one.name)
         if from_outside is not None:
-            made = from_outside.over(made)
-        if isinstance(made.redeclared, Declaration):
-            new = made.redeclared
+            entry = from_outside.over(entry)
+        if isinstance(entry.redeclared, Declaration):
+            new = entry.redeclared
             scope = from_outside.scope if from_outside and from_outside.scope else (self, text)
-            made = given(new.modification, scope, new.line).over(made)
-            made.redeclared = None
+            entry = given(new.modification, scope, new.line).over(entry)
+            entry.redeclared = None
             prefixes = one.prefixes | new.prefixes
             one = Declaration(
                 prefixes, new.type, one.name, one.dimensions, one.modification, one.condition, one.description, new.line
             )
             text = scope[1]
-        self.members.setdefault(one.name, Member(one, text, made))
+        self.members.setdefault(one.name, Member(one, text, entry))
 
 
 def refused(what: str, text: ClassText, line: int, advice: str = "") -> ModelicaTextError:

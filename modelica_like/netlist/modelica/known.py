@@ -51,9 +51,9 @@ def library_part(
         ModelicaTextError, UnknownName: a parameter does not exist here, or has a value that is not supported.
     """
     part = _Part(owner, name, member, known, given, notes)
-    made = part.make(driven)
+    component = part.make(driven)
     initial += part.initial
-    return made
+    return component
 
 
 class _Part:
@@ -154,11 +154,11 @@ class _Part:
             return
         node = Resolver(*one.scope)(one.value)
         if one.scope[0] is not self.owner or (as_formula(node) is None and node.kind not in (*fold.KNOWN, "array")):
-            known = Resolver(*one.scope, numeric=True)(one.value)
-            if known != node:
+            number = Resolver(*one.scope, numeric=True)(one.value)
+            if number != node:
                 words = one.scope[1].place(one.value.line).text
                 self.notes.tell(f"{self.name}.{name} is a number now: a formula cannot have '{words}'.")
-            node = known
+            node = number
         if node.kind == "name" and name in self.known.omit:
             node = Resolver(*one.scope, numeric=True)(one.value)
         if node.kind != "number" or self.known.omit.get(name) != node.args[0]:
@@ -180,10 +180,10 @@ class _Part:
     def _equal(self, name: str, value: Expr, line: int) -> None:
         only = self.known.only[name]
         wanted = only if isinstance(only, list) else [only]
-        found = value.args[0].rpartition(".")[2] if isinstance(value.args[0], str) else value.args[0]
-        if found not in wanted:
+        actual = value.args[0].rpartition(".")[2] if isinstance(value.args[0], str) else value.args[0]
+        if actual not in wanted:
             raise refused(
-                f"{self.known.path.rpartition('.')[2]}.{name} = {found}", self.member.text, line,
+                f"{self.known.path.rpartition('.')[2]}.{name} = {actual}", self.member.text, line,
                 f"The component {self.known.component} has {name} = {' or '.join(map(str, wanted))} only.",
             )  # fmt: skip
 
@@ -205,12 +205,12 @@ class _Part:
         return value.args[0]
 
     def _value(self, value: Expr) -> Any:
-        made = as_formula(value)
-        if made is None:
-            made = as_formula(self._owners().known()(value))
-        if made is None:
+        formula = as_formula(value)
+        if formula is None:
+            formula = as_formula(self._owners().known()(value))
+        if formula is None:
             raise refused(f"this value for {self.name}", self.member.text, self.member.declaration.line)
-        return made
+        return formula
 
     def _start(self, part: Component, here: str, one: Given) -> None:
         unknown = [key for key in one.inner if key not in _ATTRIBUTES]
@@ -265,10 +265,10 @@ class _Part:
 
 def _without_jumps(rows: tuple[Any, ...], name: str, notes: Notes) -> tuple[Any, ...]:
     """Return a table over time in which two rows at one time are a microsecond apart."""
-    made: list[Any] = []
+    changed: list[Any] = []
     for row in rows:
-        if made and isinstance(row, tuple) and row[0] <= made[-1][0]:
-            row = (made[-1][0] + 1e-6, *row[1:])
+        if changed and isinstance(row, tuple) and row[0] <= changed[-1][0]:
+            row = (changed[-1][0] + 1e-6, *row[1:])
             notes.tell(f"{name}: where the table jumps, it does so in a microsecond.")
-        made.append(row)
-    return tuple(made)
+        changed.append(row)
+    return tuple(changed)

@@ -62,34 +62,36 @@ class _Form:
             if value is None:
                 raise ModelicaTextError(f"{name} has no value.")
             parameters[name] = self._text(value, unit, name)
-        made = Assembly(
+        assembly = Assembly(
             self.model._name, parts=parts, free=self.model.free_ends, description=self.model.__dict__["_description"],
             parameters=parameters, connect={_wire_name(ends, k): ends for k, ends in enumerate(self.wires, 1)},
         )  # fmt: skip
-        shown = {path: unit for path, unit in self.model.__dict__["_display"].items() if _is_shown(made, path, unit)}
-        made.__dict__.update(_simulate=dict(self.model.__dict__["_simulate"]), _display=shown)
-        return made
+        shown = {
+            path: unit for path, unit in self.model.__dict__["_display"].items() if _is_shown(assembly, path, unit)
+        }
+        assembly.__dict__.update(_simulate=dict(self.model.__dict__["_simulate"]), _display=shown)
+        return assembly
 
     def _left_out(self) -> None:
         """Leave out variables that are only computed from the parts; refuse equations that the parts depend on."""
-        own = {name for name, one in self.model.fields.items() if not isinstance(one, Parameter)}
+        signals = {name for name, one in self.model.fields.items() if not isinstance(one, Parameter)}
         joined = {end for ends in self.wires for end in ends}
         defined = {left.args[0][0] for left, _, _ in self.model._statements if left.kind == "name"}
-        if defined != own or own & joined or self.model._happenings or self.model._initial:
+        if defined != signals or signals & joined or self.model._happenings or self.model._initial:
             raise ModelicaTextError(
                 f"{self.model._name} has equations of its own; a netlist contains only parts and connections.",
                 where=[source for _, _, source in (*self.model._initial, *self.model._statements)[:1]],
                 advice="Load the text itself: load and all commands read it like a netlist.",
             )  # fmt: skip
-        if own:
-            self.notes.append(f"{', '.join(sorted(own))}: left out, because a netlist has no equations.")
+        if signals:
+            self.notes.append(f"{', '.join(sorted(signals))}: left out, because a netlist has no equations.")
 
     # -- units -------------------------------------------------------------------------------------------------------
 
     def _end(self, end: str) -> tuple[Component, str] | None:
         """Return part and name of a signal, None for a connector."""
-        found = self.model._resolve(end)
-        return None if isinstance(found, Connector) else (found.owner, found.name)
+        resolved = self.model._resolve(end)
+        return None if isinstance(resolved, Connector) else (resolved.owner, resolved.name)
 
     def _signal_units(self) -> None:
         """Find the units of signals whose blocks take any: from the ends that have one, through the blocks."""
@@ -106,10 +108,10 @@ class _Form:
     def _along(self, sets: list[list[tuple[Component, str]]]) -> bool:
         changed = False
         for ends in sets:
-            known = [unit for one in ends if (unit := self._unit(*one)) is not None]
+            units = [unit for one in ends if (unit := self._unit(*one)) is not None]
             for one in ends:
-                if known and self._unit(*one) is None:
-                    self._set(*one, known[0])
+                if units and self._unit(*one) is None:
+                    self._set(*one, units[0])
                     changed = True
         return changed
 
@@ -119,24 +121,24 @@ class _Form:
         ports = [name for name, one in block.fields.items() if isinstance(one, Input | Output) and one.unit == ANY]
         if kind == "Product":
             y, u1, u2 = (self._unit(block, name) for name in ("y", "u1", "u2"))
-            found = {
+            units_of = {
                 "y": u1 * u2 if u1 and u2 else None,
                 "u1": y / u2 if y and u2 else None,
                 "u2": y / u1 if y and u1 else None,
             }
-            new = [name for name, unit in found.items() if unit is not None and self._unit(block, name) is None]
+            new = [name for name, unit in units_of.items() if unit is not None and self._unit(block, name) is None]
             for name in new:
-                self._set(block, name, found[name])
+                self._set(block, name, units_of[name])
             return bool(new)
         value = block.value("k") if kind in _GAINS else None
         if kind in _GAINS and value is not None and value.formula is None:
             return False  # the unit of k may be any: it follows from both sides
         if kind in _GAINS:
             return self._gain(block, value)
-        known = next((unit for name in ports if (unit := self._unit(block, name)) is not None), None)
-        new = [name for name in ports if known is not None and self._unit(block, name) is None]
+        units = next((unit for name in ports if (unit := self._unit(block, name)) is not None), None)
+        new = [name for name in ports if units is not None and self._unit(block, name) is None]
         for name in new:
-            self._set(block, name, known)
+            self._set(block, name, units)
         return bool(new)
 
     def _gain(self, block: Component, value: Value | None) -> bool:
@@ -186,9 +188,9 @@ class _Form:
             owner, _, name = path.rpartition(".")
             return self.parameters[path] if not owner else self.model.find(owner).fields[name].unit
 
-        made = formula.evaluate(lambda path: leaves.setdefault(path, ca.SX.sym(path)))
-        found = Dimensions(unit_of).unit_or_any(made)
-        return None if found == ANY else found
+        expression = formula.evaluate(lambda path: leaves.setdefault(path, ca.SX.sym(path)))
+        unit = Dimensions(unit_of).unit_or_any(expression)
+        return None if unit == ANY else unit
 
     # -- values ------------------------------------------------------------------------------------------------------
 
@@ -215,8 +217,8 @@ class _Form:
         """Return a number with its unit; a formula stays if its unit fits."""
         if value.formula is None:
             return _quantity(value.number or 0.0, unit)
-        found = self._formula_unit(value.formula)
-        if found is not None and (same_dimension(found, unit) or unit == ANY):
+        formula_unit = self._formula_unit(value.formula)
+        if formula_unit is not None and (same_dimension(formula_unit, unit) or unit == ANY):
             return value.formula
         number = float(value.formula.evaluate(self._number))
         self.notes.append(

@@ -166,8 +166,8 @@ def _declarations(component: Component, write_formula: Callable[[Formula], str],
             text = write_formula(start.formula) if start is not None and start.formula is not None else repr(number)
             lines.append(f"  discrete Real {identifier(key)}(start = {text});")
     for key, mode in component.modes.items():
-        told = ", ".join(f"{number}: {one}" for number, one in enumerate(mode.names))
-        lines.append(f'  Integer {identifier(key)}(start = {mode.number(component.start_mode(key))}) "{told}";')
+        numbers = ", ".join(f"{number}: {one}" for number, one in enumerate(mode.names))
+        lines.append(f'  Integer {identifier(key)}(start = {mode.number(component.start_mode(key))}) "{numbers}";')
     return _arrays(lines)
 
 
@@ -229,11 +229,11 @@ def _text(expression: Any, component: Component, before: bool = False, events: C
     if operation in _SINGLE:
         return _SINGLE[operation](args[0])
     if operation == ca.OP_IF_ELSE_ZERO:
-        made = f"if {args[0]} then {args[1]} else 0"
-        return f"noEvent({made})" if quiet else f"({made})"
+        text = f"if {args[0]} then {args[1]} else 0"
+        return f"noEvent({text})" if quiet else f"({text})"
     if operation in _FUNCTIONS:
-        made = f"{_FUNCTIONS[operation]}({', '.join(args)})"
-        return f"noEvent({made})" if quiet and _FUNCTIONS[operation] in ("sign", "floor", "ceil") else made
+        text = f"{_FUNCTIONS[operation]}({', '.join(args)})"
+        return f"noEvent({text})" if quiet and _FUNCTIONS[operation] in ("sign", "floor", "ceil") else text
     raise ModelicaTextError(f"{component.label} uses a function that Modelica text does not have here.")
 
 

@@ -54,9 +54,9 @@ class Resolver:
     ) -> None:  # fmt: skip
         self.instance, self.text, self.numeric, self.depth = instance, text, numeric, depth
         self.local = dict(local or {})
-        found = classes or (instance.classes if instance else None)
-        assert found is not None
-        self.classes = found
+        lookup = classes or (instance.classes if instance else None)
+        assert lookup is not None
+        self.classes = lookup
 
     def __call__(self, expression: Expr) -> Expr:
         """Return the resolved expression.
@@ -95,10 +95,10 @@ class Resolver:
         """Resolve an `if`; branches that are known not to be taken are not looked at."""
         kept: list[Expr] = []
         for condition, value in zip(args[:-1:2], args[1::2], strict=True):
-            known = self(condition)
-            if known.kind != "boolean":
-                kept += [known, self(value)]
-            elif known.args[0]:
+            choice = self(condition)
+            if choice.kind != "boolean":
+                kept += [choice, self(value)]
+            elif choice.args[0]:
                 return Expr("if", (*kept, self(value)), line) if kept else self(value)
         return Expr("if", (*kept, self(args[-1])), line) if kept else self(args[-1])
 
@@ -117,10 +117,10 @@ class Resolver:
 
     def array(self, expression: Expr) -> tuple[Expr, ...]:
         """Return the elements of an array."""
-        made = self(expression)
-        if made.kind != "array":
+        result = self(expression)
+        if result.kind != "array":
             raise refused("a loop over something that is not an array", self.text, expression.line)
-        return made.args
+        return result.args
 
     def number(self, expression: Expr) -> float:
         """Return the value of an expression of constants and parameters.
@@ -128,8 +128,8 @@ class Resolver:
         Raises:
             ModelicaTextError: it has none.
         """
-        made = self if self.numeric else self.known()
-        value = made(expression)
+        resolved = self if self.numeric else self.known()
+        value = resolved(expression)
         if value.kind != "number":
             raise ModelicaTextError(
                 "A number is needed here that constants and parameters determine.",
@@ -174,8 +174,8 @@ class Resolver:
             chosen = self.index(one, len(value.args))
             if isinstance(chosen, Expr):
                 rest = subscripts[k + 1 :]
-                found = tuple(self.indexed(value, (index, *rest), line) for index in chosen.args)
-                return Expr("array", found, line)
+                rows = tuple(self.indexed(value, (index, *rest), line) for index in chosen.args)
+                return Expr("array", rows, line)
             value = value.args[chosen - 1]
         return value
 
@@ -201,8 +201,8 @@ class Resolver:
         (name, subscripts), rest = parts[0], parts[1:]
         member = owner.members.get(name)
         if member is None:
-            known = did_you_mean(name, owner.members) or "."
-            raise members.unknown_name(f"{owner.path or owner.text.name} has no '{name}'{known}", self.text, line)
+            hint = did_you_mean(name, owner.members) or "."
+            raise members.unknown_name(f"{owner.path or owner.text.name} has no '{name}'{hint}", self.text, line)
         basic = basic_type(owner, member)
         if basic is not None:
             if rest:
@@ -249,16 +249,16 @@ class Resolver:
         """Resolve a constant of a class, or a literal of an enumeration."""
         path, line = expression.path, expression.line
         package, _, name = path.rpartition(".")
-        found = self.find(package) if package else None
+        class_text = self.find(package) if package else None
         if package.endswith("StateSelect"):
             return Expr("literal", (name,), line)
-        if isinstance(found, ClassText) and found.literals:
-            if name not in found.literals:
+        if isinstance(class_text, ClassText) and class_text.literals:
+            if name not in class_text.literals:
                 raise members.unknown_name(
-                    f"{package} has no '{name}'{did_you_mean(name, found.literals) or '.'}", self.text, line
+                    f"{package} has no '{name}'{did_you_mean(name, class_text.literals) or '.'}", self.text, line
                 )
-            return Expr("literal", (f"{found.name}.{name}",), line)
-        holder = found if isinstance(found, ClassText) else None
+            return Expr("literal", (f"{class_text.name}.{name}",), line)
+        holder = class_text if isinstance(class_text, ClassText) else None
         if holder is None and not package:
             holder = self._around(name)
         if holder is None:
@@ -268,8 +268,8 @@ class Resolver:
             inside = Instance(self.classes, holder, Given())
             if name in inside.members:
                 return self.indexed(members.value_of(inside, name, self.text, line), expression.args[-1][1], line)
-        known = [*self.local, *(self.instance.members if self.instance else ())]
-        raise members.unknown_name(f"There is no '{path}'{did_you_mean(path, known) or '.'}", self.text, line)
+        names = [*self.local, *(self.instance.members if self.instance else ())]
+        raise members.unknown_name(f"There is no '{path}'{did_you_mean(path, names) or '.'}", self.text, line)
 
     def _imported_constant(self, name: str) -> ClassText | None:
         """Return the package of a constant that is imported by its own name."""
@@ -277,8 +277,8 @@ class Resolver:
         while level is not None:
             for one in level.elements:
                 if isinstance(one, Import) and name in (one.alias, *one.names):
-                    found = self.classes.full(one.path if name in one.names else one.path.rpartition(".")[0])
-                    return found if isinstance(found, ClassText) else None
+                    class_text = self.classes.full(one.path if name in one.names else one.path.rpartition(".")[0])
+                    return class_text if isinstance(class_text, ClassText) else None
             level = level.owner
         return None
 

@@ -188,18 +188,18 @@ class Statements:
         resolver = Resolver(self.instance, text, local)
         open_branches: list[tuple[Expr | None, Statements]] = []
         for condition, body in one.parts:
-            known = Expr("boolean", (True,)) if condition is None else resolver(condition)
-            if known.kind == "boolean" and not known.args[0]:
+            holds = Expr("boolean", (True,)) if condition is None else resolver(condition)
+            if holds.kind == "boolean" and not holds.args[0]:
                 continue
-            target = Statements(self.instance) if open_branches or known.kind != "boolean" else self
+            target = Statements(self.instance) if open_branches or holds.kind != "boolean" else self
             for inner in body:
                 target._statement(inner, text, local)
             if target is self:
                 return
             if target.connections or target.happenings:
                 raise refused("a connection or an event in a branch that changes during a run", text, one.line)
-            open_branches.append((None if known.kind == "boolean" else known, target))
-            if known.kind == "boolean":
+            open_branches.append((None if holds.kind == "boolean" else holds, target))
+            if holds.kind == "boolean":
                 break
         if not open_branches:
             return
@@ -249,22 +249,22 @@ class Statements:
     def _when(self, one: Statement, text: ClassText, local: dict[str, Expr]) -> None:
         resolver, source = Resolver(self.instance, text, local), text.place(one.line)
         branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]] = []
-        made: set[str] = set()
+        assigned: set[str] = set()
         for condition, body in one.parts:
             if condition is None:
                 raise refused("'else' of a 'when'", text, one.line)
-            known = resolver(condition)
-            conditions = known.args if known.kind == "array" else (known,)
+            holds = resolver(condition)
+            conditions = holds.args if holds.kind == "array" else (holds,)
             if any(each.kind in ("boolean", "number") for each in conditions):
                 raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
             values = self._changes(body, text, local)
             calls = (one.parts[0] for one in body if one.kind == "call" and one.parts[0].args[0] == "reinit")
             states = {resolver(call.args[1][0]).args[0][0] for call in calls}
-            made |= {name for name in values if name not in states and not _is_ending(name)}
+            assigned |= {name for name in values if name not in states and not _is_ending(name)}
             branches.append((conditions, values))
-        for name in made & self.assigned:
+        for name in assigned & self.assigned:
             raise ModelicaTextError(f"Two whens determine {name}.", where=source)
-        self.assigned |= made
+        self.assigned |= assigned
         self.happenings.append(Happening(tuple(branches), source))
 
     def _changes(self, body: list[Statement], text: ClassText, local: dict[str, Expr]) -> dict[str, Expr]:

@@ -219,13 +219,13 @@ def chain(signs: list[str], terms: list[Expr]) -> Expr:
 
     The tree of a long chain of products is as deep as it is long; sums, `and` and `or` are joined two by two.
     """
-    made = terms[0]
+    result = terms[0]
     if len(terms) <= CHAIN or signs[0] not in ("+", "-", "or", "and"):
         for sign, term in zip(signs, terms[1:], strict=True):
-            made = Expr(sign, (made, term), made.line)
-        return made
+            result = Expr(sign, (result, term), result.line)
+        return result
     pairs = zip(signs, terms[1:], strict=True)
-    items = [made, *(Expr("neg", (term,), term.line) if sign == "-" else term for sign, term in pairs)]
+    items = [result, *(Expr("neg", (term,), term.line) if sign == "-" else term for sign, term in pairs)]
     kind = "+" if signs[0] == "-" else signs[0]
     return joined(lambda one, other: Expr(kind, (one, other), one.line), items)
 

@@ -34,12 +34,12 @@ def groups(connections: list[tuple[Expr, Expr, Source]], instance: Instance) -> 
     for left, right, source in connections:
         for pair in _pairs(left, right, instance, source):
             touched = [one for one in wires if set(pair) & set(one.ends)]
-            made = Wire([], touched[0].source if touched else source)
+            wire = Wire([], touched[0].source if touched else source)
             for end in (*(end for one in touched for end in one.ends), *pair):
-                if end not in made.ends:
-                    made.ends.append(end)
+                if end not in wire.ends:
+                    wire.ends.append(end)
             wires = [one for one in wires if one not in touched]
-            wires.append(made)
+            wires.append(wire)
     return wires
 
 

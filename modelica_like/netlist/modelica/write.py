@@ -81,18 +81,18 @@ class _Writer:
         if not isinstance(part, list):
             kind, values = self._part(owner, name, part, joined)
             return f"{kind} {identifier(name)}{_arguments(values)}"
-        made = [self._part(owner, f"{name}[{k}]", one, joined) for k, one in enumerate(part, 1)]
-        kinds = {kind for kind, _ in made}
-        keys = {tuple(values) for _, values in made}
+        arguments = [self._part(owner, f"{name}[{k}]", one, joined) for k, one in enumerate(part, 1)]
+        kinds = {kind for kind, _ in arguments}
+        keys = {tuple(values) for _, values in arguments}
         if len(kinds) != 1 or len(keys) != 1:
             raise ModelicaTextError(
                 f"{owner.label}.{name} is an array of different parts, which Modelica does not have.",
                 where=owner.source_of(f"parts.{name}"), advice="Give each part a name of its own.",
             )  # fmt: skip
         values = {
-            key: (f"each {key}", made[0][1][key])
-            if all(one[key] == made[0][1][key] for _, one in made)
-            else (key, "{" + ", ".join(one[key] for _, one in made) + "}")
+            key: (f"each {key}", arguments[0][1][key])
+            if all(one[key] == arguments[0][1][key] for _, one in arguments)
+            else (key, "{" + ", ".join(one[key] for _, one in arguments) + "}")
             for key in keys.pop()
         }
         return f"{kinds.pop()} {identifier(name)}[{len(part)}]{_arguments(dict(values.values()))}"
@@ -240,20 +240,20 @@ class _Arguments:
 
     def _expression(self, text: str) -> str:
         """Return an expression of the component's fields with their values."""
-        made = text
+        result = text
         for name in _fields(text):
             if name in self.part._structural:
                 value = self._plain(name, self.part.__dict__[name])
             else:
-                known = self.part.value(name)
-                value = self.writer._value(known, self.owner) if known is not None else name
+                field_value = self.part.value(name)
+                value = self.writer._value(field_value, self.owner) if field_value is not None else name
                 value = value if re.fullmatch(r"[\w.]+", value) else f"({value})"
-            made = re.sub(rf"(?<![\w.]){name}(?![\w.])", lambda _, value=value: value, made)
-        node = parse_expression(made)
+            result = re.sub(rf"(?<![\w.]){name}(?![\w.])", lambda _, value=value: value, result)
+        node = parse_expression(result)
         if any(True for _ in names_in(node)) or any(True for _ in calls_in(node)):
-            return made
+            return result
         value = fold.known(node)
-        return made if value.kind == "array" else self._plain("", value.args[0])
+        return result if value.kind == "array" else self._plain("", value.args[0])
 
     def _defaults(self) -> None:
         """Write what the component takes where its class has another default."""
@@ -314,10 +314,13 @@ def formula_text(formula: Formula, owner: Component, outer: int = 0) -> str:
         return f"(-{formula_text(operands[0], owner, 3)})"
     if kind not in _PRECEDENCE:
         return f"{kind}({', '.join(formula_text(one, owner) for one in operands)})"
-    own = _PRECEDENCE[kind]
-    left, right = formula_text(operands[0], owner, own + (kind == "**")), formula_text(operands[1], owner, own + 1)
+    precedence = _PRECEDENCE[kind]
+    left, right = (
+        formula_text(operands[0], owner, precedence + (kind == "**")),
+        formula_text(operands[1], owner, precedence + 1),
+    )
     text = f"{left}{'^' if kind == '**' else f' {kind} '}{right}"
-    return f"({text})" if own < outer else text
+    return f"({text})" if precedence < outer else text
 
 
 def _fields(text: str) -> list[str]:

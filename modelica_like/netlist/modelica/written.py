@@ -108,13 +108,13 @@ class Written(Assembly):
             if one.text:
                 yield replace(assert_(self.symbolic(one.branches[0][0][0]), one.text), source=one.source)
                 continue
-            made = None
+            event = None
             for conditions, values in one.branches:
                 active = tuple(self.symbolic(condition) for condition in conditions)
                 new = dict[Any, Any](self._changed(path, value) for path, value in values.items())
-                made = when(active, new) if made is None else made.elsewhen(active, new)
-            if made is not None:
-                yield replace(made, source=one.source)
+                event = when(active, new) if event is None else event.elsewhen(active, new)
+            if event is not None:
+                yield replace(event, source=one.source)
 
     def _changed(self, path: str, value: Node) -> tuple[Any, Any]:
         """Return what a `when` changes, and its new value."""
@@ -154,15 +154,15 @@ class Written(Assembly):
             discrete = isinstance(symbol.owner.fields[symbol.name], Discrete)
             return symbol if discrete else ca.SX(symbol) > 0.5
         if kind == "if":
-            made = self.symbolic(args[-1], events)
+            result = self.symbolic(args[-1], events)
             for condition, value in reversed(list(zip(args[:-1:2], args[1::2], strict=True))):
-                made = where(self.symbolic(condition, events), self.symbolic(value, events), made, events=events)
-            return made
+                result = where(self.symbolic(condition, events), self.symbolic(value, events), result, events=events)
+            return result
         if kind == "call":
             events = False if args[0] == "noEvent" else events
             return self._called(args[0], [self.symbolic(one, events) for one in args[1]], events)
-        made = _OPERATIONS[kind](*(self.symbolic(one, events) for one in args))
-        return silent(made) if events is False and kind in _RELATIONS else made
+        result = _OPERATIONS[kind](*(self.symbolic(one, events) for one in args))
+        return silent(result) if events is False and kind in _RELATIONS else result
 
     def _called(self, name: str, values: list[Any], events: bool | None) -> Any:
         if name == "pre" and not (isinstance(values[0], Symbol) and is_a(values[0], Discrete)):

@@ -137,7 +137,7 @@ def page(
         "schematic": schematic, "script": script, "hash": script_hash(script),
     }  # fmt: skip
     text = (folder / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], text)
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], text)
 
 
 def joined_scripts(*files: Path) -> str:
@@ -222,18 +222,22 @@ def _spelled(unit: Unit) -> str:
     if unit in (ONE, ANY):
         return ""
     text = "°" if str(unit) == "deg" else str(unit).replace(".", "·")
-    return re.sub(r"(?<=[A-Za-z])\d+", lambda found: found[0].translate(_HIGH), text)
+    return re.sub(r"(?<=[A-Za-z])\d+", lambda match: match[0].translate(_HIGH), text)
 
 
 def _variables(
-    model: CompiledDae, known: dict[str, FmuVariable], signals: Sequence[Signal], units: _Units, display: Display
+    model: CompiledDae,
+    fmu_variables: dict[str, FmuVariable],
+    signals: Sequence[Signal],
+    units: _Units,
+    display: Display,
 ) -> Iterator[dict[str, Any]]:
     """Variables, each with its value reference; formulas as trees over several references."""
-    names, variables = {one.name for one in signals}, {one.path for one in model.flat_variables} & known.keys()
+    names, variables = {one.name for one in signals}, {one.path for one in model.flat_variables} & fmu_variables.keys()
     for one in model.flat_variables:
-        if one.path in known and (one.path in names or one.kind in ("local", "output")):
+        if one.path in fmu_variables and (one.path in names or one.kind in ("local", "output")):
             yield {
-                "name": one.path, "reference": known[one.path].reference, "description": one.description,
+                "name": one.path, "reference": fmu_variables[one.path].reference, "description": one.description,
                 "unit": units.number(parse_unit(display.of(one.path))), "shown": one.path in names,
                 "driving": one.driving,
             }  # fmt: skip
@@ -241,34 +245,34 @@ def _variables(
         if one.name not in variables:
             references: list[int] = []
             yield {
-                "name": one.name, "tree": _tree(one.formula, known, references), "references": references,
+                "name": one.name, "tree": _tree(one.formula, fmu_variables, references), "references": references,
                 "unit": units.number(parse_unit(one.shown_in(display))), "shown": True, "driving": 1,
             }  # fmt: skip
 
 
-def _tree(formula: Formula, known: Mapping[str, FmuVariable], references: list[int]) -> Any:
+def _tree(formula: Formula, variables: Mapping[str, FmuVariable], references: list[int]) -> Any:
     """A number; `[place]` for the value of a reference, -1 for time; or `[operation, operands…]`."""
     kind, operands = formula.operation, formula.operands
     if kind in ("number", "quantity"):
         return operands[0] if kind == "number" else si_value(operands[0])
     if kind != "name":
-        return [kind, *(_tree(one, known, references) for one in operands)]
-    if operands[0] != "time" and operands[0] not in known:
+        return [kind, *(_tree(one, variables, references) for one in operands)]
+    if operands[0] != "time" and operands[0] not in variables:
         raise UnknownName(f"A page with sliders cannot show '{operands[0]}': it has variables, parameters and modes.")
     if operands[0] != "time":
-        references.append(known[operands[0]].reference)
+        references.append(variables[operands[0]].reference)
     return [len(references) - 1 if operands[0] != "time" else -1]
 
 
-def _sliders(model: CompiledDae, known: dict[str, FmuVariable], display: Display) -> Iterator[dict[str, Any]]:
+def _sliders(model: CompiledDae, variables: dict[str, FmuVariable], display: Display) -> Iterator[dict[str, Any]]:
     """Adjustable values in the shown unit, with factor and offset to SI units."""
     inputs = (model.flat_variables[k] for k in model.inputs)
     for one in (*model.flat_parameters, *inputs):
         if isinstance(one, FlatParameter) and not one.tunable:
             continue
-        about, asked = known[one.path], display.of_quantity(str(one.unit))
-        unit = one.written if isinstance(one, FlatParameter) and one.written and asked == str(one.unit) else None
-        unit = unit or parse_unit(asked)
+        about, shown_unit = variables[one.path], display.of_quantity(str(one.unit))
+        unit = one.written if isinstance(one, FlatParameter) and one.written and shown_unit == str(one.unit) else None
+        unit = unit or parse_unit(shown_unit)
         shown = (None if si is None else (si - unit.offset) / unit.factor for si in (about.start, one.min, one.max))
         value, least, most = shown
         low, high, log = _span(value or 0.0, least, most)

@@ -146,22 +146,22 @@ def sheet(diagram: Diagram) -> Sheet:
     return _fitted(Sheet(list(placed.values()), list(lines.values()), x, 0.0))
 
 
-def _fitted(made: Sheet) -> Sheet:
+def _fitted(drawing: Sheet) -> Sheet:
     """Move everything so that it begins at zero."""
-    tops = [part.at[1] + part.room[1] for part in made.parts]
-    tops += [y for line in made.lines for path in line.paths for _, y in path]
-    bottoms = [part.at[1] + part.room[3] for part in made.parts]
-    bottoms += [y for line in made.lines for path in line.paths for _, y in path]
+    tops = [part.at[1] + part.room[1] for part in drawing.parts]
+    tops += [y for line in drawing.lines for path in line.paths for _, y in path]
+    bottoms = [part.at[1] + part.room[3] for part in drawing.parts]
+    bottoms += [y for line in drawing.lines for path in line.paths for _, y in path]
     top = min(tops, default=0.0)
-    for part in made.parts:
+    for part in drawing.parts:
         part.at = part.at[0], part.at[1] - top
-    for line in made.lines:
+    for line in drawing.lines:
         line.paths = [[(x, y - top) for x, y in path] for path in line.paths]
         line.dots = [(x, y - top) for x, y in line.dots]
         line.tips = {port: (x, y - top) for port, (x, y) in line.tips.items()}
         line.arrows = [((x, y - top), way) for (x, y), way in line.arrows]
-    made.height = max(bottoms, default=0.0) - top
-    return made
+    drawing.height = max(bottoms, default=0.0) - top
+    return drawing
 
 
 def _measure(node: Node) -> Placed:
@@ -253,8 +253,8 @@ def _heights(layers: Layers, placed: dict[Node, Placed]) -> dict[Slot, float]:
     least += [(off - (y - middle), 0.0), (off - (middle - y), 0.0)]
     # All unknowns are positive: add the space above.
     base = 1e4
-    found = solve_lp(ca.vertcat(y, middle, low, high, off), cost, [*least, (y - base, 0.0)])
-    return {slot: round(value, 3) for slot, value in zip(slots, found[: len(slots)], strict=True)}
+    solution = solve_lp(ca.vertcat(y, middle, low, high, off), cost, [*least, (y - base, 0.0)])
+    return {slot: round(value, 3) for slot, value in zip(slots, solution[: len(slots)], strict=True)}
 
 
 def _straighten(layers: Layers, heights: dict[Slot, float], placed: dict[Node, Placed]) -> None:
@@ -323,8 +323,8 @@ def _cost(order: Sequence[Net], ends: dict[Net, tuple[list[float], ...]]) -> flo
         for other in order[k + 1 :]:
             low, high = min(map(min, filter(None, ends[other]))), max(map(max, filter(None, ends[other])))
             total += sum(low < y < high for y in after)
-            own = [*before, *after]
-            total += sum(min(own) < y < max(own) for y in ends[other][0])
+            all_ends = [*before, *after]
+            total += sum(min(all_ends) < y < max(all_ends) for y in ends[other][0])
             total += 100.0 * sum(abs(a - b) < 4.0 for a in after for b in ends[other][0])
     return total
 

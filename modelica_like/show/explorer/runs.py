@@ -49,21 +49,21 @@ class Runs:
         self._settable |= {self.references[model.flat_variables[k].path] for k in model.inputs}
         self._running, self._analysing = threading.Lock(), threading.Lock()
 
-    def values(self, asked: Mapping[str, Any]) -> list[tuple[int, float]]:
+    def values(self, request: Mapping[str, Any]) -> list[tuple[int, float]]:
         """Return the value references of parameters and inputs in a request, with what they are, in SI units.
 
         Raises:
             KeyError, TypeError, ValueError: the request is wrong.
         """
-        return [(_known(reference, self._settable), number(value)) for reference, value in asked["values"]]
+        return [(_known(reference, self._settable), number(value)) for reference, value in request["values"]]
 
-    def outputs(self, asked: Mapping[str, Any]) -> list[int]:
+    def outputs(self, request: Mapping[str, Any]) -> list[int]:
         """Return the value references of the outputs in a request.
 
         Raises:
             KeyError, TypeError, ValueError: the request is wrong.
         """
-        return [_known(reference, self._names) for reference in asked["references"]]
+        return [_known(reference, self._names) for reference in request["references"]]
 
     def run(
         self, values: Sequence[tuple[int, float]], references: Sequence[int], until: float, wanted: Callable[[], bool]
@@ -143,11 +143,11 @@ class Runs:
         """
         given = {self._names[reference]: value for reference, value in values}
         with self._analysing:
-            found = sensitivities(self._model, [output], until=until, parameters=given)
-        (end,) = found.outputs
+            sensitivity = sensitivities(self._model, [output], until=until, parameters=given)
+        (end,) = sensitivity.outputs
         rows = [
             (one.name, relative if end.value else 0.01 * one.value * derivative)
-            for one, derivative, relative in found.ranking(output)
+            for one, derivative, relative in sensitivity.ranking(output)
         ]
         rows = [row for row in rows if row[1]][:_MOST_BARS]
         caption = (
@@ -192,7 +192,7 @@ def number(value: Any) -> float:
     return float(value)
 
 
-def _known(reference: Any, known: Collection[int]) -> int:
-    if not isinstance(reference, int) or reference not in known:
+def _known(reference: Any, allowed: Collection[int]) -> int:
+    if not isinstance(reference, int) or reference not in allowed:
         raise ValueError(f"there is no reference {reference}")
     return reference

@@ -50,7 +50,7 @@ def filled(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> Li
 def declared(kind: type[Component], notation: Notation) -> list[Listing]:
     """Return listings of connectors, fields, structural fields and modes, without empty ones."""
     code, text = notation.code, notation.text
-    made = [
+    listings = [
         filled(
             "connectors", ("name", "type", "potential, flow", "may be", "description"),
             (_connector_row(name, connector, notation) for name, connector in kind._class_connectors.items()),
@@ -59,7 +59,7 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
     for title, sort in _SORTS.items():
         fields = [field for field in kind._class_fields.values() if sort is _sort_of(field)]
         head = ("name", "symbol", "unit", "default", "range", "description")
-        made.append(filled(title, head, (_field_row(field, notation) for field in fields)))
+        listings.append(filled(title, head, (_field_row(field, notation) for field in fields)))
     described = {name: one.description for name, one in kind._tables.items()}
     described |= {name: words for name, words in texts_of_fields(kind).items() if words}
     structure = (
@@ -70,13 +70,13 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
         )
         for name, default in kind._structural.items()
     )
-    made.append(filled("structure", ("name", "default", "description"), structure))
+    listings.append(filled("structure", ("name", "default", "description"), structure))
     modes = (
         (code(name), ", ".join(f"{one} ({k})" for k, one in enumerate(mode.names)), mode.start, text(mode.description))
         for name, mode in kind._class_modes.items()
     )
-    made.append(filled("modes", ("name", "one of (number)", "start", "description"), modes))
-    return [one for one in made if one.rows]
+    listings.append(filled("modes", ("name", "one of (number)", "start", "description"), modes))
+    return [one for one in listings if one.rows]
 
 
 def _sort_of(field: Field) -> type[Field]:

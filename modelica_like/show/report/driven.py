@@ -89,15 +89,15 @@ def _chains(drawn: Diagram) -> list[list[Node]]:
 
 def _givers(group: list[Node], run: Solution, rows: tuple[EnergyRow, ...], least: float) -> list[Node]:
     """Return the parts at the ends of a chain that push it; none if something there takes energy out."""
-    span, found = float(run.time[-1] - run.time[0]), list[Node]()
+    span, nodes = float(run.time[-1] - run.time[0]), list[Node]()
     for node in group:
         ports = [port for port in node.ports.values() if _moves(port)]
         if len(ports) != 1 or node.component is None:
             continue
-        own = [row for row in rows if f"{row.component}.".startswith(f"{path_of(node.component)}.")]
+        powers = [row for row in rows if f"{row.component}.".startswith(f"{path_of(node.component)}.")]
         into = (power_into(ports[0], run) or 0.0) * span
-        if (into > least and sum(row.lost for row in own) > least) or sum(row.source for row in own) < -least:
+        if (into > least and sum(row.lost for row in powers) > least) or sum(row.source for row in powers) < -least:
             return []
-        if -into - max(0.0, -sum(row.stored for row in own)) > least:
-            found.append(node)
-    return found
+        if -into - max(0.0, -sum(row.stored for row in powers)) > least:
+            nodes.append(node)
+    return nodes

@@ -82,14 +82,14 @@ def write_solution(
     )  # fmt: skip
 
 
-def write_dataset(found: xarray.Dataset, path: Path) -> None:
+def write_dataset(dataset: xarray.Dataset, path: Path) -> None:
     """Write a sweep as a table, one row per run, or as netCDF; see `write_solution`.
 
     Raises:
         NetlistError: no table has this ending.
         OSError: the file cannot be written.
     """
-    _write(path, lambda file: found.to_dataframe().to_csv(file), found.to_dataframe, lambda: found)
+    _write(path, lambda file: dataset.to_dataframe().to_csv(file), dataset.to_dataframe, lambda: dataset)
 
 
 def _write(

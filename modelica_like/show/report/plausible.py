@@ -76,8 +76,8 @@ def _neighbours(drawn: Diagram) -> Iterator[str]:
     joined = {node: {port.node for net in drawn.nets if any(one.node is node for one in net.ports) for port in net.ports
                      if not port.signal} for node in drawn.nodes}  # fmt: skip
     for unit, (what, slip) in _COMPARED.items():
-        sized = {node: found for node in joined if (part := node.component) and (found := _size(part, unit))}
-        told = set[frozenset[str]]()
+        sized = {node: amount for node in joined if (part := node.component) and (amount := _size(part, unit))}
+        pairs = set[frozenset[str]]()
         for node, (name, value) in sized.items():
             reached, pending = {node}, deque([node])
             while pending:
@@ -90,8 +90,8 @@ def _neighbours(drawn: Diagram) -> Iterator[str]:
                         continue
                     near, size = sized[other]
                     pair = frozenset((name, near))
-                    if value > _FAR * size and pair not in told:
-                        told.add(pair)
+                    if value > _FAR * size and pair not in pairs:
+                        pairs.add(pair)
                         yield (
                             f"{name} is {value / size:.2g} times {near}: is the {what} of one of them in the wrong "
                             f"unit ({slip})?"
@@ -161,8 +161,8 @@ def _beyond(run: Solution) -> Iterator[str]:
     for (one, bound, kind), (value, time) in zip(bounds, worst, strict=True):
         beyond, verb = (value - bound, "exceeds") if kind == "max" else (bound - value, "falls below")
         if beyond > _ROUNDING * max(abs(bound), one.nominal):
-            told = f"{value:.6g} {one.unit} at {time:.6g} s"
-            yield f"{one.path} {verb} its declared bound {bound:g} {one.unit}: it is {told}."
+            extreme = f"{value:.6g} {one.unit} at {time:.6g} s"
+            yield f"{one.path} {verb} its declared bound {bound:g} {one.unit}: it is {extreme}."
 
 
 def _is_source(part: Component) -> bool:

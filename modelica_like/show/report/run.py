@@ -77,12 +77,12 @@ def values_table(solution: Trajectories, words: Sequence[str], display: Mapping[
     extremes = _extremes(solution, signals)
     for one in signals:
         unit = one.shown_in(shown)
-        first, last, *told = shown.converted(
+        first, last, *shown_values = shown.converted(
             np.array([*values[one.name][[0, -1]], *extremes[one.name][0]]), one.unit, unit
         )
         low, high = extremes[one.name][1]
         named = "" if unit in ("1", "*") else unit
-        rows.append((one.name, named, *map(float, (first, last, told[0], low, told[1], high))))
+        rows.append((one.name, named, *map(float, (first, last, shown_values[0], low, shown_values[1], high))))
     heads = "first>.6g", "last>.6g", "smallest>.6g", "smallest at s>.6g", "largest>.6g", "largest at s>.6g"
     title = "values" if isinstance(solution, Solution) else "values at the results"
     return table(title, "name", "unit", *heads, rows=rows, name="values", most=_SHOWN, rest=", which --csv writes")
@@ -106,15 +106,15 @@ def notices(solution: Trajectories) -> list[str]:
     Of inputs a sentence tells the largest value; of a run that has not kept what happens between its results, the
     least that it can be.
     """
-    told: dict[tuple[str, str], str] = {}
+    notes: dict[tuple[str, str], str] = {}
     for event in (one for one in solution.events if one.transition >= 0):
         notice, (component, dot, _) = solution.model.transitions[event.transition].notice, event.mode.rpartition(".")
         ends = solution.model.transitions[event.transition].ends
-        if notice and not ends and (component, notice) not in told:
+        if notice and not ends and (component, notice) not in notes:
             path = component + dot
             values = NAME_IN_NOTICE.sub(lambda name, path=path: _largest(solution, path + name[1]), notice)
-            told[component, notice] = f"At {event.time:.9g} s {component or solution.model.name} {values}."
-    return [*solution.notices, *told.values()]
+            notes[component, notice] = f"At {event.time:.9g} s {component or solution.model.name} {values}."
+    return [*solution.notices, *notes.values()]
 
 
 def _largest(solution: Trajectories, path: str) -> str:

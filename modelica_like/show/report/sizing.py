@@ -51,9 +51,9 @@ def _check_tables(check: CheckedResult) -> Iterator[RenderableType]:
         yield f"[dim]{escape(check.note)}[/]"
     for title, rows in check.result.tables().items():
         yield ""
-        made = _rows(title, rows)
-        made.name = f"{check.name}: {title}"
-        yield made
+        tables = _rows(title, rows)
+        tables.name = f"{check.name}: {title}"
+        yield tables
 
 
 def _published(check: CheckedResult, line: str) -> list[str]:
@@ -109,8 +109,8 @@ def check_page(name: str, check: Check) -> RenderableType:
         (one.name, _kind(one), "" if one.required else str(one.default), described.get(one.name, ""))
         for one in arguments_of(check).values()
     )
-    made = table("arguments", "name*", "unit", "default", "meaning", rows=rows)
-    return Group(f"[bold]{name}[/]", escape(text), "", made)
+    tables = table("arguments", "name*", "unit", "default", "meaning", rows=rows)
+    return Group(f"[bold]{name}[/]", escape(text), "", tables)
 
 
 def _kind(argument: Argument) -> str:

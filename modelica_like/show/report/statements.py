@@ -28,8 +28,8 @@ def statements(kind: type[Component]) -> dict[str, list[str]]:
         for name in ("equations", "initial_equations", "events", *_ENERGY)
         if (of := reader.source.method(name))
     }
-    made = {name: list(reader.body(of, of.code.body, {})) for name, of in said.items() if name not in _ENERGY}
-    made["energy"] = [line for name, of in said.items() if name in _ENERGY for line in reader.defined(of)]
+    by_method = {name: list(reader.body(of, of.code.body, {})) for name, of in said.items() if name not in _ENERGY}
+    by_method["energy"] = [line for name, of in said.items() if name in _ENERGY for line in reader.defined(of)]
     done: set[str] = set(_ENERGY)
     where: list[str] = []
     while missing := [name for name in reader.found if name not in done]:
@@ -37,7 +37,7 @@ def statements(kind: type[Component]) -> dict[str, list[str]]:
             done.add(name)
             where += reader.defined(reader.found[name], name)
     where += [f"{shown(name)} = {value}" for name, value in reader.constants.items()]
-    return {title.replace("_", " "): lines for title, lines in {**made, "where": where}.items() if lines}
+    return {title.replace("_", " "): lines for title, lines in {**by_method, "where": where}.items() if lines}
 
 
 def shown(name: str) -> str:
@@ -121,23 +121,23 @@ class _Reader:
         arguments = call.args
         match call.func:
             case ast.Attribute(value=ast.Call(func=ast.Name(id="super")), attr=name):
-                found = self.source.method(name, of.owner)
+                function = self.source.method(name, of.owner)
             case ast.Attribute(value=ast.Name(id="self"), attr=name):
-                found = self.source.method(name)
+                function = self.source.method(name)
             case ast.Attribute(value=ast.Name(id=base), attr=name) if isinstance(of.constants.get(base), type):
-                found, arguments = in_class(of.constants[base], name), arguments[1:]
+                function, arguments = in_class(of.constants[base], name), arguments[1:]
             case ast.Name(id=name) if _is_own(of.constants.get(name)):
-                found = plain_function(name, of.constants[name])
+                function = plain_function(name, of.constants[name])
             case ast.Attribute(value=ast.Call(), attr="equations" | "events"):
                 return  # of the language's own class
             case _:
                 yield self.text(of, call, names)
                 return
-        if found is not None:
-            formal = [one.arg for one in found.code.args.args if one.arg != "self"]
+        if function is not None:
+            formal = [one.arg for one in function.code.args.args if one.arg != "self"]
             given = dict(zip(formal, arguments, strict=False)) | {one.arg or "": one.value for one in call.keywords}
             meant = {name: self._replaced(of, value, names) for name, value in given.items()}
-            yield from self.body(found, found.code.body, meant)
+            yield from self.body(function, function.code.body, meant)
 
     def text(self, of: Function, code: ast.AST, names: Names) -> str:
         """Return code as in formulas: without `self`, local names by what they mean."""
@@ -182,14 +182,14 @@ class _Replace(ast.NodeTransformer):
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         match node.value:
             case ast.Name(id="self"):
-                if (found := self._reader.source.method(node.attr)) is not None:
-                    self._reader.found.setdefault(node.attr, found)
+                if (method := self._reader.source.method(node.attr)) is not None:
+                    self._reader.found.setdefault(node.attr, method)
                 return ast.Name(shown(node.attr))
             case ast.Call(func=ast.Name(id="super")):
-                found = self._reader.source.method(node.attr, self._of.owner)
-                name = f"{found.owner.__name__}.{node.attr}" if found and found.owner else node.attr
-                if found is not None:
-                    self._reader.found.setdefault(name, found)
+                method = self._reader.source.method(node.attr, self._of.owner)
+                name = f"{method.owner.__name__}.{node.attr}" if method and method.owner else node.attr
+                if method is not None:
+                    self._reader.found.setdefault(name, method)
                 return ast.Name(shown(name))
             case _:
                 return self.generic_visit(node)  # type: ignore[return-value]

@@ -65,9 +65,9 @@ def _sizes(flat: FlatModel, reduced: ReducedDae) -> Listed:
 
 def listed(names: Iterable[str]) -> str:
     """Return the first names and the number of others."""
-    known = list(names)
-    more = f", … {len(known) - _SHOWN} more" if len(known) > _SHOWN else ""
-    return ", ".join(known[:_SHOWN]) + more
+    items = list(names)
+    more = f", … {len(items) - _SHOWN} more" if len(items) > _SHOWN else ""
+    return ", ".join(items[:_SHOWN]) + more
 
 
 def _is_there(term: Expr | float) -> bool:

@@ -121,8 +121,8 @@ class Writer:
     def path(self, node: ast.expr) -> Path | None:
         """Return the path of a chain of names."""
         if isinstance(node, ast.Name):
-            known = self.local.get(node.id)
-            return Path("") if node.id == "self" else known if isinstance(known, Path) else None
+            value = self.local.get(node.id)
+            return Path("") if node.id == "self" else value if isinstance(value, Path) else None
         if not isinstance(node, ast.Attribute) or (owner := self.path(node.value)) is None:
             return None
         return Path(f"{owner.path}.{node.attr}".removeprefix("."), owner.own)
@@ -135,11 +135,11 @@ class Writer:
         return number(node.value)
 
     def _name(self, node: ast.Name) -> Written:
-        known = self.local.get(node.id)
-        if isinstance(known, Written):
-            return known
-        if isinstance(known, Path):
-            return self._at(known)
+        path = self.local.get(node.id)
+        if isinstance(path, Written):
+            return path
+        if isinstance(path, Path):
+            return self._at(path)
         value = self.constants.get(node.id)
         return number(value) if isinstance(value, int | float) else Written(names.name(node.id.strip("_")))
 
@@ -296,11 +296,11 @@ class Writer:
 
     def _column_of(self, node: ast.expr) -> Column | None:
         """Return the column of a table for a name, or for `[row[0] for row in self.table]`."""
-        known = self.local.get(node.id) if isinstance(node, ast.Name) else None
+        column = self.local.get(node.id) if isinstance(node, ast.Name) else None
         if isinstance(node, ast.ListComp) and isinstance(node.elt, ast.Subscript):
             table = self.path(node.generators[0].iter)
-            known = Column(table.path, self.latex(node.elt.slice)) if table is not None else None
-        return known if isinstance(known, Column) else None
+            column = Column(table.path, self.latex(node.elt.slice)) if table is not None else None
+        return column if isinstance(column, Column) else None
 
 
 def number(value: float) -> Written:

@@ -35,9 +35,9 @@ def component_pages(folder: Path, examples: Path | None = None, types: Sequence[
     kinds = {name: find_type(name) for name in types} if types else library_types()
     occurrences = examples_by_type(examples) if examples else {}
     pages = {folder / place(kind): (name, kind) for name, kind in kinds.items()}
-    made = {} if types else {folder / INDEX: index(kinds)}
-    made |= {file: page(kind, file, occurrences.get(name, ())) for file, (name, kind) in pages.items()}
-    return made | {symbol_file(file): symbol(kind) for file, (_, kind) in pages.items()}
+    texts = {} if types else {folder / INDEX: index(kinds)}
+    texts |= {file: page(kind, file, occurrences.get(name, ())) for file, (name, kind) in pages.items()}
+    return texts | {symbol_file(file): symbol(kind) for file, (_, kind) in pages.items()}
 
 
 def write_component_pages(folder: Path, examples: Path | None = None, types: Sequence[str] | None = None) -> list[Path]:
@@ -62,15 +62,15 @@ def examples_by_type(folder: Path) -> dict[str, list[Example]]:
     """
     if not folder.is_dir():
         raise NetlistError(f"There is no folder '{folder}' with examples.", advice="Name a folder of netlists.")
-    found: dict[str, list[Example]] = {}
+    by_type: dict[str, list[Example]] = {}
     contents = {file: read_text(file) for file in folder.rglob("*.toml")}
     for file in sorted(contents, key=lambda file: (len(contents[file]), file)):
         if "[parts" in contents[file]:
             netlist = parse(contents[file], str(file))
             for name, part in _parts("", netlist.parts):
                 example = Example(file, netlist.description or netlist.name, f"{name} = {_inline(part)}")
-                found.setdefault(part["is"], []).append(example)
-    return {name: _once(examples) for name, examples in found.items()}
+                by_type.setdefault(part["is"], []).append(example)
+    return {name: _once(examples) for name, examples in by_type.items()}
 
 
 def _once(examples: Sequence[Example]) -> list[Example]:

@@ -110,18 +110,18 @@ def _notation(optional: Mapping[str, str]) -> Notation:
 
 def _optional(source: Source) -> dict[str, str]:
     """Return the note on optional parameters and on alternatives."""
-    told = dict.fromkeys(source.asked, "optional")
+    notes = dict.fromkeys(source.asked, "optional")
     for name, uses in source.uses.items():
-        instead = [asked for asked in source.asked if all(use.get(asked) is False for use in uses)]
-        if instead and name not in told:
-            told[name] = "required without " + ", ".join(f"`{one}`" for one in instead)
-    return told
+        instead = [field for field in source.asked if all(use.get(field) is False for use in uses)]
+        if instead and name not in notes:
+            notes[name] = "required without " + ", ".join(f"`{one}`" for one in instead)
+    return notes
 
 
 def _parts(kind: type[Component]) -> list[str]:
     """Return the parts that the class declares, and how it builds others."""
-    found = {name: part if isinstance(part, list) else [part] for name, part in kind._class_parts.items()}
-    rows = ((f"`{name}`", page_link(type(one)), _values(one)) for name, part in found.items() for one in part)
+    by_name = {name: part if isinstance(part, list) else [part] for name, part in kind._class_parts.items()}
+    rows = ((f"`{name}`", page_link(type(one)), _values(one)) for name, part in by_name.items() for one in part)
     code = dedent(inspect.getsource(kind.build)).strip() if kind.build is not Component.build else ""
     parts = [table("", ("part", "type", "values"), rows), code and f"```python\n{code}\n```"]
     return ["## Parts", *parts] if any(parts) else []

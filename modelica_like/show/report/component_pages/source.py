@@ -104,9 +104,9 @@ class Source:
 
     def symbol(self, name: str, dots: int = 0) -> str:
         """Return the symbol of a method or property: words if a connector has the same symbol."""
-        made = names.name(name.lstrip("_"), dots)
+        letter = names.name(name.lstrip("_"), dots)
         ends = (f"{end}.{one}" for end, connector in self.kind._class_connectors.items() for one in connector.fields)
-        return names.text(name) if made in map(names.name, ends) else made
+        return names.text(name) if letter in map(names.name, ends) else letter
 
     def method(self, name: str, after: type | None = None) -> Function | None:
         """Return a method or property of the class from a library, or the next one after a base."""
@@ -144,8 +144,8 @@ class _Reader(Writer):
     # -- what occurs ---------------------------------------------------------------------------------------------------
 
     def member(self, path: str, dots: int) -> str:
-        if (found := self.source.method(path)) is not None:
-            self.source.found.setdefault(path, found)
+        if (method := self.source.method(path)) is not None:
+            self.source.found.setdefault(path, method)
             return self.source.symbol(path, dots)
         if path in self.source.kind._class_fields:
             self.source.uses.setdefault(path, []).append(dict(self.source.conditions))
@@ -162,11 +162,11 @@ class _Reader(Writer):
         return f"{path}: " if len(self.source.kind._class_modes) > 1 else ""
 
     def inherited(self, name: str) -> str:
-        found = self.source.method(name, self.of.owner)
-        if found is None or found.owner is None:
+        method = self.source.method(name, self.of.owner)
+        if method is None or method.owner is None:
             raise Unwritable
-        title = f"{name} of {found.owner.__name__}"
-        self.source.found.setdefault(title, found)
+        title = f"{name} of {method.owner.__name__}"
+        self.source.found.setdefault(title, method)
         return title
 
     @contextmanager
@@ -225,20 +225,20 @@ class _Reader(Writer):
         arguments = call.args
         match call.func:
             case ast.Attribute(value=ast.Call(), attr=name):
-                found = self.source.method(name, self.of.owner)
+                function = self.source.method(name, self.of.owner)
             case ast.Attribute(value=ast.Name(id="self"), attr=name):
-                found = self.source.method(name)
+                function = self.source.method(name)
             case ast.Attribute(value=ast.Name(id=base), attr=name):
-                found, arguments = in_class(self.constants[base], name), arguments[1:]
+                function, arguments = in_class(self.constants[base], name), arguments[1:]
             case ast.Name(id=name) if name in self.constants and name != "series":
-                found = plain_function(name, self.constants[name])
+                function = plain_function(name, self.constants[name])
             case _:
                 raise Unwritable
-        if found is not None:
-            formal = [one.arg for one in found.code.args.args if one.arg != "self"]
+        if function is not None:
+            formal = [one.arg for one in function.code.args.args if one.arg != "self"]
             given = dict(zip(formal, arguments, strict=False)) | {one.arg or "": one.value for one in call.keywords}
             local: dict[str, Meaning] = {name: self.path(one) or self.write(one) for name, one in given.items()}
-            yield from _reader(self.source, found, local).body(found.code.body)
+            yield from _reader(self.source, function, local).body(function.code.body)
 
     # -- what functions return -----------------------------------------------------------------------------------------
 

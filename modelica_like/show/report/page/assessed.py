@@ -68,21 +68,23 @@ def ranking(run: Solution, ends: Sequence[str]) -> str:
     if not names or not len(run.model.p):
         return ""
     try:
-        found = sensitivities(run, names)
+        sensitivity = sensitivities(run, names)
     except NoGradient as error:
         return f"<p>{escape(' '.join(filter(None, (error.what, error.why, error.advice))))}</p>"
-    percents = np.nan_to_num(found.normalised)
+    percents = np.nan_to_num(sensitivity.normalised)
     largest = np.max(np.abs(percents), axis=0)
     order = [int(k) for k in np.argsort(-largest)[:_RANKED] if largest[k] > _MATTERS]
-    heads = ("one percent more of", "value>", "unit", *(f"{one.name}, %>" for one in found.outputs))
+    heads = ("one percent more of", "value>", "unit", *(f"{one.name}, %>" for one in sensitivity.outputs))
     rows = [
         (one.name, f"{one.value:.6g}", one.unit_text, *(f"{round(value, 3) + 0.0:.3f}" for value in percents[:, k]))
-        for k in order for one in [found.parameters[k]]
+        for k in order for one in [sensitivity.parameters[k]]
     ]  # fmt: skip
-    at_the_end = ", ".join(f"{one.name} = {one.value:.5g} {one.unit_text}".rstrip() for one in found.outputs)
+    at_the_end = ", ".join(f"{one.name} = {one.value:.5g} {one.unit_text}".rstrip() for one in sensitivity.outputs)
     said = f"<p>Change in percent of what the run ends with: {escape(at_the_end)}.</p>"
-    left = "".join(f"<p>{escape(note)}</p>" for note in found.notes())
-    return (said + table(heads, rows) if rows else "") + details(left, f"{len(found.left_out)} without a derivative")
+    left = "".join(f"<p>{escape(note)}</p>" for note in sensitivity.notes())
+    return (said + table(heads, rows) if rows else "") + details(
+        left, f"{len(sensitivity.left_out)} without a derivative"
+    )
 
 
 def small_motions(drive: Component, run: Solution) -> str:

@@ -44,8 +44,12 @@ def curves(run: Trajectories, patterns: Sequence[str] = ()) -> dict[str, Any]:
         unit = one.shown_in(shown)
         title = with_unit(quantity_of(one), unit)
         values = one.driving * shown.converted(curve[one.name][rows], one.unit, unit)
-        told = {"name": one.label, "path": one.name if one.plain else "", "values": [float(f"{v:.6g}") for v in values]}
-        panels.setdefault(title, {"title": title, "curves": []})["curves"].append(told)
+        curve_data = {
+            "name": one.label,
+            "path": one.name if one.plain else "",
+            "values": [float(f"{v:.6g}") for v in values],
+        }
+        panels.setdefault(title, {"title": title, "curves": []})["curves"].append(curve_data)
     hidden = {one.path for one in run.model.flat_discretes if one.hidden}
     modes = dict.fromkeys(event.mode for event in run.events if event.mode not in hidden)
     return {

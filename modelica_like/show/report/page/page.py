@@ -85,7 +85,7 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
         "script": script, "hash": script_hash(script),
     }  # fmt: skip
     page = (folder / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], page)
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], page)
 
 
 def _of_equations(drive: Component, run: Solution, ends: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -124,8 +124,8 @@ def _happens(drive: Component | None, run: Trajectories) -> str:
         for time, paths in list(instants.items())[:_MOST_EVENTS]
     ]
     lines += [f"<li>… {len(instants) - _MOST_EVENTS} more instants</li>"] if len(instants) > _MOST_EVENTS else []
-    told = (*notices(run), *(plausible(drive, run) if drive else ()))
-    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in told)
+    notes = (*notices(run), *(plausible(drive, run) if drive else ()))
+    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in notes)
     if len(lines) > _FIRST + 5:
         rest = details(f"<ul>{''.join(lines[_FIRST:])}</ul>", f"{len(instants) - _FIRST} more instants")
         return f"{said}<ul>{''.join(lines[:_FIRST])}</ul>{rest}"
@@ -138,8 +138,8 @@ def _told(run: Trajectories, some: Sequence[Change]) -> str:
     why = ", ".join(dict.fromkeys(filter(None, (*(one.because for one in some), _slid(run, last)))))
     if not last.after:
         return f"{last.path}: {why}"
-    known = next((one for one in run.model.flat_discretes if one.path == last.path), None)
-    name = (last.owner if known is None or known.names else last.path) or run.model.name
+    discrete = next((one for one in run.model.flat_discretes if one.path == last.path), None)
+    name = (last.owner if discrete is None or discrete.names else last.path) or run.model.name
     return f"{name} becomes {last.after.replace('_', ' ')}{f' ({why})' if why else ''}"
 
 
