@@ -49,9 +49,9 @@ def modes(
             page.print("", escape(str(loop.margins())))
         if shapes:
             speeds = [
-                one.path
-                for one in linear.model.flat_variables
-                if (str(one.unit), one.path.rpartition(".")[2]) in (("rad/s", "w"), ("m/s", "v"))
+                variable.path
+                for variable in linear.model.flat_variables
+                if (str(variable.unit), variable.path.rpartition(".")[2]) in (("rad/s", "w"), ("m/s", "v"))
             ]
             save_plot(mode_shapes.plot(show or speeds), shapes)
         if draw:

@@ -104,7 +104,7 @@ def cosim(
                 ), debug=debug,
             )  # fmt: skip
         outcome.tell(cosimulation_report, page)
-        outcome.write(csv, units=units, show=show or (), pictures=[(plot, lambda one: draw(one, show or ()))])
+        outcome.write(csv, units=units, show=show or (), pictures=[(plot, lambda run: draw(run, show or ()))])
 
 
 def _numbers(assignments: list[str] | tuple[str, ...]) -> dict[str, float]:

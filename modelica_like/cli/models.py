@@ -120,11 +120,13 @@ def simulate(
         with Bar(until or model.settings.get("until")) as bar:
             outcome = Outcome(lambda: run(model, until, progress=bar, solver=solver, **how), debug=debug)
         energy = energy and outcome.stopped is None and outcome.attempt("The energy balance", outcome.solution.energy)
-        outcome.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown, show=show or ()), page)
+        outcome.tell(
+            lambda result: run_report(result, energy=energy, debug=debug, display=shown, show=show or ()), page
+        )
         outcome.attempt("The notes", lambda: note(*notes(assembly, outcome.solution, energy=energy)))
         again = partial(run, model, until, **how)
-        curves = (plot, lambda one: _drawn(one, variants, files, again, show or (), shown))
-        pictures = curves, (sankey, lambda one: one.energy().sankey(model.name))
+        curves = (plot, lambda result: _drawn(result, variants, files, again, show or (), shown))
+        pictures = curves, (sankey, lambda result: result.energy().sankey(model.name))
         outcome.write(csv, units=units or bool(display), display=shown, pictures=pictures, show=show or ())
 
 

@@ -106,7 +106,7 @@ def complete(words: Sequence[str]) -> None:
     """
     *before, now = words or [""]
     now = "" if now == "=" else now  # Bash splits words there
-    candidates = _candidates([one for one in before if one != "="], now)
+    candidates = _candidates([word for word in before if word != "="], now)
     sys.stdout.writelines(f"{word}\t{meaning}".strip() + "\n" for word, meaning in candidates if word.startswith(now))
 
 
@@ -120,14 +120,17 @@ def _candidates(before: list[str], now: str) -> Iterable[tuple[str, str]]:
     if action and action.nargs != 0:
         begin = f"{name}=" if equals else ""
         return (
-            (begin + value, "") for one in parameters_of_command if one.name == action.dest for value in _values(one)
+            (begin + value, "")
+            for parameter in parameters_of_command
+            if parameter.name == action.dest
+            for value in _values(parameter)
         )
     if now.startswith("-"):
         return [(word, action.help or "") for word, action in of._option_string_actions.items()]
     if not before:
         return [(name, paragraphs(command(name))[0]) for name in HOMES]
-    return ((value, "") for one in parameters_of_command if not one.option for value in _values(one))
+    return ((value, "") for parameter in parameters_of_command if not parameter.option for value in _values(parameter))
 
 
-def _values(one: Parameter) -> Iterable[str]:
-    return one.declared.choices() if one.declared.choices else one.choices
+def _values(parameter: Parameter) -> Iterable[str]:
+    return parameter.declared.choices() if parameter.declared.choices else parameter.choices

@@ -34,7 +34,7 @@ class Parameter:
     def __init__(self, name: str, hint: Any, default: Any) -> None:
         kind, self.declared = get_args(hint)
         # A default of None is no value: `X | None` takes an X.
-        kinds = [one for one in get_args(kind) if one is not type(None)] if type(None) in get_args(kind) else [kind]
+        kinds = [word for word in get_args(kind) if word is not type(None)] if type(None) in get_args(kind) else [kind]
         self.many = get_origin(kinds[0]) is list
         self.kind: Any = get_args(kinds[0])[0] if self.many else kinds[0]
         self.choices: tuple[str, ...] = get_args(self.kind) if get_origin(self.kind) is Literal else ()
@@ -58,7 +58,7 @@ class Parameter:
     def read(self, text: str) -> Any:
         """Read one value."""
         if self.choices and text not in self.choices:
-            choices = ", ".join(f"'{one}'" for one in self.choices)
+            choices = ", ".join(f"'{choice}'" for choice in self.choices)
             raise argparse.ArgumentTypeError(f"'{text}' is not one of {choices}.")
         try:
             return text if self.choices else self.kind(text)
@@ -86,7 +86,7 @@ def parameters(command: Callable[..., None]) -> list[Parameter]:
     """Return the parameters of a command."""
     hints = get_type_hints(command, include_extras=True)
     arguments = inspect.signature(command).parameters.values()
-    return [Parameter(one.name, hints[one.name], one.default) for one in arguments]
+    return [Parameter(argument.name, hints[argument.name], argument.default) for argument in arguments]
 
 
 def paragraphs(command: Callable[..., None]) -> list[str]:
@@ -98,11 +98,11 @@ def reader(name: str, command: Callable[..., None]) -> Reader:
     """Return the reader of a command."""
     declared = parameters(command)
     places, options = [one for one in declared if not one.option], [one for one in declared if one.option]
-    result = Reader(name, " ".join(["[OPTIONS]", *(one.place() for one in places)]), paragraphs(command))
+    result = Reader(name, " ".join(["[OPTIONS]", *(place.place() for place in places)]), paragraphs(command))
     for title, those in ("Arguments", places), ("Options", options):
         group = result.add_argument_group(title)
-        for one in those:
-            one.add(group)
+        for parameter in those:
+            parameter.add(group)
     group.add_argument("--help", action="help", help="Show this page.")
     return result
 
@@ -152,7 +152,7 @@ class Reader(argparse.ArgumentParser):
                 self.error(f"Option '{name}' requires a value.")
             else:
                 yield f"{actions[name].option_strings[0]}={value}"
-        yield from [*(["--"] if any(one.startswith("-") for one in places) else ()), *places]
+        yield from [*(["--"] if any(place.startswith("-") for place in places) else ()), *places]
 
     def error(self, message: str) -> NoReturn:
         """Tell what is wrong with the words, and how they should be."""
@@ -173,7 +173,7 @@ class _Page(argparse.HelpFormatter):
         super().add_usage(usage, actions, groups, "Usage: ")
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        return "\n\n".join(super(_Page, self)._fill_text(one, width, indent) for one in text.split("\n\n"))
+        return "\n\n".join(super(_Page, self)._fill_text(word, width, indent) for word in text.split("\n\n"))
 
     def _format_action_invocation(self, action: argparse.Action) -> str:
         value = "" if action.nargs == 0 else str(action.metavar or action.dest)

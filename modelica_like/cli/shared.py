@@ -85,7 +85,7 @@ def told(
         pictures: to be written.
         files: of any kind, to be written.
     """
-    tables = [one for one in tables if one is not None]
+    tables = [table for table in tables if table is not None]
     try:
         _check(tables, filter(None, pictures), filter(None, files))
         page = Page(json=json, stderr=Path("-") in tables)
@@ -170,7 +170,7 @@ def note(*sentences: str) -> None:
 
 def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
     """Split assignments at the equals sign."""
-    pairs = [one.partition("=") for one in assignments or ()]
+    pairs = [assignment.partition("=") for assignment in assignments or ()]
     for before, equals, _ in pairs:
         if not equals:
             form = "PATH=VALUE" if option == "--set" else "WHAT=UNIT"

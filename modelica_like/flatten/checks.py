@@ -46,8 +46,12 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
     """
     variables = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
     unknowns = [n for n in variables if n not in joined]
-    used = {name: one for name, one in component.connectors.items() if one.used and name not in joined}
-    unknowns += [f"{name}.{n}" for name, one in used.items() for n, f in one.quantities.items() if f.is_flow]
+    used = {
+        name: connector for name, connector in component.connectors.items() if connector.used and name not in joined
+    }
+    unknowns += [
+        f"{name}.{n}" for name, connector in used.items() for n, f in connector.quantities.items() if f.is_flow
+    ]
     if len(equations) == len(unknowns):
         return
     kind = type(component).__name__
@@ -74,9 +78,13 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
 def _driven_input(component: Component, equations: list[Equation]) -> str:
     """Return an input of a part that occurs in an equation, relative to the component, or an empty text."""
     leaves = (symbol for e in equations for side in (e.left, e.right) for symbol in symbols_in(side))
-    foreign = (one for one in leaves if isinstance(one.owner, Component) and one.owner is not component)
+    foreign = (symbol for symbol in leaves if isinstance(symbol.owner, Component) and symbol.owner is not component)
     prefix = component.path
-    paths = (f"{one.owner.path}.{one.name}" for one in foreign if isinstance(one.owner.fields.get(one.name), Input))
+    paths = (
+        f"{symbol.owner.path}.{symbol.name}"
+        for symbol in foreign
+        if isinstance(symbol.owner.fields.get(symbol.name), Input)
+    )
     return next((path.removeprefix(f"{prefix}.") for path in paths), "")
 
 
@@ -136,7 +144,7 @@ def _by_any_units(component: Component, errors: Sequence[ModelicaLikeError]) -> 
     """Say which units of `*` parameters do not fit together; the equations of a library do not tell that."""
     given = [(name, unit_of_field(component, name)) for name, field in component.fields.items()
              if isinstance(field, Parameter) and field.unit_text == "*" and name in component._values]  # fmt: skip
-    if len(given) < _PAIR or not all(isinstance(one, UnitMismatch) for one in errors):
+    if len(given) < _PAIR or not all(isinstance(error, UnitMismatch) for error in errors):
         return None
     units = ", ".join(f"{name} in {unit}" for name, unit in given)
     return UnitMismatch(f"{component.label} ({type(component).__name__}): its units do not fit together: {units}.",

@@ -101,8 +101,8 @@ class _Flattener:
                     FlatVariable(full_path, ONE, description, "local", "avoid", 0.0, 1.0, None, None, hidden=True)
                 )
                 self.starts.append(StartValue(node, 0.0, "fixed"))
-            for one in template.hidden:
-                self._hide(id(component), one.path, f"{component.path}.{one.path}".lstrip("."), one)
+            for hidden in template.hidden:
+                self._hide(id(component), hidden.path, f"{component.path}.{hidden.path}".lstrip("."), hidden)
         added = self._disturb() if self.disturbed else None
         self.nodes = [(k, 0) for k in range(len(self.variables))]
         instances = [self._instance(component, template) for component, template in templates]
@@ -118,7 +118,7 @@ class _Flattener:
             raise raise_together_or_one(errors)
         self.parameters.check_derived()
         general = self._split_linear(instances)
-        d = ca.vertcat(*(ca.SX.sym(one.path) for one in self.discretes))
+        d = ca.vertcat(*(ca.SX.sym(discrete.path) for discrete in self.discretes))
         return FlatModel(
             name=self.root.label, variables=self.variables, nodes=self.nodes, derivative=self.derivative,
             parameters=self.parameters.flat, p=self.parameters.symbols(), q=self.parameters.expressions(),
@@ -161,8 +161,8 @@ class _Flattener:
         for name, mode in ((n, m) for n, m in component.modes.items() if (id(component), n) in used):
             self.discrete_of[id(component), name] = len(self.discretes)
             start = mode.number(component.start_mode(name))
-            one = FlatDiscrete(prefix + name, ONE, mode.description, start, mode.names, hysteresis=mode.hysteresis)
-            self.discretes.append(one)
+            discrete = FlatDiscrete(prefix + name, ONE, mode.description, start, mode.names, hysteresis=mode.hysteresis)
+            self.discretes.append(discrete)
         for end, connector in component.connectors.items():
             if connector.used:
                 for name, field in connector.quantities.items():
@@ -171,7 +171,7 @@ class _Flattener:
 
     def _disturb(self) -> int:
         """Declare the input that is added to a signal."""
-        signals = {self.variable_of[id(one.owner), one.name] for pair in self.wiring.signals for one in pair[:2]}
+        signals = {self.variable_of[id(end.owner), end.name] for pair in self.wiring.signals for end in pair[:2]}
         paths = {self.variables[k].path: self.variables[k] for k in sorted(signals)}
         if self.disturbed not in paths:
             near = did_you_mean(self.disturbed, paths)
@@ -200,10 +200,10 @@ class _Flattener:
         with component.at_its_place(name):
             return self.parameters.evaluate(value, scope or component, path)
 
-    def _hide(self, owner: int, name: str, path: str, one: Hidden, start: Any = 0.0) -> int:
+    def _hide(self, owner: int, name: str, path: str, hidden: Hidden, start: Any = 0.0) -> int:
         """Declare a discrete value that no user has declared."""
         self.discrete_of[owner, name] = len(self.discretes)
-        self.discretes.append(FlatDiscrete(path, ONE, one.description, start, one.names, hidden=True))
+        self.discretes.append(FlatDiscrete(path, ONE, hidden.description, start, hidden.names, hidden=True))
         return self.discrete_of[owner, name]
 
     def _discrete(self, component: Component, path: str) -> int:
@@ -316,7 +316,7 @@ class _Flattener:
         if component.terminal is None:
             return
         for name, rate in component.terminal.rates:
-            nodes = [self.variable_of[id(component), one] for one in (name, rate)]
+            nodes = [self.variable_of[id(component), key] for key in (name, rate)]
             if all(node in self.inputs for node in nodes):
                 terms = ((self._node(nodes[0], 1), 1.0), (nodes[1], -1.0))
                 self.linear.append(LinearEquation(terms, 0.0, Origin(component.path, type(component).__name__, _WIRE)))

@@ -68,8 +68,8 @@ def ideal_forms(component: Component, residuals: list[Any]) -> tuple[IdealForm, 
         for row, residual in enumerate(residuals):
             cases = [ca.substitute(residual, symbol, ca.SX(k)) for k in range(2)]
             if all(
-                _only(one, zero) and _number(ca.jacobian(one, zero)) != 0.0
-                for one, zero in zip(cases, zeros, strict=True)
+                _only(case, zero) and _number(ca.jacobian(case, zero)) != 0.0
+                for case, zero in zip(cases, zeros, strict=True)
             ):
                 forms.append(IdealForm(mode.name, (zeros[0].name, zeros[1].name), row))
                 break
@@ -109,12 +109,12 @@ def hold_forms(component: Component, residuals: list[Any]) -> tuple[tuple[HoldFo
 
 def starts_at_rest(component: Component, declared: Iterable[StartMode]) -> Iterator[StartMode]:
     """Yield the start modes, which hold a motion only if it is at rest: what moves is met in an impact."""
-    for one in declared:
-        mode = one.mode.mode
-        if hold := mode.holds.get(one.target):
+    for transition in declared:
+        mode = transition.mode.mode
+        if hold := mode.holds.get(transition.target):
             motion = cast(Any, _variable(component, mode, hold.motion, "motion"))
-            one = replace(one, when=all_of(one.when, motion <= 0, motion >= 0))
-        yield one
+            transition = replace(transition, when=all_of(transition.when, motion <= 0, motion >= 0))
+        yield transition
     for mode in component.modes.values():
         loose = _loose(mode)
         if loose >= 0 and (hold := mode.holds.get(mode.start)):
@@ -145,7 +145,7 @@ def _variable(component: Component, mode: Mode, name: str, role: str) -> Symbol:
 def _capacities(component: Component, hold: Hold) -> tuple[Any, Any]:
     given = _value(component, hold.capacity) if hold.capacity else None
     pair = given if isinstance(given, tuple) else (given, given)
-    forward, backward = (UNLIMITED if one is None else one for one in cast("tuple[Any, Any]", pair))
+    forward, backward = (UNLIMITED if side is None else side for side in cast("tuple[Any, Any]", pair))
     return forward, backward
 
 

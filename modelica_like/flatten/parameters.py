@@ -112,9 +112,9 @@ class Parameters:
         if value.formula is None:
             return value.number
         expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scope, path, label), self._quantity))
-        quantities = [one for one in ca.symvar(expression) if leaf_id(one) in self._quantities]
+        quantities = [symbol for symbol in ca.symvar(expression) if leaf_id(symbol) in self._quantities]
         result = ca.substitute(
-            expression, column(quantities), column(self._quantities[leaf_id(one)][1] for one in quantities)
+            expression, column(quantities), column(self._quantities[leaf_id(quantity)][1] for quantity in quantities)
         )
         if result.is_constant() and not math.isfinite(float(result)):
             raise ValueOutOfRange(f"{label} must be a finite number, not {float(result):g}.")
@@ -176,9 +176,13 @@ class Parameters:
         Raises:
             ValueOutOfRange: one is not finite, or outside its min and max.
         """
-        numbers = ca.Function("derived", [self.symbols()], [self.formulas()])([one.value for one in self.flat])
+        numbers = ca.Function("derived", [self.symbols()], [self.formulas()])(
+            [parameter.value for parameter in self.flat]
+        )
         pairs = zip(self.derived, numbers.full().ravel(), strict=True)
-        self.derived = [replace(one, value=one.checked(float(number), f"{number:g}")) for one, number in pairs]
+        self.derived = [
+            replace(parameter, value=parameter.checked(float(number), f"{number:g}")) for parameter, number in pairs
+        ]
 
     def formulas(self) -> Any:
         """Return the expressions of the parameters that follow from others."""

@@ -33,7 +33,9 @@ def reason(transition: Transition, path: Callable[[Symbol], str]) -> str:
     text = _condition(transition.when, path)
     if len(text) <= _LONGEST and "…" not in text:
         return text
-    named = dict.fromkeys(path(one) for one in symbols_in(transition.when) if not isinstance(_field(one), Parameter))
+    named = dict.fromkeys(
+        path(symbol) for symbol in symbols_in(transition.when) if not isinstance(_field(symbol), Parameter)
+    )
     return f"its condition on {', '.join(named)} holds"
 
 
@@ -44,13 +46,13 @@ def _condition(condition: Any, path: Callable[[Symbol], str], *, turned: bool = 
         return _condition(sides[0], path, turned=not turned)
     if operation in (ca.OP_AND, ca.OP_OR):
         both = (operation == ca.OP_AND) != turned
-        parts = [_condition(one, path, turned=turned) for one in sides]
+        parts = [_condition(side, path, turned=turned) for side in sides]
         return (" and " if both else " or ").join(dict.fromkeys(parts))
     if operation in (ca.OP_LT, ca.OP_LE):
         low, high = reversed(sides) if turned else sides
         if {low.op(), high.op()} <= {ca.OP_NEG, ca.OP_CONST}:
             low, high = -high, -low
-        fixed = all(isinstance(_field(one), Parameter) for one in symbols_in(low))
+        fixed = all(isinstance(_field(symbol), Parameter) for symbol in symbols_in(low))
         first, passes, second = (high, "rose above", low) if fixed else (low, "fell below", high)
         return f"{_side(first, path)} {passes} {_side(second, path)}"
     if operation in (ca.OP_EQ, ca.OP_NE):
@@ -67,7 +69,7 @@ def _side(expression: Any, path: Callable[[Symbol], str]) -> str:
     if expression.is_constant():
         return f"{float(expression):g}" if float(expression) else "zero"
     symbols = symbols_in(expression)
-    named = [ca.SX.sym(path(one) if not one.order else f"der({path(one)})") for one in symbols]
+    named = [ca.SX.sym(path(symbol) if not symbol.order else f"der({path(symbol)})") for symbol in symbols]
     (plain,) = ca.substitute([expression], [ca.vertcat(*symbols)], [ca.vertcat(*named)])
     text = re.sub(r"(?<![\w.])\d[\d.]*(e[+-]?\d+)?", lambda number: f"{float(number[0]):g}", str(plain))
     text = re.sub(r"\(([\w.]+[*/][\w.]+)\)", r"\1", re.sub(r"fabs\(([^()]*)\)", r"|\1|", text))

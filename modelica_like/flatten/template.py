@@ -230,7 +230,7 @@ def _build(component: Component) -> Template:
     starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
     residuals = [with_events(between_events(e.left - e.right)) for e in equations]
     sources = tuple(e.source for e in (*equations, *initial))
-    residuals += [honest(one - (e.left - e.right)) for one, e in zip(starts, initial, strict=True)]
+    residuals += [honest(start - (e.left - e.right)) for start, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
     others = [*zip(residuals, sources, strict=True), *((term, NOWHERE) for term in energy_terms)]
@@ -240,7 +240,7 @@ def _build(component: Component) -> Template:
     changes = _Changes(component, discrete)
     names = Names(component)
     names.add([*residuals, *hold_terms, *changes.expressions()])
-    names.add(ca.SX(symbol_of(component, name)) for one in holds for name in (one.motion, one.reaction) if name)
+    names.add(ca.SX(symbol_of(component, name)) for hold in holds for name in (hold.motion, hold.reaction) if name)
     discrete.check_determined(names.discretes)
     energy.parameters, energy.discretes = names.parameters, names.discretes
     energy.add(energy_terms)
@@ -253,7 +253,9 @@ def _build(component: Component) -> Template:
         discretes=tuple(names.discretes),
         residual=residual,
         sources=sources,
-        initial=tuple((one.name, e.source.text.removeprefix("yield ")) for one, e in zip(starts, initial, strict=True)),
+        initial=tuple(
+            (start.name, e.source.text.removeprefix("yield ")) for start, e in zip(starts, initial, strict=True)
+        ),
         incidence=_rows(residual.jac_sparsity(0, 0)),
         linear=linear,
         coefficients=coefficients,
@@ -262,7 +264,7 @@ def _build(component: Component) -> Template:
         start_modes=changes.start_modes(),
         hidden=tuple(discrete.hidden),
         update_forms=discrete.forms(lambda symbol: path_of(symbol, component)),
-        delay_parts=tuple(tuple(part.name for part in parts(one)) for one, _ in discrete.delays),
+        delay_parts=tuple(tuple(part.name for part in parts(delay)) for delay, _ in discrete.delays),
         holds=holds,
         hold_terms=names.function("hold_terms", hold_terms),
         ideals=ideal_forms(component, residuals),
@@ -289,7 +291,7 @@ def _statements(
     at_start = located(component.initial_equations(), f"{kind}.initial_equations()")
     initial = [as_equation(item, source, kind) for item, source in at_start]
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
-    joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
+    joined = {name for joint in wiring if isinstance(joint, Connection) for name in taken(component, joint)}
     check_balance(component, equations, joined)
     return equations, [s for s in every if is_discrete(s)], initial, wiring
 
@@ -302,16 +304,22 @@ class _Changes:
         self.transitions = [e for e in discrete.events if isinstance(e, Transition)]
         declared = (e for e in discrete.events if isinstance(e, StartMode))
         self.starts = list(starts_at_rest(component, declared))
-        self.updates = [part for one in discrete.updates for part in (one.active, one.value)]
-        self.targets = [one.target for one in discrete.updates]
+        self.updates = [part for update in discrete.updates for part in (update.active, update.value)]
+        self.targets = [update.target for update in discrete.updates]
         self.guards = [ca.SX(0) if t.when is None else guard_of(t.when, t.source) for t in self.transitions]
         self.moments = [ca.SX(0) if t.at is None else t.at for t in self.transitions]
-        self.delays = [part for one, _ in discrete.delays for part in (one.of, one.offset)]
+        self.delays = [part for delay, _ in discrete.delays for part in (delay.of, delay.offset)]
         self.resets = [pair for t in self.transitions for pair in t.reset.items()]
 
     def expressions(self) -> Iterator[Any]:
         """Yield all expressions, and the symbols of the modes."""
-        yield from (*self.guards, *self.moments, *self.updates, *self.delays, *(ca.SX(one) for one in self.targets))
+        yield from (
+            *self.guards,
+            *self.moments,
+            *self.updates,
+            *self.delays,
+            *(ca.SX(target) for target in self.targets),
+        )
         for pair in self.resets:
             yield from pair
         yield from (s.when for s in self.starts)

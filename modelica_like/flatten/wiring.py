@@ -121,7 +121,7 @@ class Wiring:
     def check_signal_units(self) -> None:
         """Compare the units along signal connections, after all templates are known."""
         for driver, sink, source in self.signals:
-            if not all((one.owner._owner or one.owner).units_checked for one in (driver, sink)):
+            if not all((symbol.owner._owner or symbol.owner).units_checked for symbol in (driver, sink)):
                 continue
             units = [
                 self.inferred.get((id(symbol.owner), symbol.name)) or unit_of_field(symbol.owner, symbol.name)
@@ -157,17 +157,17 @@ def _is_within(end: Connector | Symbol, scope: Component) -> bool:
 
 def _givers(scope: Component, ends: Iterable[Connector | Symbol]) -> list[Symbol]:
     """Return what gives a connection its signal: an own input, a part's output, or an own output without these."""
-    kinds = [(one, one.owner is scope, one.owner.fields[one.name]) for one in ends if isinstance(one, Symbol)]
-    first = [one for one, kind_of, kind in kinds if isinstance(kind, Input if kind_of else Output)]
-    return first or [one for one, _, kind in kinds if isinstance(kind, Output)]
+    kinds = [(end, end.owner is scope, end.owner.fields[end.name]) for end in ends if isinstance(end, Symbol)]
+    first = [end for end, kind_of, kind in kinds if isinstance(kind, Input if kind_of else Output)]
+    return first or [end for end, _, kind in kinds if isinstance(kind, Output)]
 
 
 def taken(scope: Component, connection: Connection) -> list[str]:
     """Return the own signals that a connection determines, and the own connectors in it."""
-    connectors = [one._name for one in connection.ends if isinstance(one, Connector) and one._owner is scope]
-    givers = [id(one) for one in _givers(scope, connection.ends)]
-    signals = [one for one in connection.ends if isinstance(one, Symbol) and one.owner is scope]
-    return connectors + [one.name for one in signals if id(one) not in givers]
+    connectors = [end._name for end in connection.ends if isinstance(end, Connector) and end._owner is scope]
+    givers = [id(giver) for giver in _givers(scope, connection.ends)]
+    signals = [end for end in connection.ends if isinstance(end, Symbol) and end.owner is scope]
+    return connectors + [signal.name for signal in signals if id(signal) not in givers]
 
 
 def _name(end: Connector | Symbol) -> str:
@@ -191,7 +191,7 @@ def _fitting(first: Connector, second: Connector) -> str:
     for end, other in ((first, second), (second, first)):
         owner = other._owner
         connectors = owner.connectors.values() if isinstance(owner, Component) else ()
-        ends = [one for one in connectors if type(one) is type(end) and not one.optional]
+        ends = [connector for connector in connectors if type(connector) is type(end) and not connector.optional]
         if len(ends) == 1:
             meant = [end.label, ends[0].label] if end is first else [ends[0].label, end.label]
             return f'To join them, write in [connect]: joint = ["{meant[0]}", "{meant[1]}"]'

@@ -36,8 +36,8 @@ class Platform:
 
 
 PLATFORMS = {
-    one.name: one
-    for one in (
+    platform.name: platform
+    for platform in (
         Platform("x86_64-linux", "linux64", "x86_64-linux-gnu.2.17", ".so"),
         Platform("aarch64-linux", "aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
         Platform("x86_64-windows", "win64", "x86_64-windows-gnu", ".dll"),
@@ -95,9 +95,9 @@ def chosen_platforms(platforms: Sequence[str] | str, there: Iterable[str] = PLAT
         ExportError: FMUs have no binaries for this machine.
     """
     result: list[str] = []
-    for one in (platforms,) if isinstance(platforms, str) else platforms:
-        _check_known(one, ["native", "all", *there])
-        result += there if one == "all" else [native_platform() if one == "native" else one]
+    for platform in (platforms,) if isinstance(platforms, str) else platforms:
+        _check_known(platform, ["native", "all", *there])
+        result += there if platform == "all" else [native_platform() if platform == "native" else platform]
     return tuple(dict.fromkeys(result))
 
 

@@ -63,7 +63,7 @@ def description_problems(path: str | Path) -> list[str]:
         description = fmpy.read_model_description(str(path), validate=True, validate_model_structure=True)
     except ValidationError as error:
         return list(error.problems)
-    names = (one.name for one in description.modelVariables)
+    names = (variable.name for variable in description.modelVariables)
     return [f"The variable name '{name}' is not legal." for name in names if not _NAME.fullmatch(name)]
 
 
@@ -73,7 +73,7 @@ def _terminal_problems(content: bytes, description: bytes, names: set[str]) -> l
     schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema/fmi3/fmi3TerminalsAndIcons.xsd"))
     result = [] if schema.validate(top) else [f"{TERMINALS}: {error.message}" for error in schema.error_log]
     variables: Any = etree.fromstring(description, parser).find("ModelVariables")
-    listed = {one.get("name") for one in variables}
+    listed = {variable.get("name") for variable in variables}
     for member in top.iter("TerminalMemberVariable"):
         if member.get("variableName") not in listed:
             result.append(f"{TERMINALS}: there is no variable {member.get('variableName')}.")
@@ -125,7 +125,7 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
     if fixed_step:
         fails, unknown = (f"{text} of {fixed_step:g} s {rest}" for text, rest in _FIXED)
     # Modes, whose changes match the curves; an FMU has only those that are declared.
-    modes = (one.path for one in model.flat_discretes if one.names and not one.hidden)
+    modes = (discrete.path for discrete in model.flat_discretes if discrete.names and not discrete.hidden)
     try:
         run = run_fmu(path, stop=end, kind=kind, step=step, outputs=[*nominals, *modes])
         truth = _idas(model, end, points, _TRUTH, rtol)

@@ -44,10 +44,10 @@ class Following:
         """Dependencies of each implicit unknown, by its own block and those before."""
         rows = sparsity_rows(self.model.alg)
         implicit = [{k for name, k in row if name == "z"} for row in rows]
-        return solved_rows(implicit, [{one for one in row if one[0] != "z"} for row in rows], len(rows))
+        return solved_rows(implicit, [{quantity for quantity in row if quantity[0] != "z"} for row in rows], len(rows))
 
     def _through_implicit(self, row: set[Known]) -> set[Known]:
-        result = {one for one in row if one[0] != "z"}
+        result = {quantity for quantity in row if quantity[0] != "z"}
         return result.union(*(self._implicit[k] for name, k in row if name == "z"))
 
 
@@ -105,8 +105,8 @@ class Dependencies(Following):
             entries = self.model.ideal.entries
             rows[entries] = [self._everything] * (entries.stop - entries.start)
         starts = sparsity_rows(self.model.discrete_starts)
-        for k, one in enumerate(self.model.flat_discretes):
-            rows[k] = {("discrete", k)} if not one.names else {d for d in starts[k] if d[0] in "tpu"}
+        for k, discrete in enumerate(self.model.flat_discretes):
+            rows[k] = {("discrete", k)} if not discrete.names else {d for d in starts[k] if d[0] in "tpu"}
         conditions = sparsity_rows(self.model.start_conditions)
         for row, (mode, _, _) in zip(conditions, self.model.start_modes, strict=True):
             for name, k in self._through_implicit(row):
@@ -116,7 +116,9 @@ class Dependencies(Following):
 
     def _start_value(self, position: int) -> set[Known]:
         """A start value: set by an importer, or its formula."""
-        return {("start", position)} | {one for one in self._row("start_values", position) if one[0] in "tpu"}
+        return {("start", position)} | {
+            quantity for quantity in self._row("start_values", position) if quantity[0] in "tpu"
+        }
 
     @cached_property
     def _initial_states(self) -> Rows:
@@ -148,7 +150,7 @@ class Dependencies(Following):
         for row in tables.wanted:
             columns = {offsets[name] + k for name, k in every[row] if name in offsets}
             causes_of.append({place[column] for column in columns if column in place})
-            causes = {one for one in every[row] if one[0] in "tpu"}
+            causes = {quantity for quantity in every[row] if quantity[0] in "tpu"}
             outside = columns.difference(place)
             causes = causes.union(*(direct[k] if k < nx else guessed.get(k, set()) for k in outside))
             outer.append(causes | (self._start_value(given[row]) if row in given else set()))
@@ -168,15 +170,17 @@ class Dependencies(Following):
         references = {
             (names[v.slot[0]], v.slot[1]): v.reference for v in self.interface.variables if v.slot[0] in names
         }
-        for one in self.interface.variables:
-            if one.start_entry is not None and one.initial == "exact":
-                references["start", one.start_entry] = one.reference
-            if one.slot[0] == "discrete" and one.initial == "exact":
-                references["discrete", one.slot[1]] = one.reference
+        for variable in self.interface.variables:
+            if variable.start_entry is not None and variable.initial == "exact":
+                references["start", variable.start_entry] = variable.reference
+            if variable.slot[0] == "discrete" and variable.initial == "exact":
+                references["discrete", variable.slot[1]] = variable.reference
         return references
 
     def _references(self, quantities: Iterable[Known], names: Sequence[str]) -> list[int]:
-        return sorted(self._reference[one] for one in quantities if one[0] in names and one in self._reference)
+        return sorted(
+            self._reference[quantity] for quantity in quantities if quantity[0] in names and quantity in self._reference
+        )
 
 
 def sparsity_rows(function: Any, output: int = 0) -> Rows:

@@ -134,21 +134,21 @@ def silent(_: str) -> None:
 
 
 def _modes(modes: str) -> ModesAs:
-    for one in get_args(ModesAs):
-        if modes == one:
-            return one
+    for word in get_args(ModesAs):
+        if modes == word:
+            return word
     raise UnknownName(f"Modes cannot be exported as '{modes}'.", advice=f"There are {', '.join(get_args(ModesAs))}.")
 
 
 def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
     kinds = {kind} if isinstance(kind, str) else set(kind)
-    for one in sorted(kinds - set(get_args(Kind))):
+    for unknown in sorted(kinds - set(get_args(Kind))):
         raise UnknownName(
-            f"There is no kind of FMU '{one}'.", advice="There are me (Model Exchange) and cs (Co-Simulation)."
+            f"There is no kind of FMU '{unknown}'.", advice="There are me (Model Exchange) and cs (Co-Simulation)."
         )
     if not kinds:
         raise ExportError("An FMU needs a kind.", advice="Ask for me (Model Exchange), cs (Co-Simulation) or both.")
-    return tuple(one for one in get_args(Kind) if one in kinds)
+    return tuple(word for word in get_args(Kind) if word in kinds)
 
 
 def _fixed_step(step: float | str | None, kinds: tuple[Kind, ...]) -> float:
@@ -177,8 +177,10 @@ def compiled_open(
     if tables:
         drive = with_tunable_tables(drive, tables)
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
-    lines = ((one, [source.text or str(source) for source in one.template.sources]) for one in flat.instances)
-    equations = [(one.path, one.template.component, texts) for one, texts in lines if texts]
+    lines = (
+        (instance, [source.text or str(source) for source in instance.template.sources]) for instance in flat.instances
+    )
+    equations = [(instance.path, instance.template.component, texts) for instance, texts in lines if texts]
     return as_asked(compile(reduce(flat))), str(getattr(drive, "_description", "") or ""), equations
 
 
@@ -235,7 +237,7 @@ def _contents(
     if about.version == "3.0":
         texts["sources/buildDescription.xml"] = build_description(model.name, about.sources)
         texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model.terminals, icon[1])
-        kinds = dict.fromkeys(icon_name(one.kind) for one in model.terminals)
+        kinds = dict.fromkeys(icon_name(terminal.kind) for terminal in model.terminals)
         shown = [_PICTURES / f"{kind}.{suffix}" for kind in kinds for suffix in ("png", "svg")]
         pictures = {f"terminalsAndIcons/{picture.name}": picture.read_bytes() for picture in shown}
         pictures |= {f"terminalsAndIcons/icon.{ending}": one for ending, one in zip(("svg", "png"), icon, strict=True)}
@@ -264,11 +266,11 @@ def _binaries(
     c_sources = {file: text for file, text in sources.items() if file.endswith((".c", ".h"))}
     binaries: dict[str, bytes] = {}
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
-        for one in platforms:
+        for platform in platforms:
             if embed:
-                tell(f"compiling for {one}")
-            library = build(c_sources, one, Path(folder)) if embed else runtime_library(one, tell)
-            place = PLATFORMS[one].fmi2 if version == "2.0" else one
+                tell(f"compiling for {platform}")
+            library = build(c_sources, platform, Path(folder)) if embed else runtime_library(platform, tell)
+            place = PLATFORMS[platform].fmi2 if version == "2.0" else platform
             binaries[f"binaries/{place}/{name}{library.suffix}"] = library.read_bytes()
     return binaries
 

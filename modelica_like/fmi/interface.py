@@ -91,12 +91,12 @@ class Interface:
     @cached_property
     def by_name(self) -> dict[str, FmuVariable]:
         """Variables by their names."""
-        return {one.name: one for one in self.variables}
+        return {variable.name: variable for variable in self.variables}
 
     def __str__(self) -> str:
         counts: dict[str, int] = {}
-        for one in self.variables:
-            counts[one.causality] = counts.get(one.causality, 0) + 1
+        for variable in self.variables:
+            counts[variable.causality] = counts.get(variable.causality, 0) + 1
         parts = ", ".join(f"{count} {causality}" for causality, count in counts.items())
         return f"Interface {self.name}: {len(self.states)} states; {parts}"
 
@@ -122,7 +122,7 @@ def interface(model: CompiledDae, outputs: Sequence[str] = (), modes: ModesAs = 
     build.discretes(modes)
     build.guards()
     states = range(len(model.states))
-    chosen = tuple(one.reference for one in build.found if one.causality == "output")
+    chosen = tuple(variable.reference for variable in build.found if variable.causality == "output")
     return Interface(
         model.name, tuple(build.found), tuple(build.states[k] for k in states),
         tuple(build.derivatives[k] for k in states), chosen,
@@ -138,14 +138,14 @@ class _Builder:
         self.states: dict[int, int] = {}
         self.derivatives: dict[int, int] = {}
         self.indicators: dict[int, int] = {}
-        paths, chosen = [one.path for one in model.flat_variables], set[str]()
+        paths, chosen = [variable.path for variable in model.flat_variables], set[str]()
         for pattern in outputs:
             matches = [path for path in paths if fnmatchcase(path, pattern.replace("[", "[[]"))]
             if not matches:
                 hint = did_you_mean(pattern, paths) or "."
                 raise UnknownName(f"{model.name} has no variable '{pattern}' that could be an output{hint}")
             chosen.update(matches)
-        self.wanted = lambda one: one.kind == "output" or one.path in chosen
+        self.wanted = lambda variable: variable.kind == "output" or variable.path in chosen
         self.starts = _Starts(model)
         self.reach = Reach(model.variables)
         # Variables change with time, at events only, or with parameters only.
@@ -170,11 +170,11 @@ class _Builder:
         # Parameters on which times of delays depend do not change during a run.
         pattern = self.model.delays.jac_sparsity(0, self.model.delays.name_in().index("p"))
         fixed = {number for row, number in zip(*pattern.get_triplet(), strict=True) if row % 2}
-        for k, one in enumerate(self.model.flat_parameters):
-            variability, start = "tunable" if one.tunable and k not in fixed else "fixed", float(self.model.p[k])
-            self.add(one.path, ("parameter", k), "parameter", variability, None, start=start, **_about(one))
-        for k, one in enumerate(self.model.flat_derived):
-            self.add(one.path, ("derived", k), "calculatedParameter", "tunable", **_about(one))
+        for k, parameter in enumerate(self.model.flat_parameters):
+            variability, start = "tunable" if parameter.tunable and k not in fixed else "fixed", float(self.model.p[k])
+            self.add(parameter.path, ("parameter", k), "parameter", variability, None, start=start, **_about(parameter))
+        for k, parameter in enumerate(self.model.flat_derived):
+            self.add(parameter.path, ("derived", k), "calculatedParameter", "tunable", **_about(parameter))
 
     def continuous(self) -> None:
         """Inputs, states, and all other variables."""
@@ -182,23 +182,23 @@ class _Builder:
         taken = {*model.parameter_position, *model.derived_position}
         inputs = {variable: k for k, variable in enumerate(model.inputs)}
         states = {name: k for k, name in enumerate(model.states)}
-        for k, one in enumerate(model.flat_variables):
-            if one.hidden:
+        for k, variable in enumerate(model.flat_variables):
+            if variable.hidden:
                 continue
-            about, causality = _about(one), "output" if self.wanted(one) else "local"
+            about, causality = _about(variable), "output" if self.wanted(variable) else "local"
             if k in inputs:
                 start = float(model.u[inputs[k]])
-                self.add(one.path, ("input", inputs[k]), "input", initial=None, start=start, **about)
-            elif one.path in states:
-                slot, start = ("state", states[one.path]), self.starts.of_variable(k)
-                self.states[slot[1]] = self.add(one.path, slot, causality, **start, **about)
-            elif one.path not in taken:  # an input with a value from a parameter is that parameter
+                self.add(variable.path, ("input", inputs[k]), "input", initial=None, start=start, **about)
+            elif variable.path in states:
+                slot, start = ("state", states[variable.path]), self.starts.of_variable(k)
+                self.states[slot[1]] = self.add(variable.path, slot, causality, **start, **about)
+            elif variable.path not in taken:  # an input with a value from a parameter is that parameter
                 start, variability = self.starts.of_variable(k), self.depends[k]
                 if start["initial"] != "calculated":
                     variability = "continuous"
                 elif causality == "output" and variability == "tunable":
                     variability = "discrete"  # an output cannot become local
-                self.add(one.path, ("variable", k), causality, variability, **start, **about)
+                self.add(variable.path, ("variable", k), causality, variability, **start, **about)
 
     def rates(self) -> None:
         """Derivatives of all states; states that are no variables, and derivatives without another name, come first."""
@@ -225,49 +225,53 @@ class _Builder:
     def discretes(self, modes: ModesAs) -> None:
         """Modes, and other discrete values, which are local; equations determine some at the start, too."""
         determined = {row.reset.index for row in self.model.update_rows if row.at_start}
-        for k, one in ((k, one) for k, one in enumerate(self.model.flat_discretes) if not one.hidden):
-            values = ", ".join(f"{k}: {name}" for k, name in enumerate(one.names))
-            description = " – ".join(text for text in (one.description, values) if text)
-            slot, about = ("discrete", k), {"unit": one.unit, "description": description}
-            if one.names:
-                kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", one.names)
+        for k, discrete in (
+            (k, discrete) for k, discrete in enumerate(self.model.flat_discretes) if not discrete.hidden
+        ):
+            values = ", ".join(f"{k}: {name}" for k, name in enumerate(discrete.names))
+            description = " – ".join(text for text in (discrete.description, values) if text)
+            slot, about = ("discrete", k), {"unit": discrete.unit, "description": description}
+            if discrete.names:
+                kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", discrete.names)
                 causality = "local" if modes == "local" else "output"
-                about |= {"min": 0, "max": len(one.names) - 1, "modes": names}
-                self.add(one.path, slot, causality, "discrete", kind=kind, **about)
+                about |= {"min": 0, "max": len(discrete.names) - 1, "modes": names}
+                self.add(discrete.path, slot, causality, "discrete", kind=kind, **about)
             elif k in determined:
-                self.add(one.path, slot, "local", "discrete", **about)
+                self.add(discrete.path, slot, "local", "discrete", **about)
             else:
-                self.add(one.path, slot, "local", "discrete", "exact", start=self.starts.discrete[k], **about)
+                self.add(discrete.path, slot, "local", "discrete", "exact", start=self.starts.discrete[k], **about)
 
     def guards(self) -> None:
         """One event indicator per state event, named by its mode."""
-        for one in self.model.transitions:
-            if one.timed or one.index in self.indicators:
+        for transition in self.model.transitions:
+            if transition.timed or transition.index in self.indicators:
                 continue
-            mode = self.model.flat_discretes[one.mode]
-            every = len(one.sources) == len(mode.names)
-            leaving = "any mode" if every else " or ".join(mode.names[k] for k in one.sources)
-            description = f"{mode.path}: {leaving} → {mode.names[one.target]} above zero"
-            name = f"event_indicator[{one.index + 1}]"
-            self.indicators[one.index] = self.add(name, ("guard", one.index), description=description)
+            mode = self.model.flat_discretes[transition.mode]
+            every = len(transition.sources) == len(mode.names)
+            leaving = "any mode" if every else " or ".join(mode.names[k] for k in transition.sources)
+            description = f"{mode.path}: {leaving} → {mode.names[transition.target]} above zero"
+            name = f"event_indicator[{transition.index + 1}]"
+            self.indicators[transition.index] = self.add(name, ("guard", transition.index), description=description)
 
     def arrays(self) -> Iterator[FmuVariable]:
         """Tables: parameters `clutch.mu_pos[2,1]` belong together."""
-        cells = (one for one in self.found if one.causality == "parameter" and one.name.endswith("]"))
-        for number, (name, group) in enumerate(groupby(cells, lambda one: one.name.rpartition("[")[0])):
+        cells = (
+            variable for variable in self.found if variable.causality == "parameter" and variable.name.endswith("]")
+        )
+        for number, (name, group) in enumerate(groupby(cells, lambda variable: variable.name.rpartition("[")[0])):
             numbers = tuple(group)
             dimensions = tuple(int(size) for size in numbers[-1].name[len(name) + 1 : -1].split(","))
-            units = {str(one.unit): one.unit for one in numbers}
+            units = {str(variable.unit): variable.unit for variable in numbers}
             yield FmuVariable(
                 name, len(self.found) + number, "Float64", "parameter", "tunable", None, numbers[0].slot,
                 next(iter(units.values())) if len(units) == 1 else ONE, _table_text(numbers, dimensions),
-                elements=tuple(one.reference for one in numbers), dimensions=dimensions,
+                elements=tuple(variable.reference for variable in numbers), dimensions=dimensions,
             )  # fmt: skip
 
 
 def _table_text(numbers: Sequence[FmuVariable], dimensions: tuple[int, ...]) -> str:
     columns = numbers[: dimensions[1]] if len(dimensions) > 1 else numbers[:1]
-    return "rows of " + ", ".join(one.description.partition(" in row 1 of ")[0] for one in columns)
+    return "rows of " + ", ".join(column.description.partition(" in row 1 of ")[0] for column in columns)
 
 
 def fmi_name(name: str) -> str:
@@ -276,10 +280,15 @@ def fmi_name(name: str) -> str:
     return name if depth < 2 else f"der({name[4 * depth : -depth]},{depth})"
 
 
-def _about(one: FlatVariable | FlatParameter) -> dict[str, Any]:
-    about: dict[str, Any] = {"unit": one.unit, "description": one.description, "min": one.min, "max": one.max}
-    if isinstance(one, FlatVariable) and one.nominal != 1.0:
-        about["nominal"] = abs(one.nominal)
+def _about(quantity: FlatVariable | FlatParameter) -> dict[str, Any]:
+    about: dict[str, Any] = {
+        "unit": quantity.unit,
+        "description": quantity.description,
+        "min": quantity.min,
+        "max": quantity.max,
+    }
+    if isinstance(quantity, FlatVariable) and quantity.nominal != 1.0:
+        about["nominal"] = abs(quantity.nominal)
     return about
 
 

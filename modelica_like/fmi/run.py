@@ -93,12 +93,14 @@ def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:
         tell_error(folder, {"": path.name})
         table = np.load(folder / "result.npy", max_header_size=_HEADER)  # names of all columns
         meta = json.loads((folder / "meta.json").read_text())
-    variables = (RecordedVariable(**{**one, "names": dict(one["names"])}) for one in meta["variables"])
-    columns = [one for one in variables if one.path in table.dtype.names]
-    parts = [tuple(one for one in columns if (one.kind == "discrete") is modes) for modes in (False, True)]
+    variables = (RecordedVariable(**{**variable, "names": dict(variable["names"])}) for variable in meta["variables"])
+    columns = [variable for variable in variables if variable.path in table.dtype.names]
+    parts = [tuple(column for column in columns if (column.kind == "discrete") is modes) for modes in (False, True)]
     constants = {name: float(job["parameters"].get(name, value)) for name, value in meta["constants"].items()}
     model = RecordedModel(meta["name"], parts[0], parts[1], constants)
-    values, modes = (np.array([table[one.path] for one in part], float).reshape(-1, len(table)) for part in parts)
+    values, modes = (
+        np.array([table[variable.path] for variable in part], float).reshape(-1, len(table)) for part in parts
+    )
     run = RecordedSolution(model, table["time"].copy(), values, modes, time.perf_counter() - begin)
     if meta["ended"]:
         run._ended = Ended(float(run.time[-1]), run.model.name, TERMINATED)
@@ -110,7 +112,7 @@ def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:
 
 def _check_finite(name: str, run: RecordedSolution) -> None:
     """Refuse results that are not finite; the run is on the error."""
-    paths = [one.path for one in run.model.flat_variables]
+    paths = [variable.path for variable in run.model.flat_variables]
     bad = [(int(np.argmin(finite)), path) for path in paths if not (finite := np.isfinite(run[path])).all()]
     if bad:
         first, path = min(bad)

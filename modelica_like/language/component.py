@@ -247,7 +247,7 @@ class Component(Declared):
             named = {}
             for name, part in self._parts.items():
                 listed = isinstance(part, list)
-                named |= {f"{name}[{k}]": one for k, one in enumerate(part, 1)} if listed else {name: part}
+                named |= {f"{name}[{k}]": element for k, element in enumerate(part, 1)} if listed else {name: part}
             self.__dict__["_named"] = named
         return MappingProxyType(named)
 

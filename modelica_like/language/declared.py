@@ -191,15 +191,19 @@ def refuse_collection(label: str, value: object, where: Callable[[], Source] | N
     if not isinstance(value, list | tuple | dict):
         return
     elements = list(cast("Iterable[Any]", value.values() if isinstance(value, dict) else value))
-    inner = [part for one in elements for part in cast("Iterable[Any]", one if isinstance(one, tuple) else (one,))]
-    if any(isinstance(one, Connector) for one in inner):
+    inner = [
+        part
+        for element in elements
+        for part in cast("Iterable[Any]", element if isinstance(element, tuple) else (element,))
+    ]
+    if any(isinstance(connector, Connector) for connector in inner):
         advice = "Give each a name of its own: flange_1 and flange_2; where their number varies, by setattr in `build`."
-    elif any(isinstance(one, Declared) for one in inner):
+    elif any(isinstance(connector, Declared) for connector in inner):
         advice = "An array is a list of parts only: [Inertia(J=1), Inertia(J=2)]; other parts have names of their own."
     else:
         return
     kind = type(cast(object, value)).__name__
-    kinds = ", ".join(dict.fromkeys(type(one).__name__ for one in elements))
+    kinds = ", ".join(dict.fromkeys(type(element).__name__ for element in elements))
     raise LanguageError(
         f"{label} is a {kind} that is no array of parts: it has {kinds}.", where=where() if where else (), advice=advice
     )

@@ -84,7 +84,7 @@ class Field:
     @cached_property
     def bounds(self) -> tuple[float | None, float | None]:
         """Smallest and largest value in SI units, or None."""
-        low, high = (None if one is None else to_si(one, self.unit, self.label) for one in (self.min, self.max))
+        low, high = (None if limit is None else to_si(limit, self.unit, self.label) for limit in (self.min, self.max))
         return low, high
 
     @property

@@ -40,8 +40,8 @@ _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
 
 
 def _operator(sign: str, *, turned: bool = False) -> Callable[[Any, Any], Formula]:
-    def apply(one: Any, other: Any) -> Formula:
-        return Formula(sign, tuple(as_formula(side) for side in ((other, one) if turned else (one, other))))
+    def apply(part: Any, other: Any) -> Formula:
+        return Formula(sign, tuple(as_formula(side) for side in ((other, part) if turned else (part, other))))
 
     return apply
 

@@ -152,7 +152,7 @@ def _short(given: Any) -> str:
 
 
 def _as_written(given: Any) -> Any:
-    return [_as_written(one) for one in cast("tuple[Any, ...]", given)] if isinstance(given, tuple) else given
+    return [_as_written(cell) for cell in cast("tuple[Any, ...]", given)] if isinstance(given, tuple) else given
 
 
 def frozen_rows(value: Any) -> Any:

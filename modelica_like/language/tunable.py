@@ -33,7 +33,7 @@ def with_tunable_tables(root: _Root, patterns: Iterable[str]) -> _Root:
     with_tables = [
         (part, name, rows) for part in cast("Iterable[Any]", root.walk()) for name, rows in part._tables.items()
     ]
-    tables = {f"{one[0].path}.{one[1]}".lstrip("."): one for one in with_tables}
+    tables = {f"{table[0].path}.{table[1]}".lstrip("."): table for table in with_tables}
     for pattern in patterns:
         met = [path for path in tables if fnmatchcase(path, pattern.replace("[", "[[]"))]
         if not met:

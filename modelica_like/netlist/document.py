@@ -267,7 +267,7 @@ def _names(key: str, value: Any) -> list[str]:
 
 
 def _ends(key: str, value: Any) -> list[str]:
-    if isinstance(value, list) and any(isinstance(one, list) for one in value):
+    if isinstance(value, list) and any(isinstance(entry, list) for entry in value):
         raise NetlistError(
             f"{key} must be a list of names.",
             advice="Write a separate entry for every list.",

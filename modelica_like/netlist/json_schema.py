@@ -58,8 +58,8 @@ def chosen(types: Iterable[str], others: Iterable[dict[str, Any]] = ()) -> dict[
 def _units(types: Iterable[type[Component]]) -> set[str]:
     fields = {field.unit_text for kind in types for field in kind._class_fields.values()}
     columns = {
-        str(one.unit_in(kind._class_fields)) for kind in types for table in kind._tables.values()
-        for one in table.columns if not one.text
+        str(column.unit_in(kind._class_fields)) for kind in types for table in kind._tables.values()
+        for column in table.columns if not column.text
     }  # fmt: skip
     return fields | columns
 
@@ -173,7 +173,7 @@ def _field(field: Field, quantities: Quantities) -> dict[str, Any]:
 
 
 def _table(table: Rows, fields: Mapping[str, Field], quantities: Quantities) -> dict[str, Any]:
-    cells = [{"description": one.described(fields), **_cell(one, fields, quantities)} for one in table.columns]
+    cells = [{"description": column.described(fields), **_cell(column, fields, quantities)} for column in table.columns]
     size = {"minItems": len(cells), "additionalItems": cells[-1] if table.more else False}
     row = cells[0] if table.flat else {"type": "array", "items": cells, **size}
     array: dict[str, Any] = {"type": "array", "description": table.description, "minItems": 1, "items": row}

@@ -50,4 +50,4 @@ def member(run: Trajectories, path: str) -> Any:
 def next_names(names: Iterable[str], before: str) -> list[str]:
     """Return the words that follow the beginning of a path, each once."""
     after = (name.removeprefix(before) for name in names if name.startswith(before))
-    return [*dict.fromkeys(word for one in after if (word := one.partition(".")[0]).isidentifier())]
+    return [*dict.fromkeys(word for name in after if (word := name.partition(".")[0]).isidentifier())]

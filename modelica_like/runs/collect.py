@@ -50,12 +50,12 @@ class Collector:
 
     def __init__(self, model: CompiledDae, outputs: Sequence[Output], atol: float) -> None:
         self._model, self.outputs = model, list(outputs)
-        self._parts = [one.parts(model) for one in outputs]
+        self._parts = [output.parts(model) for output in outputs]
         self._every = [part for parts in self._parts for part in parts]
         self._along = [k for k, part in enumerate(self._every) if part.kind not in ("change", "impact")]
         self._between = [k for k in self._along if self._every[k].kind in ("integral", "max", "first")]
         self._curves, self._fits = (self._curves_of(numbers, atol) for numbers in (self._along, self._between))
-        self._values = np.array([0.0 if one.kind in ("integral", "impact") else np.nan for one in self._every])
+        self._values = np.array([0.0 if part.kind in ("integral", "impact") else np.nan for part in self._every])
         self._times = np.full(len(self._every), np.nan)
 
     @property
@@ -65,8 +65,8 @@ class Collector:
 
     def _curves_of(self, numbers: Sequence[int], atol: float) -> Curves:
         parts = [self._every[k] for k in numbers]
-        key = tuple((one.text, one.form, one.change) for one in parts)
-        return Curves(self._model, key, lambda: [ca.SX(one.expression(self._model)) for one in parts], atol)
+        key = tuple((part.text, part.form, part.change) for part in parts)
+        return Curves(self._model, key, lambda: [ca.SX(part.expression(self._model)) for part in parts], atol)
 
     def feed(self, dense: Dense) -> None:
         """Read stretches that follow those before."""
@@ -105,7 +105,7 @@ class Collector:
             self._read_ends(segments)
         for k, part in enumerate(self._every):
             if part.kind == "impact":
-                self._values[k] = sum(one.energy for one in record.impacts if part.text in ("", one.component))
+                self._values[k] = sum(impact.energy for impact in record.impacts if part.text in ("", impact.component))
             elif part.kind == "change":
                 self._values[k] = self._change(record, part)
         span, first = float(segments[-1].times[-1] - segments[0].times[0]), 0
@@ -121,10 +121,10 @@ class Collector:
         return numbers
 
     def _read_ends(self, segments: Sequence[Segment]) -> None:
-        places = [(one, k) for one in segments for k in (0, -1)]
-        times = np.array([one.times[k] for one, k in places])
-        x, z = (np.array([getattr(one, name)[:, k] for one, k in places]).T for name in "xz")
-        values = self._curves.at(times, x, z, np.array([one.d for one, _ in places]).T)
+        places = [(segment, k) for segment in segments for k in (0, -1)]
+        times = np.array([piece.times[k] for piece, k in places])
+        x, z = (np.array([getattr(piece, name)[:, k] for piece, k in places]).T for name in "xz")
+        values = self._curves.at(times, x, z, np.array([piece.d for piece, _ in places]).T)
         latest = times[-1] + _SAME_END * (times[-1] - times[0])
         for row, k in enumerate(self._along):
             part = self._every[k]
@@ -140,11 +140,11 @@ class Collector:
         before, after, number = part.change
         names = self._model.flat_discretes[self._model.discrete_position[part.text]].names
         times = [
-            one.time
-            for one in record.events
-            if one.mode == part.text
-            and (before < 0 or one.before == names[before])
-            and (after < 0 or one.after == names[after])
+            event.time
+            for event in record.events
+            if event.mode == part.text
+            and (before < 0 or event.before == names[before])
+            and (after < 0 or event.after == names[after])
         ]
         return times[number - 1] if len(times) >= number else np.nan
 

@@ -128,9 +128,9 @@ class Curves(Shown):
         )
         scales = (row.largest / row.relative for row in rows)
         return tuple(
-            one
-            for one, scale in zip(differences, scales, strict=True)
-            if abs(one.second - one.first) > _SAME_START * scale
+            difference
+            for difference, scale in zip(differences, scales, strict=True)
+            if abs(difference.second - difference.first) > _SAME_START * scale
         )
 
     def __getitem__(self, signal: str) -> Deviation:

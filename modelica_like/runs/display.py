@@ -32,8 +32,10 @@ class Display:
     """
 
     def __init__(self, model: Any, chosen: Mapping[str, str] | None = None) -> None:
-        self._own = {one.path: str(one.unit) for one in (*model.flat_variables, *model.flat_discretes)}
-        self._differences = {one.path for one in model.flat_variables if getattr(one, "difference", False)}
+        self._own = {variable.path: str(variable.unit) for variable in (*model.flat_variables, *model.flat_discretes)}
+        self._differences = {
+            variable.path for variable in model.flat_variables if getattr(variable, "difference", False)
+        }
         wanted = {**getattr(model, "settings", {}).get("display", {}), **(chosen or {})}
         self._quantities: dict[str, str] = {}
         self._paths: dict[str, str] = {}

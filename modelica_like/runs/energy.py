@@ -248,7 +248,7 @@ def energy_balance(
     rows = tuple(map(EnergyRow, model.components, *(column.tolist() for column in columns)))
     exchanged = (inflow, source + work, lost + impact)
     throughput = max([powers.stored, powers.cancelled, *(float(np.sum(np.abs(part))) for part in exchanged)])
-    resets = {number for number, one in enumerate(model.transitions) if one.resets}
+    resets = {number for number, transition in enumerate(model.transitions) if transition.resets}
     reset = [event.time for event in events if event.transition in resets]
     unexplained = [(one.time, one.energy - float(np.sum(work))) for one, work in zip(impacts, given, strict=True)]
     at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, unexplained)
@@ -338,12 +338,12 @@ def _impacts(
     """
     struck, given = np.zeros((2, len(impacts), len(stored)))
     at_start: Vector | None = None
-    for lost, work, one in zip(struck, given, impacts, strict=True):
-        lost[model.components.index(one.component)] = one.energy
-        if one.trials:
-            before, after = (call(model, model.energy, point).reshape(-1, len(stored)) for point in one.trials)
+    for lost, work, impact in zip(struck, given, impacts, strict=True):
+        lost[model.components.index(impact.component)] = impact.energy
+        if impact.trials:
+            before, after = (call(model, model.energy, point).reshape(-1, len(stored)) for point in impact.trials)
             work[:] = INSTANT * (after[2] - before[2])
-            if at_start is None and one.time == start:
+            if at_start is None and impact.time == start:
                 at_start = stored - before[0]
     return struck, given, np.zeros(len(stored)) if at_start is None else at_start
 

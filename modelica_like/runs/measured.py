@@ -45,9 +45,10 @@ def read_columns(path: Path) -> dict[str, tuple[Vector, str]]:
         if said
         else next(
             (
-                one
-                for one in ";\t"
-                if one in next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+                separator_
+                for separator_ in ";\t"
+                if separator_
+                in next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
             ),
             ",",
         )

@@ -108,8 +108,8 @@ def _together(model: CompiledDae, segments: list[Segment]) -> Results:
     owner = np.repeat(np.arange(len(sizes)), sizes)
     # One array, so that the results whose last digits are changed stand at its end.
     some, whole = [0, count // 2, count - 1], np.empty((1 + nx + len(segments[0].z), count + 3))
-    for one, rows in (("times", 0), ("x", slice(1, 1 + nx)), ("z", slice(1 + nx, None))):
-        np.concatenate([getattr(segment, one) for segment in segments], axis=-1, out=whole[rows, :count])
+    for name, rows in (("times", 0), ("x", slice(1, 1 + nx)), ("z", slice(1 + nx, None))):
+        np.concatenate([getattr(segment, name) for segment in segments], axis=-1, out=whole[rows, :count])
     whole[:, count:] = whole[:, some]
     whole[1::2, count:] *= 1.0 + _DIGITS * _SIGNS
     whole[2::2, count:] *= 1.0 - _DIGITS * _SIGNS

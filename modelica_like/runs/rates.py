@@ -40,7 +40,7 @@ def rate_along(model: CompiledDae, name: str, times: Any, x: Vector, z: Vector, 
 
     def make() -> ca.Function:
         parts = model.motion.parts(model.variables(*arguments)[row])
-        return ca.Function("rate", arguments, [ca.densify(one) for one in parts])
+        return ca.Function("rate", arguments, [ca.densify(part) for part in parts])
 
     parts = model.once(("rate", name), make)(np.reshape(times, (1, -1)), x, z, model.p, model.u, d)
     direct, by_z, drift, jacobian = (np.asarray(part.full()) for part in parts)

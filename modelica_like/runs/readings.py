@@ -205,10 +205,10 @@ def _plain(model: CompiledDae, name: str) -> Output:
 
 def _holding_mode(model: CompiledDae, owner: str) -> tuple[str, str] | None:
     """The mode of a component in which it holds a motion, and the name of that."""
-    for one in model.holds:
-        if one.component == owner:
-            mode = model.flat_discretes[one.mode]
-            return mode.path, mode.names[one.number]
+    for hold in model.holds:
+        if hold.component == owner:
+            mode = model.flat_discretes[hold.mode]
+            return mode.path, mode.names[hold.number]
     return None
 
 
@@ -221,20 +221,20 @@ def _mode_change(model: CompiledDae, name: str, inside: str) -> Output:
             "time(clutch.mode -> stuck, 2).",
         )
     mode = parts["mode"]
-    _check_mode(model, mode, *(one for one in (parts["before"], parts["after"]) if one is not None))
+    _check_mode(model, mode, *(value for value in (parts["before"], parts["after"]) if value is not None))
     return Output(
         name, _SECOND, "time", mode, change=(parts["before"] or "", parts["after"], int(parts["number"] or 1))
     )
 
 
 def _check_mode(model: CompiledDae, mode: str, *names: str) -> None:
-    modes = {one.path: one.names for one in model.flat_discretes if one.names}
+    modes = {discrete.path: discrete.names for discrete in model.flat_discretes if discrete.names}
     if mode not in modes:
         raise UnknownName(f"{model.name} has no mode '{mode}'{did_you_mean(mode, modes) or '.'}")
-    for one in names:
-        if one not in modes[mode]:
+    for name in names:
+        if name not in modes[mode]:
             raise UnknownName(
-                f"{mode} has no mode '{one}'{did_you_mean(one, modes[mode]) or '.'} It has {', '.join(modes[mode])}."
+                f"{mode} has no mode '{name}'{did_you_mean(name, modes[mode]) or '.'} It has {', '.join(modes[mode])}."
             )
 
 
@@ -268,7 +268,7 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
         rows = [model.components.index(owner)] if owner else list(range(len(model.components)))
         unit = _JOULE if last in (*_ENERGY, "stored_energy") else _WATT
         return lambda: ca.sum1(model.energy(*arguments)[rows, columns[last]]), unit
-    words = [*model.position, *(f"{one}.{last}" for one in model.components if last in columns)]
+    words = [*model.position, *(f"{component}.{last}" for component in model.components if last in columns)]
     if owner in model.components:
         words += [f"{owner}.{word}" for word in (*columns, "lock_time", "unlock_time")]
     raise UnknownName(
@@ -281,6 +281,6 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
 
 def quadratures(model: CompiledDae, outputs: Sequence[Output]) -> tuple[Any, str]:
     """Return all integrands of outputs as one SX column, and a name for them."""
-    parts = [part for one in outputs for part in one.parts(model) if part.kind == "integral"]
+    parts = [part for output in outputs for part in output.parts(model) if part.kind == "integral"]
     column = ca.vertcat(*(part.expression(model) for part in parts)) if parts else ca.SX(0, 1)
     return column, ";".join(f"{part.text} {part.form} {part.change}" for part in parts)

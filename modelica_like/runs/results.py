@@ -103,8 +103,8 @@ class _Columns:
             name=recorded.name, position=recorded.position, discrete_position=recorded.discrete_position, holds=(),
             components=recorded.components, flat_variables=recorded.flat_variables, u=np.zeros(0),
             parameter_position={name: k for k, name in enumerate(constants)}, p=np.array([*constants.values()], float),
-            units={one.path: _unit(one.unit) for one in (*recorded.flat_variables, *recorded.flat_discretes)},
-            flat_discretes=[SimpleNamespace(path=one.path, names=_names(one.names)) for one in recorded.flat_discretes],
+            units={v.path: _unit(v.unit) for v in (*recorded.flat_variables, *recorded.flat_discretes)},
+            flat_discretes=[SimpleNamespace(path=d.path, names=_names(d.names)) for d in recorded.flat_discretes],
         )  # fmt: skip
         sizes = {
             "t": 1,
@@ -120,9 +120,11 @@ class _Columns:
         return arguments[1]
 
     def energy(self, *arguments: Any) -> Any:
-        rows = [[f"{one}.{term}" for term in ENERGY_TERMS] for one in self.recorded.components]
+        rows = [[f"{component}.{term}" for term in ENERGY_TERMS] for component in self.recorded.components]
         x, position = arguments[1], self.recorded.position
-        return ca.vertcat(*(ca.horzcat(*(x[position[one]] if one in position else 0 for one in row)) for row in rows))
+        return ca.vertcat(
+            *(ca.horzcat(*(x[position[value]] if value in position else 0 for value in row)) for row in rows)
+        )
 
     def once(self, _: Any, make: Callable[[], Any]) -> Any:
         return make()
@@ -147,14 +149,14 @@ def read_results(run: RecordedSolution, names: Sequence[str]) -> tuple[list[Numb
     """
     model: Any = _Columns(run.model)
     outputs, dense = [read_output(model, name) for name in names], OfResults(run)
-    sized = [replace(one, kind="peak") if one.kind not in _TIMES else replace(one, kind="end", path="time")
-             for one in outputs]  # fmt: skip
+    sized = [replace(output, kind="peak") if output.kind not in _TIMES else replace(output, kind="end", path="time")
+             for output in outputs]  # fmt: skip
     readings = Collector(model, [*outputs, *sized], _NOISE)
     readings.feed(dense)
     record: Any = SimpleNamespace(segments=dense.stretches, events=run.events, impacts=())
     numbers, span = readings.finish(record), float(run.time[-1] - run.time[0])
-    sizes = [span if one.kind in _TIMES else abs(size) * (span if one.kind == "integral" else 1.0)
-             for one, size in zip(outputs, numbers[len(outputs):], strict=True)]  # fmt: skip
+    sizes = [span if output.kind in _TIMES else abs(size) * (span if output.kind == "integral" else 1.0)
+             for output, size in zip(outputs, numbers[len(outputs):], strict=True)]  # fmt: skip
     return numbers[: len(outputs)], np.array(sizes)
 
 

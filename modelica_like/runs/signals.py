@@ -79,9 +79,9 @@ def read_signals(model: Any, words: Iterable[str]) -> list[Signal]:
         UnitError: the units in a formula do not fit together.
     """
     unit_of_path = _units(model)
-    terms = {f"{one}.{term}" for one in getattr(model, "components", ()) for term in ENERGY_TERMS}
-    names = [one.path for one in (*model.flat_variables, *model.flat_discretes) if not one.hidden]
-    signs = {one.path: getattr(one, "driving", 1) for one in model.flat_variables}
+    terms = {f"{component}.{term}" for component in getattr(model, "components", ()) for term in ENERGY_TERMS}
+    names = [variable.path for variable in (*model.flat_variables, *model.flat_discretes) if not variable.hidden]
+    signs = {variable.path: getattr(variable, "driving", 1) for variable in model.flat_variables}
     signals: dict[str, Signal] = {}
     for word in words:
         pool = sorted(terms) if word.rpartition(".")[2] in ENERGY_TERMS else names
@@ -100,20 +100,20 @@ def read_signals(model: Any, words: Iterable[str]) -> list[Signal]:
 
 def named(model: Any, paths: Sequence[str]) -> list[Signal]:
     """Return variables as signals."""
-    variables = {one.path: one for one in (*model.flat_variables, *model.flat_discretes)}
+    variables = {variable.path: variable for variable in (*model.flat_variables, *model.flat_discretes)}
     pairs = ((path, variables[path]) for path in paths)
     return [Signal(p, str(v.unit), Formula("name", (p,)), getattr(v, "driving", 1)) for p, v in pairs]
 
 
 def evaluated(run: Trajectories, signals: Sequence[Signal]) -> dict[str, Vector]:
     """Return the trajectories of signals by name, in SI units."""
-    plain = run.together(*(one.name for one in signals if one.plain))
-    return {one.name: plain[one.name] if one.plain else one.values(run) for one in signals}
+    plain = run.together(*(signal.name for signal in signals if signal.plain))
+    return {signal.name: plain[signal.name] if signal.plain else signal.values(run) for signal in signals}
 
 
 def _units(model: Any) -> dict[str, str]:
-    units = {one.path: str(one.unit) for one in getattr(model, "flat_parameters", ())} | {"time": "s"}
-    return units | {one.path: str(one.unit) for one in (*model.flat_variables, *model.flat_discretes)}
+    units = {parameter.path: str(parameter.unit) for parameter in getattr(model, "flat_parameters", ())} | {"time": "s"}
+    return units | {variable.path: str(variable.unit) for variable in (*model.flat_variables, *model.flat_discretes)}
 
 
 def _energies(terms: Iterable[str]) -> dict[str, str]:
@@ -152,7 +152,11 @@ def unit_of(formula: Formula, units: dict[str, str], model: str) -> str:
     if str(formula_unit) in QUANTITIES:
         return str(formula_unit)
     return next(
-        (one for one in QUANTITIES if one not in _KEPT and same_dimension(parse_unit(one), formula_unit)),
+        (
+            quantity
+            for quantity in QUANTITIES
+            if quantity not in _KEPT and same_dimension(parse_unit(quantity), formula_unit)
+        ),
         str(formula_unit),
     )
 

@@ -104,7 +104,7 @@ class Solution(Trajectories):
         path = self.path(key)  # type: ignore[arg-type]
         model = self.model
         positions = (model.position, model.discrete_position, model.parameter_position, model.derived_position)
-        return any(path in one for one in positions) or differentiated(path) in model.position
+        return any(path in position for position in positions) or differentiated(path) in model.position
 
     @property
     def _small(self) -> bool:
@@ -156,8 +156,8 @@ class Solution(Trajectories):
         return self._values(self.segments[-1].point(-1))
 
     def _values(self, now: Point) -> Values:
-        one = Segment(np.array([now.t]), now.x[:, None], now.z[:, None], now.d)
-        return Values(replace(self, segments=(one,), _cache={}))
+        segment = Segment(np.array([now.t]), now.x[:, None], now.z[:, None], now.d)
+        return Values(replace(self, segments=(segment,), _cache={}))
 
     def energy(self, begin: float | None = None, end: float | None = None) -> EnergyBalance:
         """Return the energy balance of every component over the run, or over a part of it.
@@ -174,22 +174,26 @@ class Solution(Trajectories):
             first, last = (self.time[k] if t is None else float(t) for k, t in ((0, begin), (-1, end)))
             segments = self.segments if (begin, end) == (None, None) else tuple(self._part(first, last))
             until = np.inf if last == self.time[-1] else last
-            events = [one for one in self.events if first <= one.time < until]
-            impacts = [one for one in self.impacts if first <= one.time < until]
+            events = [event for event in self.events if first <= event.time < until]
+            impacts = [impact for impact in self.impacts if first <= impact.time < until]
             self._cache[key] = energy_balance(self.model, segments, self.options, events, impacts)
         return self._cache[key]
 
     def _part(self, begin: float, end: float) -> Iterator[Segment]:
         """Yield the segments between two times."""
         edges = {t: self.point(t) for t in (begin, end)}
-        for one in self.segments:
-            inside = (one.times >= begin) & (one.times <= end)
-            cuts = [edges[t] for t in (begin, end) if one.times[0] < t < one.times[-1] and t not in one.times[inside]]
-            times = np.concatenate([one.times[inside], [cut.t for cut in cuts]])
+        for segment in self.segments:
+            inside = (segment.times >= begin) & (segment.times <= end)
+            cuts = [
+                edges[t]
+                for t in (begin, end)
+                if segment.times[0] < t < segment.times[-1] and t not in segment.times[inside]
+            ]
+            times = np.concatenate([segment.times[inside], [cut.t for cut in cuts]])
             order = np.argsort(times, kind="stable")
             if len(order) > 1:
-                x, z = (np.column_stack([getattr(one, n)[:, inside], *(getattr(c, n) for c in cuts)]) for n in "xz")
-                yield Segment(times[order], x[:, order], z[:, order], one.d)
+                x, z = (np.column_stack([getattr(segment, n)[:, inside], *(getattr(c, n) for c in cuts)]) for n in "xz")
+                yield Segment(times[order], x[:, order], z[:, order], segment.d)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_cache": {}, "dense": None}

@@ -51,9 +51,9 @@ class Statistics:
 class Values(Mapping[str, float]):
     """All variables at one time, by path."""
 
-    def __init__(self, one: Trajectories) -> None:
-        self.time = float(one.time[0])
-        self._one = one
+    def __init__(self, trajectories: Trajectories) -> None:
+        self.time = float(trajectories.time[0])
+        self._one = trajectories
 
     def __getitem__(self, key: str | Any) -> float:
         return float(self._one[key][0])
@@ -152,7 +152,7 @@ class Trajectories(Shown, ABC):
     def names(self) -> tuple[str, ...]:
         """Paths of all variables, modes and discrete values that somebody has declared."""
         every = (*self.model.flat_variables, *self.model.flat_discretes)
-        return tuple(one.path for one in every if not one.hidden)
+        return tuple(variable.path for variable in every if not variable.hidden)
 
     def unit_of(self, name: str) -> str:
         """Return the coherent SI unit of a variable; that of a mode is `1`."""

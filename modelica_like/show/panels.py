@@ -63,7 +63,7 @@ def draw_panels(
     heights = [_HEIGHT] * max(len(panels), 1) + [_ROW * max(len(bands), len(states) * 0.8) + 0.1] * bool(bands)
     reach = float(time[0]), float(time[-1])
     texts = [f"{k}  {told(t)} s  {text}" for k, (t, text) in enumerate(marks, 1)]
-    wrapped = [(one, _wrapped(texts, (width - 0.2) / one - 0.3)) for one in (1, 2, 3)]
+    wrapped = [(step, _wrapped(texts, (width - 0.2) / step - 0.3)) for step in (1, 2, 3)]
     _, listed = min(wrapped, key=lambda pair: -(-len(pair[1]) // pair[0]))
     below = [listed, _wrapped(notes, width - 0.5)]
     with picture(title, count, 0.85 + sum(heights), width=width, below=below, height_ratios=heights) as (figure, rows):

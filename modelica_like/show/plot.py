@@ -51,27 +51,27 @@ def plot(
         UnitError: a variable cannot be shown in a unit, or the units in a formula do not fit together.
     """
     shown = Display(solution.model, display)
-    modes = {one.path for one in solution.model.flat_discretes if one.names}
+    modes = {discrete.path for discrete in solution.model.flat_discretes if discrete.names}
     chosen = read_signals(solution.model, patterns)
-    units = [one for one in _USUAL if one in (*_on_page(solution), *_BESIDE)]
-    curves = [one for one in chosen if one.name not in modes] if chosen else usual(solution, units)
+    units = [kind for kind in _USUAL if kind in (*_on_page(solution), *_BESIDE)]
+    curves = [signal for signal in chosen if signal.name not in modes] if chosen else usual(solution, units)
     values = evaluated(solution, curves)
     groups: dict[tuple[str, str], list[Signal]] = {}
     for one in curves:
         groups.setdefault((quantity_of(one), one.shown_in(shown)), []).append(one)
     panels, left = _panels(groups, 0 if chosen else _MOST_PANELS[0])
-    bands, unbanded = bands_of(solution, [one.name for one in chosen if one.name in modes])
+    bands, unbanded = bands_of(solution, [signal.name for signal in chosen if signal.name in modes])
     marks, unmarked = marks_of(solution, [band.mode for band in bands])
     left += [] if chosen else _quantities_left(solution, units)
     notes = [f"Not drawn: {', '.join(left)}; name them to draw them."] if left else []
 
     def draw(axes: Any, signals: Sequence[Signal]) -> None:
-        for k, one in enumerate(signals):
-            curve = one.driving * shown.converted(values[one.name], one.unit, one.shown_in(shown))
+        for k, signal in enumerate(signals):
+            curve = signal.driving * shown.converted(values[signal.name], signal.unit, signal.shown_in(shown))
             style = {"linestyle": "-" if k < len(COLOURS) else "--", "color": COLOURS[k % len(COLOURS)]}
-            axes.plot(solution.time, curve, label=one.label, **style)
+            axes.plot(solution.time, curve, label=signal.label, **style)
 
-    drawn = [Panel(name, unit, [one.label for one in some], lambda axes, some=some: draw(axes, some))
+    drawn = [Panel(name, unit, [signal.label for signal in some], lambda axes, some=some: draw(axes, some))
             for (name, unit), some in panels]  # fmt: skip
     return draw_panels(title or solution.model.name, solution.time, drawn, bands, marks, [*notes, *unbanded, *unmarked])
 
@@ -89,7 +89,7 @@ def _panels(
         panels += [(key, signals[k * each : (k + 1) * each]) for k in range(min(count, room))]
         rest = signals[each * room :]
         if rest:
-            left.append(f"{len(rest)} more of {key[0]} ({listed([one.name for one in rest])})")
+            left.append(f"{len(rest)} more of {key[0]} ({listed([signal.name for signal in rest])})")
     return panels, left
 
 
@@ -151,22 +151,22 @@ def for_page(solution: Trajectories, words: Sequence[str] = ()) -> tuple[list[Si
         UnitError: the units in a formula do not fit together.
     """
     if words:
-        modes = {one.path for one in solution.model.flat_discretes if one.names}
-        return [one for one in read_signals(solution.model, words) if one.name not in modes], ""
+        modes = {discrete.path for discrete in solution.model.flat_discretes if discrete.names}
+        return [signal for signal in read_signals(solution.model, words) if signal.name not in modes], ""
     units = _on_page(solution)
     signals = {unit: usual(solution, [unit], slips=True) for unit in units}
     left = [
-        f"{len(some) - _MOST} of {len(some)} {_plural(quantity(unit))} ({listed([one.name for one in some[_MOST:]])})"
+        f"{len(some) - _MOST} of {len(some)} {_plural(quantity(unit))} ({listed([s.name for s in some[_MOST:]])})"
         for unit, some in signals.items()
         if len(some) > _MOST
     ]
     left += _quantities_left(solution, units)
     note = f"Not drawn: {', '.join(left)}; --show draws them." if left else ""
-    return [one for some in signals.values() for one in some[:_MOST]], note
+    return [signal for some in signals.values() for signal in some[:_MOST]], note
 
 
 def _on_page(solution: Trajectories) -> tuple[str, ...]:
-    part_units = {str(one.unit) for one in _of_parts(solution)}
+    part_units = {str(part.unit) for part in _of_parts(solution)}
     return next((units for units in _ON_PAGES if part_units.intersection(units)), ())
 
 
@@ -181,8 +181,8 @@ def usual(solution: Trajectories, units: Sequence[str], *, slips: bool = False) 
     model, signals = solution.model, dict[bytes, str]()
     wanted = getattr(model, "settings", {}).get("display", {})
     for unit in units:
-        some = [one.path for one in _of_parts(solution) if str(one.unit) == unit]
-        signs = {one.name: one.driving for one in named(model, some)}
+        some = [part.path for part in _of_parts(solution) if str(part.unit) == unit]
+        signs = {signal.name: signal.driving for signal in named(model, some)}
         for path, values in solution.together(*some).items():
             if np.any(values) and (slips or unit != "m" or not path.endswith("_rel")):
                 scale = float(np.abs(values).max())
@@ -207,12 +207,16 @@ def quantity(unit: str) -> str:
 
 def _of_parts(solution: Trajectories) -> list[Any]:
     """Return the variables of parts without their connectors and inputs."""
-    return [one for one in solution.model.flat_variables if one.kind in ("local", "output") and not one.hidden]
+    return [
+        variable
+        for variable in solution.model.flat_variables
+        if variable.kind in ("local", "output") and not variable.hidden
+    ]
 
 
 def _quantities_left(solution: Trajectories, drawn: Sequence[str]) -> list[str]:
     """Count the variables of parts with a unit that is not drawn."""
-    units = [str(one.unit) for one in _of_parts(solution)]
+    units = [str(part.unit) for part in _of_parts(solution)]
     names = [QUANTITIES.get(unit, "signal") for unit in units if unit not in drawn]
     counts = {name: names.count(name) for name in names}
     return [f"{count} {name if count == 1 else _plural(name)}" for name, count in counts.items()]

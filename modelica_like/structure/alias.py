@@ -184,8 +184,8 @@ class _Elimination:
         if first in self.inputs and second in self.inputs:
             return False
         # As a derivative, an input would take the factor of the integral's name; only that of another input has none.
-        for one, other, times in ((first, second, 1.0 / ratio), (second, first, ratio)):
-            if one in self.inputs and other in self.integral:
+        for node, other, times in ((first, second, 1.0 / ratio), (second, first, ratio)):
+            if node in self.inputs and other in self.integral:
                 base = self._integral_root(other)
                 if base not in self.inputs or self._derivative(base)[1] * times != 1.0:
                     return False

@@ -140,21 +140,23 @@ def _domain(model: FlatModel, origins: Sequence[Origin]) -> tuple[Domain, list[s
     ends = {f"{path}.{name}" if path else name: (path, connector)
             for path, part in model.components.items() for name, connector in part.connectors.items()}  # fmt: skip
     named = {path for origin in origins for path in origin.path.split(" – ")}
-    connectors = [one for end, one in ends.items() if not named.isdisjoint((end, one[0]))]
+    connectors = [connector for end, connector in ends.items() if not named.isdisjoint((end, connector[0]))]
     if not connectors:
         return Domain(), []
     domains = {id(connector.domain): connector.domain for _, connector in connectors}.values()
     networks = [(domain, _network(model, ends, connectors, domain)) for domain in domains]
-    return next((one for one in networks if _has_no_reference(model, *one)), networks[0])
+    return next((network for network in networks if _has_no_reference(model, *network)), networks[0])
 
 
 def _network(
     model: FlatModel, ends: dict[str, tuple[str, Connector]], connectors: list[tuple[str, Connector]], domain: Domain
 ) -> list[str]:
     """Return the parts that the connections of a domain join with those found."""
-    sets = [origin.path.split(" – ") for one in model.linear if (origin := one.origin).kind == "connection"]
-    joined = [{ends[end][0] for end in one} for one in sets if one[0] in ends and ends[one[0]][1].domain is domain]
+    sets = [origin.path.split(" – ") for equation in model.linear if (origin := equation.origin).kind == "connection"]
+    joined = [
+        {ends[end][0] for end in nodes} for nodes in sets if nodes[0] in ends and ends[nodes[0]][1].domain is domain
+    ]
     network = {path for path, connector in connectors if connector.domain is domain}
-    while larger := [one for one in joined if not (one <= network or one.isdisjoint(network))]:
+    while larger := [nodes for nodes in joined if not (nodes <= network or nodes.isdisjoint(network))]:
         network = network.union(*larger)
     return [path for path in model.components if path in network]

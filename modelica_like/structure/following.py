@@ -183,7 +183,7 @@ def _vanishes(system: System, rows: list[int], dependent: list[int]) -> bool:
     points = nominal * spread(-np.pi, np.pi, (len(nominal), _SAMPLES))
     times = np.logspace(*_TIMES, _SAMPLES)[None]
     values = function.map(_SAMPLES)(points, *system.constants, times).full().T.reshape(_SAMPLES, len(rows), -1)
-    determinants = np.linalg.det(values[[bool(np.isfinite(one).all()) for one in values]])
+    determinants = np.linalg.det(values[[bool(np.isfinite(value).all()) for value in values]])
     sizes = np.abs(determinants)
     return bool(
         len(determinants) and (determinants.min() < 0 < determinants.max() or sizes.min() < _VANISHES * sizes.max())
@@ -238,7 +238,7 @@ def _follow(system: System, group: Group, numbers: Counter[str]) -> Following:
         chains.append(added)
         discretes += [FlatDiscrete(f"{name}.{of}", ONE, f"weight of {of} in {name}", float(weight), hidden=True)
                       for of, weight in zip(moved, row, strict=True)]  # fmt: skip
-    symbols = ca.vertcat(*(ca.SX.sym(one.path) for one in discretes))
+    symbols = ca.vertcat(*(ca.SX.sym(discrete.path) for discrete in discretes))
     system.model = replace(model, discretes=[*model.discretes, *discretes], d=ca.vertcat(model.d, symbols))
     weights = ca.reshape(symbols[1:], len(moved), -1)
     states = ca.vertcat(*(system.symbols[system.chains[chain][0]] for chain in chains))
@@ -272,8 +272,8 @@ def _first_weights(system: System, slopes: Any) -> Any:
 
 def prefer(system: System, groups: tuple[Group, ...], following: tuple[Following, ...]) -> None:
     """Prefer the states that follow, and no variable that a constraint determines."""
-    for one in following:
-        _set_preference(system, one.chains, _ALWAYS + 1)
+    for choice in following:
+        _set_preference(system, choice.chains, _ALWAYS + 1)
     for group in groups:
         _set_preference(system, [system.levels[level].chain for level in group.own], -1)
 

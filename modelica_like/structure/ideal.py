@@ -93,7 +93,7 @@ def complete(reduced: ReducedDae, ideals: list[IdealElement], rows: list[int]) -
         rows: positions in the residual of the equations in `alg`.
     """
     flat, size = reduced.flat, len(rows)
-    elements = tuple(replace(one, row=rows.index(one.row)) for one in ideals)
+    elements = tuple(replace(ideal, row=rows.index(ideal.row)) for ideal in ideals)
     network = IdealNetwork(elements, flat.d.numel(), HEAD + size)
     table = ca.SX.sym("ideal", network.width, len(elements))
     rates = ca.jtimes(reduced.alg, reduced.x, reduced.ode) + ca.jtimes(reduced.alg, flat.time, ca.SX(1))
@@ -103,11 +103,11 @@ def complete(reduced: ReducedDae, ideals: list[IdealElement], rows: list[int]) -
     reactions = [ca.if_else(flat.d[one.mode] == 0, pair[1], pair[0]) for one, pair in zip(elements, zeros, strict=True)]
     reacting = [one.row for one in elements]
     alg = ca.SX(reduced.alg)
-    for k, one in enumerate(elements):
+    for k, element in enumerate(elements):
         replaced, impulse, is_norm, weights = *ca.vertsplit(table[:HEAD, k]), table[HEAD:, k]
         # The sums one by one: reactions are lost in terms that are a million times as large.
         norm = ca.dot(weights[reacting], ca.vertcat(*reactions)) - _CONDUCTANCE * ca.dot(weights, missed)
         equation = ca.if_else(is_norm, norm, ca.dot(weights, rates) + impulse)
-        alg[one.row] = ca.if_else(replaced, equation, alg[one.row])
+        alg[element.row] = ca.if_else(replaced, equation, alg[element.row])
     flat = replace(flat, d=ca.vertcat(flat.d, ca.vec(table)))
     return replace(reduced, flat=flat, alg=alg, ideal=network)

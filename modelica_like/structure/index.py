@@ -70,8 +70,8 @@ class Pantelides:
             if complete:
                 return
             above = {level: self.system.add_level(self.system.levels[level].chain) for level in levels}
-            for one in equations:
-                self._differentiate(one)
+            for row in equations:
+                self._differentiate(row)
             for level in levels:
                 self._assign(above[level], self._derived[self._equation_of[level]])
             equation = self._derived[equation]

@@ -128,9 +128,9 @@ class ReducedDae:
         text = f"{count} constraint{'s' if count > 1 else ''} differentiated; states kept: {', '.join(self.states)}."
         index = f"Index {self.index}: {named} motions. {text}"
         return index, *(
-            f"No fixed choice of states fits {one.told} everywhere: {self.flat.discretes[one.mode].path} makes it anew "
-            "at events."
-            for one in self.choices
+            f"No fixed choice of states fits {choice.told} everywhere: {self.flat.discretes[choice.mode].path} makes "
+            "it anew at events."
+            for choice in self.choices
         )
 
 
@@ -152,7 +152,7 @@ def reduce(flat: FlatModel) -> ReducedDae:
     derivatives = {system.derivative(state) for state in states}
     rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
     ideals = find_ideals(flat)
-    kept = [one.row for one in ideals]
+    kept = [ideal.row for ideal in ideals]
     solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
@@ -162,11 +162,11 @@ def reduce(flat: FlatModel) -> ReducedDae:
     if changed is not residual:
         residual = changed
         solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
-    degrees = len(counts) - sum(len(one.chains) for one in chosen.following)
+    degrees = len(counts) - sum(len(choice.chains) for choice in chosen.following)
     reduced = _assemble(system, counts[:degrees], states, unknowns, origins, solved)
-    held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
+    held = tuple(replace(hold, state=reduced.node_states[hold.motion]) for hold in holds)
     ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
-    choices = tuple(write_choice(one, system, states, reduced.level_values) for one in chosen.following)
+    choices = tuple(write_choice(choice, system, states, reduced.level_values) for choice in chosen.following)
     reduced = replace(reduced, ode=ode, holds=held, circuits=tuple(circuits), choices=choices)
     return complete(reduced, ideals, solved.rows) if ideals else reduced
 
@@ -301,11 +301,15 @@ def _assemble(
         nominals=tuple(levels[s].nominal for s in states),
         z_guesses=tuple(levels[n].guess for n in z_levels),
         blocks=tuple(solved.blocks),
-        determinants=tuple((*blocks[number], one) for number, one in zip(numbers, determinants, strict=True)),
+        determinants=tuple(
+            (*blocks[number], determinant) for number, determinant in zip(numbers, determinants, strict=True)
+        ),
         index=max(counts, default=0) + 1,
         differentiated=tuple(system.origins[k] for k, count in enumerate(counts) if count),
         system=system,
-        implicit_blocks=tuple(pair for pair, one in zip(blocks, solved.blocks, strict=True) if one.kind == "implicit"),
+        implicit_blocks=tuple(
+            pair for pair, block in zip(blocks, solved.blocks, strict=True) if block.kind == "implicit"
+        ),
         level_values=level_values,
         explicit=tuple((unknowns[k], expression) for k, expression in solved.order),
     )

@@ -42,7 +42,10 @@ def select_states(
         choices = [_independent(rows, some, slopes) for some in ([c for c in ranked if c in candidates], ranked)]
         chosen = min(
             choices,
-            key=lambda one: (-len(one), sum(system.levels[system.chains[c][-1 - stage]].preference for c in one)),
+            key=lambda choice: (
+                -len(choice),
+                sum(system.levels[system.chains[c][-1 - stage]].preference for c in choice),
+            ),
         )
         if len(chosen) < len(rows):
             equations = [e for e in rows if e not in chosen.values()]
@@ -78,7 +81,7 @@ def _ranked(
 
     def rank(chain: int) -> tuple[float, ...]:
         base, level = (system.levels[system.chains[chain][k]] for k in (0, -1 - stage))
-        wanted, relative = (one.preference >= PREFERRED for one in (level, base))
+        wanted, relative = (number.preference >= PREFERRED for number in (level, base))
         length = shortest.get(chain, 0) if wanted or relative else _ABSOLUTE
         return level.preference, system.chains[chain][0] in read if wanted else level.own, length, -chain
 

@@ -79,10 +79,10 @@ class System:
     def constants(self) -> tuple[list[float], Any]:
         """Values of parameters, and of modes and discrete values at the start; those that are no numbers are zero."""
         starts = np.zeros(self.model.d.numel())
-        for k, one in enumerate(self.model.discretes):
-            if isinstance(one.start, int | float):
-                starts[k] = one.start
-        return [one.value for one in self.model.parameters], starts
+        for k, discrete in enumerate(self.model.discretes):
+            if isinstance(discrete.start, int | float):
+                starts[k] = discrete.start
+        return [parameter.value for parameter in self.model.parameters], starts
 
     def generic(self, expressions: Any) -> ca.DM:
         """Return numbers at a point that is not special; parameters have their values, modes their starts."""
@@ -103,9 +103,9 @@ class System:
 
     def derivative(self, level: int) -> int | None:
         """Return the next level of the chain, if there is one."""
-        one = self.levels[level]
-        chain = self.chains[one.chain]
-        return chain[one.order + 1] if one.order + 1 < len(chain) else None
+        entry = self.levels[level]
+        chain = self.chains[entry.chain]
+        return chain[entry.order + 1] if entry.order + 1 < len(chain) else None
 
 
 def build_system(model: FlatModel, aliases: Aliases) -> System:
@@ -159,10 +159,10 @@ def _ranked(model: FlatModel, node_level: list[tuple[int, float] | None]) -> dic
         if placed is not None:
             level, factor = placed
             variable, order = model.nodes[node]
-            one = model.variables[variable]
-            connected, preference = one.kind in ("potential", "flow"), PREFERENCES.index(one.state)
-            rank = (order, connected, factor != 1.0, -preference, one.path.count("."))
-            nodes_of.setdefault(level, []).append((rank, node, one, factor))
+            variable_of = model.variables[variable]
+            connected, preference = variable_of.kind in ("potential", "flow"), PREFERENCES.index(variable_of.state)
+            rank = (order, connected, factor != 1.0, -preference, variable_of.path.count("."))
+            nodes_of.setdefault(level, []).append((rank, node, variable_of, factor))
     return {level: sorted(nodes) for level, nodes in nodes_of.items()}
 
 
@@ -172,10 +172,10 @@ def _levels(model: FlatModel, chains: list[list[int]], ranked: dict[int, list[_N
         (_, connected, *_), *_ = ranked[numbers[0]][0]
         for order, number in enumerate(numbers):
             (_, node, named, _), *_ = nodes = ranked[number]
-            base = [(one, factor) for rank, _, one, factor in nodes if rank[0] == 0]
-            preference = max((PREFERENCES.index(one.state) for one, _ in base), default=0)
+            base = [(variable, factor) for rank, _, variable, factor in nodes if rank[0] == 0]
+            preference = max((PREFERENCES.index(variable.state) for variable, _ in base), default=0)
             # The name says nothing about the guess: any of them that has one knows more than zero.
-            guess = next((one.guess / factor for one, factor in base if one.guess), 0.0)
+            guess = next((variable.guess / factor for variable, factor in base if variable.guess), 0.0)
             levels.append(Level(chain, order, model.node_name(node), preference, named.nominal, guess, not connected))
     return levels
 
@@ -192,7 +192,7 @@ def _node_values(aliases: Aliases, node_level: list[tuple[int, float] | None], s
 def _collect_residuals(system: System, aliases: Aliases) -> None:
     model = system.model
     columns = evaluate(model, "residual", system.node_values)
-    *starts, count = accumulate((one.numel() for one in columns.values()), initial=0)
+    *starts, count = accumulate((column.numel() for column in columns.values()), initial=0)
     first = dict(zip(columns, starts, strict=True))
     sums: list[Any] = []
     # Positions in all columns, then the sums; together this is cheaper than one by one.

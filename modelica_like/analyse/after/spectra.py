@@ -198,5 +198,7 @@ def duty(run: Trajectories, torque: str, speed: str, gear: str = "", classes: in
 
 
 def _gears(run: Trajectories, gear: str, values: Vector) -> tuple[str, ...]:
-    names = {one.path: one.names for one in run.model.flat_discretes}.get(run.path(gear), ()) if gear else ()
+    names = (
+        {discrete.path: discrete.names for discrete in run.model.flat_discretes}.get(run.path(gear), ()) if gear else ()
+    )
     return tuple(names[int(value)] if names else f"gear {value:g}" if gear else "all" for value in values)

@@ -132,10 +132,10 @@ def calibrate(
     measured = [data] if isinstance(data, Measurement | str | Path) else list(data)
     if not measured or not parameters:
         raise ValueOutOfRange("A calibration needs data and at least one parameter.")
-    for one in measured:
-        if not isinstance(one, Measurement):
+    for fit in measured:
+        if not isinstance(fit, Measurement):
             raise ValueOutOfRange(
-                f"{one!r} is no measurement.",
+                f"{fit!r} is no measurement.",
                 advice='Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the '
                 "uncertainties.",
             )
@@ -154,7 +154,7 @@ def calibrate(
             advice="Give a guess for which the model can be solved, or narrower bounds.",
         )  # fmt: skip
     best = min(results, key=lambda one: one.cost)
-    return problem.result(best, tuple(2 * one.cost for one in results))
+    return problem.result(best, tuple(2 * result.cost for result in results))
 
 
 class _Problem:
@@ -200,7 +200,9 @@ class _Problem:
         key = q.tobytes()
         if self._at is None or self._at[0] != key:
             model = self.at(q)
-            residuals, slopes, labels = zip(*(one.residuals(model, self.names) for one in self.data), strict=True)
+            residuals, slopes, labels = zip(
+                *(measured.residuals(model, self.names) for measured in self.data), strict=True
+            )
             self.labels = tuple(chain(*labels))
             self._at = key, np.concatenate(residuals), np.concatenate(slopes) * self.span
         return self._at[1], self._at[2]

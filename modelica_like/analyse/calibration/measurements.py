@@ -56,10 +56,12 @@ class Numbers(Measurement):
         outputs = [read_output(model, name) for name in self.values]
         wanted = np.array([to_si(v, o.unit, o.name) for v, o in zip(self.values.values(), outputs, strict=True)])
         pairs = zip(outputs, wanted, strict=True)
-        sizes = np.array([_uncertainty(self.uncertainty, one.name, one.unit, value) for one, value in pairs])
+        sizes = np.array(
+            [_uncertainty(self.uncertainty, quantity.name, quantity.unit, value) for quantity, value in pairs]
+        )
         run = quick_run(model, until=self.until, parameters=self.parameters, readings=[*self.values])
         sensitivity = sensitivities(run, list(self.values), names)
-        now = np.array([one.value for one in sensitivity.outputs])
+        now = np.array([output.value for output in sensitivity.outputs])
         return (now - wanted) / sizes, sensitivity.derivatives / sizes[:, None], list(self.values)
 
 
@@ -121,7 +123,7 @@ class Trajectories(Measurement):
         wanted = [f"at({name}, {float(t)!r})" for name in columns for t in times]
         sensitivity = sensitivities(run, wanted, names, method="forward")
         scale = np.repeat(sizes, len(times))
-        deviations = np.array([one.value for one in sensitivity.outputs]) - np.concatenate(list(columns.values()))
+        deviations = np.array([output.value for output in sensitivity.outputs]) - np.concatenate(list(columns.values()))
         shown, unit = table["time"]
         labels = [f"{name} at {t:g} {unit or 's'}" for name in columns for t in shown]
         return deviations / scale, sensitivity.derivatives / scale[:, None], labels

@@ -103,9 +103,11 @@ class Campbell:
                 place = 0.97 * min(rpm[-1], 60 * top / order)
                 at = {"xytext": (-4, 2), "textcoords": "offset points", "fontsize": 8, "ha": "right"}
                 axes.annotate(f"{order:g}\u00d7", (place, order * place / 60), **at)
-            for one in met:
-                axes.plot(one.speed * _RPM, one.frequency, "o", color="#000000", markersize=4)
-                axes.vlines(one.speed * _RPM, one.frequency, top, color="#999999", linewidth=0.7, linestyle=":")
+            for crossing in met:
+                axes.plot(crossing.speed * _RPM, crossing.frequency, "o", color="#000000", markersize=4)
+                axes.vlines(
+                    crossing.speed * _RPM, crossing.frequency, top, color="#999999", linewidth=0.7, linestyle=":"
+                )
             axes.set(xlabel=f"{self.speed} in rpm", ylabel="frequency in Hz", ylim=(0, top), xlim=(rpm[0], rpm[-1]))
             axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title="modes", title_fontsize=8)
             numbered(axes, [(one.speed * _RPM - rpm[0]) / (rpm[-1] - rpm[0]) for one in met], width - 1.0 - legend)
@@ -114,7 +116,7 @@ class Campbell:
     def __str__(self) -> str:
         over = f"{self.speed} = {self.speeds[0] * _RPM:.4g} … {self.speeds[-1] * _RPM:.4g} rpm"
         head = f"Campbell diagram of {self.name}: {len(self.eigenvalues)} modes, {over}"
-        return "\n".join([head, *(f"  {one}" for one in self.crossings())])
+        return "\n".join([head, *(f"  {crossing}" for crossing in self.crossings())])
 
 
 def campbell(
@@ -149,7 +151,7 @@ def campbell(
     curves = [ahead[0][np.argsort(ahead[0].imag, kind="stable")]]
     for values in ahead[1:]:
         curves.append(_nearest(curves[-1], values))
-    name_of = {one.eigenvalue: mode_name(one) for one in linear[order[0]].modes() if one.oscillates}
+    name_of = {mode.eigenvalue: mode_name(mode) for mode in linear[order[0]].modes() if mode.oscillates}
     names = tuple(name_of[min(name_of, key=lambda value, mode=mode: abs(value - mode))] for mode in curves[0])
     return Campbell(model.name, speed, speeds[order], np.array(curves).T, tuple(map(float, orders)), names)
 

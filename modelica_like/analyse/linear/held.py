@@ -69,13 +69,13 @@ def _held_speeds(model: CompiledDae, point: Point) -> Iterator[Vector]:
     if not held:
         return
     free = point.copy()
-    for one in held:
-        free.d[one.mode] = free.d[one.mode] if one.loose < 0 else one.loose
+    for hold in held:
+        free.d[hold.mode] = free.d[hold.mode] if hold.loose < 0 else hold.loose
     share(model, free)
     rates = _rate_slopes(model, point), _rate_slopes(model, free)
     for slope in variable_slopes(model, point, [one.motion for one in held]):
         # A creep speed follows its torque: its rate depends on something; compare it with the rate of a free motion.
-        present, let_go = (np.abs(slope @ one).max() for one in rates)
+        present, let_go = (np.abs(slope @ rate).max() for rate in rates)
         if np.any(slope) and not present > _ZERO * let_go:
             yield slope / np.linalg.norm(slope)
 

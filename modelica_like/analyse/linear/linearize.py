@@ -82,7 +82,7 @@ def linearize(
     model, point = point_of(drive, at)
     model.refuse_delays(LanguageError, f"{model.name} cannot be linearized")
     u_names = tuple(model.flat_variables[k].path for k in model.inputs) if inputs is None else tuple(inputs)
-    top = (one.path for one in model.flat_variables if one.kind == "output" and "." not in one.path)
+    top = (variable.path for variable in model.flat_variables if variable.kind == "output" and "." not in variable.path)
     # A state such as der(spring.phi_rel) is the rate of a variable, and no variable itself.
     states = tuple(name for name in model.states if name in model.position)
     y_names = (tuple(top) or states) if outputs is None else tuple(outputs)

@@ -67,9 +67,9 @@ class Loop(LinearModel):
             return complex(self.response(frequency)[0, 0, 0])
 
         real = _crossings(f, gains.imag, lambda g: at(g).imag)
-        turned = [(one, 1 / abs(at(one))) for one in real if at(one).real < 0]
+        turned = [(phase, 1 / abs(at(phase))) for phase in real if at(phase).real < 0]
         unity = _crossings(f, np.abs(gains) - 1, lambda g: abs(at(g)) - 1)
-        phases = [(one, (np.degrees(np.angle(at(one))) + 360) % 360 - 180) for one in unity]
+        phases = [(gain, (np.degrees(np.angle(at(gain))) + 360) % 360 - 180) for gain in unity]
         k = int(np.argmin(np.abs(1 + gains)))
         closed = self.A - self.B @ self.C / (1 + self.D)
         values = np.linalg.eigvals(closed) if len(closed) else np.zeros(0)
@@ -107,7 +107,9 @@ def open_loop(drive: Component | str | Path, signal: str, at: At = None) -> Loop
         raise LanguageError("A compiled drive has no loop to open.", advice="Give the component or the netlist.")
     flat = flatten(drive if isinstance(drive, Component) else load(drive), disturbed=signal)
     added = flat.inputs[-1]
-    sends = any(flat.variables[one.terms[0][0]].path == signal for one in flat.linear if added in dict(one.terms))
+    sends = any(
+        flat.variables[equation.terms[0][0]].path == signal for equation in flat.linear if added in dict(equation.terms)
+    )
     name = flat.variables[added].path
     closed = linearize(compile(reduce(flat)), at, inputs=[name], outputs=[signal])
     # What arrives at an input is what comes back, and what is added.

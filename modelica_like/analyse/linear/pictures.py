@@ -60,11 +60,11 @@ def bode(linear: LinearModel, f: Any = None) -> Figure:
         from matplotlib.ticker import MultipleLocator
 
         low, high = phase.get_ylim()
-        step = next((one for one in (45, 90, 180, 360) if (high - low) / one <= 6), 720)
+        step = next((degrees for degrees in (45, 90, 180, 360) if (high - low) / degrees <= 6), 720)
         phase.yaxis.set_major_locator(MultipleLocator(step))
         for axes in (size, phase):
-            for one in modes:
-                axes.axvline(one.frequency, color="#999999", linewidth=0.7, linestyle=":", zorder=0.5)
+            for mode in modes:
+                axes.axvline(mode.frequency, color="#999999", linewidth=0.7, linestyle=":", zorder=0.5)
         numbered(
             size, [float(np.log(one.frequency / f[0]) / np.log(f[-1] / f[0])) for one in modes], width - 1.2 - labels
         )

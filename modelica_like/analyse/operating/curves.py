@@ -35,10 +35,10 @@ class Curves(Shown):
     def __getitem__(self, path: str) -> Any:
         """Return a column, shape (points,); `efficiency` and `loss` are those of the drive, in 1 and W."""
         if path == "efficiency":
-            return np.array([one.efficiency for one in self.points])
+            return np.array([point.efficiency for point in self.points])
         if path == "loss":
-            return np.array([sum(one.losses.values()) for one in self.points])
-        return np.array([one[path] for one in self.points])
+            return np.array([sum(point.losses.values()) for point in self.points])
+        return np.array([point[path] for point in self.points])
 
     def plot(self, *paths: str, over: str = "", display: Mapping[str, str] | None = None) -> Figure:
         """Draw columns, one panel each.

@@ -68,8 +68,8 @@ class OperatingPoint(Shown, Mapping[str, float]):
         A load that turns its power into heat, such as a brake, takes nothing away.
         """
         sources = [source for source, _ in self.powers.values()]
-        brought = sum(one for one in sources if one > 0)
-        return -sum(one for one in sources if one < 0) / brought if brought else float("nan")
+        brought = sum(source for source in sources if source > 0)
+        return -sum(source for source in sources if source < 0) / brought if brought else float("nan")
 
     @property
     def stuck(self) -> tuple[str, ...]:

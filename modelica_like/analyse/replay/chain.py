@@ -177,7 +177,7 @@ class Replay:
         size = Sizes.of(self.model)
         whole = np.zeros((size.x + size.theta, len(readings)))
         none = np.zeros(self.functions.nq)
-        Q = np.array([one.quadratures if one.quadratures.size else none for one in readings]).T
+        Q = np.array([reading.quadratures if reading.quadratures.size else none for reading in readings]).T
         at_node = _by_node(readings)
         for k in range(len(self.nodes) - 1, -1, -1):
             if k < len(self.moves):
@@ -291,7 +291,7 @@ class _Maker:
             whole = np.concatenate([start_x, np.eye(size.fixed), start_d])
             start_x, start_d, point = jump.x @ whole, jump.d @ whole, jump.after
         self.chain.start_x, self.chain.start_d = start_x, start_d
-        self.chain.chances += [replace(one, by=np.pad(one.by @ whole, (size.x, size.d))) for one in chances]
+        self.chain.chances += [replace(chance, by=np.pad(chance.by @ whole, (size.x, size.d))) for chance in chances]
         self.chain.nodes.append(point)
 
     def jump(self, number: int) -> None:

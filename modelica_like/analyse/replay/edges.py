@@ -58,12 +58,12 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
         chain: the run.
         readings: the requested ones, which may depend on the times of jumps.
     """
-    timed = {id(node) for one in readings for node, _ in one.parts}
-    chances = [(chain.nodes[0], one) for one in chain.chances]
+    timed = {id(node) for reading in readings for node, _ in reading.parts}
+    chances = [(chain.nodes[0], chance) for chance in chain.chances]
     for _, jump in chain.jumps:
         apart = jump.when.apart if jump.matters or id(jump.before) in timed else ()
-        chances += [(jump.before, one) for one in (*apart, *jump.chances)]
-    result = [Edge(Reading(0.0, ((node, one.by),)), one.size, one.reason) for node, one in chances]
+        chances += [(jump.before, chance) for chance in (*apart, *jump.chances)]
+    result = [Edge(Reading(0.0, ((node, chance.by),)), chance.size, chance.reason) for node, chance in chances]
     return result + _ties(_Later(chain, readings))
 
 
@@ -98,12 +98,12 @@ def _ties(later: _Later) -> list[Edge]:
         if isinstance(move := chain.moves[last] if last < len(chain.moves) else None, Jump):
             # A guard that fires at the end of the segment was approaching zero.
             fired = [model.transitions[one.transition] for one in move.events if one.transition >= 0 and not one.round]
-            still[[guards.positions[id(one)] for one in fired if not one.timed]] = False
+            still[[guards.positions[id(transition)] for transition in fired if not transition.timed]] = False
         if chain.nodes[last].t > chain.nodes[first].t:
             segments.append((first, last, still))
         first = last + 1
     for k, event in enumerate(guards.state_events):
-        for still, group in groupby(segments, lambda one, k=k: bool(one[2][k])):
+        for still, group in groupby(segments, lambda tie, k=k: bool(tie[2][k])):
             if still and (those := list(group)):
                 result.append(_tie(later, event, those[0][0], those[-1][1]))
     # A guard that fires exactly at the end of the run fires on one side only.
@@ -112,25 +112,26 @@ def _ties(later: _Later) -> list[Edge]:
     return result + [_tie(later, guards.state_events[k], last, last) for k in np.flatnonzero(fires)]
 
 
-def _tie(later: _Later, one: CompiledTransition, first: int, last: int) -> Edge:
+def _tie(later: _Later, transition: CompiledTransition, first: int, last: int) -> Edge:
     chain, model, point = later.chain, later.chain.model, later.chain.nodes[last]
-    mode = model.flat_discretes[one.mode]
-    part = slopes(model, point, "guards", [one.index])
+    mode = model.flat_discretes[transition.mode]
+    part = slopes(model, point, "guards", [transition.index])
     x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.nominals
     terms = np.abs(part.by[0]) @ np.abs(np.concatenate([x, model.p, model.u, point.d]))
     # The slope of an acceleration that the others hold at zero is nothing but rounding, and so are its terms.
     begins = [chain.nodes[0], *(jump.after for _, jump in chain.jumps)]
-    largest = max(abs(float(call(model, model.guards, node)[one.index])) for node in begins)
+    largest = max(abs(float(call(model, model.guards, node)[transition.index])) for node in begins)
     error = NoGradient(
-        f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays {mode.names[int(point.d[one.mode])]} "
-        f"exactly at the limit where it becomes {mode.names[one.target]}.",
-        where=one.source,
+        f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays "
+        f"{mode.names[int(point.d[transition.mode])]} exactly at the limit where it becomes "
+        f"{mode.names[transition.target]}.",
+        where=transition.source,
         why="A small change of a parameter decides whether it changes, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",
     )
     return Edge(
         Reading(float(part.value[0]), ((point, part.by[0]),)), _ROUNDING * max(float(terms), largest), error,
-        lambda: _felt(later, first, last, one.mode),
+        lambda: _felt(later, first, last, transition.mode),
     )  # fmt: skip
 
 
@@ -147,7 +148,7 @@ def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
     for hold, begin in product(held, dict.fromkeys((last, first))):
         change = _sliding(model, chain.nodes[begin], hold)
         nominals = model.nominals * np.max(np.abs(change) / model.nominals)
-        sizes = [sum(float(np.abs(row[: size.x]) @ nominals) for _, row in one.parts) for one in readings]
+        sizes = [sum(float(np.abs(row[: size.x]) @ nominals) for _, row in reading.parts) for reading in readings]
         read, whole = chain.carried(readings, np.pad(change, (0, size.theta))[:, None], begin, until)
         if until > last and hold in holding(model, chain.nodes[until]):
             stop = slopes(model, chain.nodes[until], f"impact {[hold]}", None, lambda hold=hold: impact(model, [hold]))

@@ -32,12 +32,12 @@ def impact(model: CompiledDae, struck: Sequence[int]) -> ca.Function:
     given = model.arguments
     arguments = list(given.values())
     holds = [model.holds[k] for k in struck]
-    motions = model.variables(*arguments)[[one.motion for one in holds]]
+    motions = model.variables(*arguments)[[hold.motion for hold in holds]]
     restitution = ca.reshape(model.hold_terms(*arguments), TERMS, -1)[_RESTITUTION, list(struck)].T
-    approaches = given["d"][[one.approach for one in holds]]
+    approaches = given["d"][[hold.approach for hold in holds]]
     by = [ca.jtimes(f(*arguments), approaches, -(1 + restitution) * motions) for f in (model.ode, model.alg)]
     by += [ca.jacobian(f(*arguments), given["z"]) for f in (model.ode, model.alg)]
-    parts = ca.Function("response", arguments, [ca.densify(one) for one in by])
+    parts = ca.Function("response", arguments, [ca.densify(slope) for slope in by])
     symbols = parts.mx_in()
     change, residual, ode_z, alg_z = parts(*symbols)
     if model.implicit:

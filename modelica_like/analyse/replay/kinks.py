@@ -35,7 +35,7 @@ class Kinks:
         self.model = model
         self._function: ca.Function = model.once("kinks", lambda: _switches(model))
         self.count = int(self._function.size1_out(0))
-        self._along = [(one.times, self._over(one)) for one in segments if self.count]
+        self._along = [(segment.times, self._over(segment)) for segment in segments if self.count]
         largest = [np.abs(values).max(axis=1) for _, values in self._along]
         self._zero = np.maximum(_AT_IT * np.max(largest, axis=0), _NOISE) if largest else np.full(self.count, _NOISE)
 
@@ -63,7 +63,7 @@ class Kinks:
     def _over(self, segment: Segment) -> Vector:
         """Values at the results of a segment, shape (count, n)."""
         model, times = self.model, segment.times
-        fixed = (np.repeat(one[:, None], len(times), axis=1) for one in (model.p, model.u, segment.d))
+        fixed = (np.repeat(values[:, None], len(times), axis=1) for values in (model.p, model.u, segment.d))
         return np.asarray(self._function(times[None, :], segment.x, segment.z, *fixed).full())
 
 

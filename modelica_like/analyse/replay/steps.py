@@ -84,19 +84,21 @@ class StepFunctions:
     @cached_property
     def _symbols(self) -> list[Any]:
         """The same as SX."""
-        return [ca.SX.sym(name, one.shape[0]) for name, one in zip("thxWpud", self._names, strict=True)]
+        return [ca.SX.sym(name, symbol.shape[0]) for name, symbol in zip("thxWpud", self._names, strict=True)]
 
     def _at_stages(self, function: ca.Function) -> list[Any]:
         """Results of a function at all stages, one list for each."""
         (t, h, _, W, p, u, d), size = self._symbols, self.nx + self.nz
         begins = zip(self.tableau.nodes, range(0, self.size, size), strict=True)
         given = ([t + c * h, W[k : k + self.nx], W[k + self.nx : k + size], p, u, d] for c, k in begins)
-        return list(zip(*(function.call(one) for one in given), strict=True))
+        return list(zip(*(function.call(value) for value in given), strict=True))
 
     def _weighted(self, weights: Vector, values: Sequence[Any]) -> Any:
         """Sum over the stages, times the length of the step."""
         h = self._symbols[1]
-        return sum((h * w * one for w, one in zip(weights[1:], values[1:], strict=True)), h * weights[0] * values[0])
+        return sum(
+            (h * w * value for w, value in zip(weights[1:], values[1:], strict=True)), h * weights[0] * values[0]
+        )
 
     @cached_property
     def _of_states(self) -> ca.DM:
@@ -125,14 +127,14 @@ class StepFunctions:
         """Jacobians of the residual by (p, u, d); of the quadratures by W and by (p, u, d)."""
         by_theta, q_w, q_theta = self._at_stages(self._parameters)
         h, weights = self._symbols[1], self.tableau.weights
-        by_w = ca.horzcat(*(h * b * one for b, one in zip(weights, q_w, strict=True)))
+        by_w = ca.horzcat(*(h * b * quadrature for b, quadrature in zip(weights, q_w, strict=True)))
         outputs = [self._collocated(ca.vertcat(*by_theta)), by_w, self._weighted(weights, q_theta)]
         return ca.Function("sources", self._symbols, outputs)
 
     @cached_property
     def _ending(self) -> ca.Function:
         """Weighted rates of the error estimate, and quadratures."""
-        rates, powers = (self._at_stages(one)[0] for one in (self._equations, self._integrands))
+        rates, powers = (self._at_stages(function)[0] for function in (self._equations, self._integrands))
         outputs = [
             self._weighted(self.tableau.estimate, rates)[: self.nx],
             self._weighted(self.tableau.weights, powers),
@@ -247,7 +249,8 @@ class StepFunctions:
         slopes = self._equations(t, x, z, p, u, d)[1]
         rate = ca.mtimes(of_x, slopes)
         shifted = [
-            ca.kron(ca.SX.eye(len(one)), of_x + slopes - rate) - h * ca.kron(ca.SX(ca.DM(one)), rate) for one in blocks
+            ca.kron(ca.SX.eye(len(block)), of_x + slopes - rate) - h * ca.kron(ca.SX(ca.DM(block)), rate)
+            for block in blocks
         ]
         return ca.Function(name, [t, h, x, z, p, u, d], shifted)
 
@@ -304,7 +307,7 @@ class StepFunctions:
         seed = ca.vertcat(ca.MX(before, columns), L, ca.MX(self.nz, columns)) + ca.mtimes(q_w.T, Q)
         multiplier = self._solve_stages(seed, transposed=True)
         stages = ca.vertsplit(multiplier, self.nx + self.nz)
-        begin = sum((one[: self.nx, :] for one in stages[1:]), stages[0][: self.nx, :])
+        begin = sum((stage[: self.nx, :] for stage in stages[1:]), stages[0][: self.nx, :])
         gradient = ca.mtimes(q_theta.T, Q) - ca.mtimes(by_theta.T, multiplier)
         return ca.Function("adjoint", [*self._names, L, Q], [ca.densify(begin), ca.densify(gradient)])
 

@@ -71,8 +71,10 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
     for event in events:
         if event.round or event.transition < 0:
             continue
-        one = model.transitions[event.transition]
-        trigger = _moment(model, before, one) if one.timed else _crossing(model, before, one, begin)
+        transition = model.transitions[event.transition]
+        trigger = (
+            _moment(model, before, transition) if transition.timed else _crossing(model, before, transition, begin)
+        )
         if trigger is None:
             return When(None, NoGradient(
                 f"No gradient at t = {event.time:.9g} s: {event.mode} changes from {event.before} to {event.after} "
@@ -106,13 +108,13 @@ def _give_way_together(
     """
     for circuit in model.circuits:
         modes = {model.holds[k].mode for k in circuit.members if before.d[model.holds[k].mode] == model.holds[k].number}
-        fired = [model.transitions[one.transition] for one, _ in triggers]
-        those = [k for k, one in enumerate(fired) if not one.timed and one.mode in modes]
+        fired = [model.transitions[event.transition] for event, _ in triggers]
+        those = [k for k, transition in enumerate(fired) if not transition.timed and transition.mode in modes]
         shared = circuit.shares(before.d).any(axis=1)
         if len(those) < 2 or not shared.any():
             continue
         part = slopes(model, before, "guards", [fired[k].index for k in those])
-        by_split = np.array([circuit.shares(one)[shared].ravel() for one in part.theta[:, -len(before.d) :]])
+        by_split = np.array([circuit.shares(column)[shared].ravel() for column in part.theta[:, -len(before.d) :]])
         left, sizes, _ = np.linalg.svd(by_split)
         weights, rank = left[:, -1], int(np.sum(sizes > SAME * sizes.max(initial=0.0)))
         if rank != len(those) - 1 or not (np.all(weights > 0.0) or np.all(weights < 0.0)):
@@ -139,9 +141,11 @@ def either_first(model: CompiledDae, before: Point, events: tuple[Event, ...], a
     What the later one does in between is undone by what it then holds. The one that comes first must hold alone, and
     the other one must still come.
     """
-    pair = [model.transitions[one.transition] for one in events if not one.round and one.transition >= 0]
+    pair = [model.transitions[event.transition] for event in events if not event.round and event.transition >= 0]
     held = {(model.holds[k].mode, model.holds[k].number) for k in holding(model, after)}
-    if len(pair) != 2 or any(one.timed or (one.mode, one.target) not in held for one in pair):
+    if len(pair) != 2 or any(
+        transition.timed or (transition.mode, transition.target) not in held for transition in pair
+    ):
         return False
     for first, second in (pair, pair[::-1]):
         alone = before.copy()
@@ -149,7 +153,7 @@ def either_first(model: CompiledDae, before: Point, events: tuple[Event, ...], a
         share(model, alone)
         solve_implicit(model, alone)
         rates = [float(slopes(model, at, "guards", [second.index]).rate[0]) for at in (before, alone)]
-        leaves = any(one.mode == first.mode for one in Guards(model).wanting(alone))
+        leaves = any(transition.mode == first.mode for transition in Guards(model).wanting(alone))
         if leaves or not rates[1] > _GRAZING * rates[0]:
             return False
     return True
@@ -171,11 +175,11 @@ def _crossing(model: CompiledDae, before: Point, transition: CompiledTransition,
     return Trigger(-float(part.value[0]) / rate, -part.by[0] / rate)
 
 
-def _together(one: Event, other: Event) -> NoGradient:
+def _together(event: Event, other: Event) -> NoGradient:
     return NoGradient(
-        f"No gradient at t = {one.time:.9g} s: '{one.mode}: {one.before} → {one.after}' and "
+        f"No gradient at t = {event.time:.9g} s: '{event.mode}: {event.before} → {event.after}' and "
         f"'{other.mode}: {other.before} → {other.after}' happen at the same instant but for different reasons.",
-        where=[one.source, other.source],
+        where=[event.source, other.source],
         why="A small change of a parameter decides which comes first, so the derivatives on both sides differ.",
         advice="Choose parameter values that separate the two events.",
     )

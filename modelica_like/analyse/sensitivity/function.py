@@ -93,7 +93,7 @@ class SimulationFunction(_Callback):
         self._tight = {"until": end, "rtol": rtol, "atol": min(chosen.atol, rtol / 100)}
         solution = quick_run(self._model, **{**self._run, **self._tight}, readings=outputs)
         first = self._differentiate(solution)
-        self.start_values = np.array([one.value for one in first.parameters])
+        self.start_values = np.array([parameter.value for parameter in first.parameters])
         self._sequence = None if any_sequence else mode_sequence(solution.events)
         self._jacobian = _Jacobian(self)
         dense = ca.Sparsity.dense
@@ -208,7 +208,7 @@ class _Second(_Callback):
         derivatives = np.full((self._size[0] * self._size[1], self._size[1]), np.nan)
         for k, step in enumerate(_CHANGE * np.where(p == 0, 1.0, np.abs(p))):
             moved = (p + sign * step * (np.arange(len(p)) == k) for sign in (1, -1))
-            sides = [self._simulation.attempt(self._simulation.at, one) for one in moved]
+            sides = [self._simulation.attempt(self._simulation.at, result) for result in moved]
             if None not in sides:
                 above, below = (side.derivatives for side in sides if side is not None)
                 derivatives[:, k] = ((above - below) / (2 * step)).ravel("F")
@@ -262,14 +262,14 @@ def mode_sequence(events: Sequence[Event]) -> list[tuple[str, str, str]]:
         if not groups or event.time - groups[-1][0].time > _TOGETHER * max(1.0, abs(event.time)):
             groups.append([])
         groups[-1].append(event)
-    ordered = (event for group in groups for event in sorted(group, key=lambda one: one.mode))
+    ordered = (event for group in groups for event in sorted(group, key=lambda transition: transition.mode))
     return [(event.mode, event.before, event.after) for event in ordered]
 
 
 def _changed(expected: Sequence[Any], results: Sequence[Any], solution: Solution) -> NoGradient:
     pairs = zip_longest(expected, results)
     same, (before, now) = next((k, pair) for k, pair in enumerate(pairs) if pair[0] != pair[1])
-    before, now = (f"'{one[0]}: {one[1]} → {one[2]}'" if one else "" for one in (before, now))
+    before, now = (f"'{result[0]}: {result[1]} → {result[2]}'" if result else "" for result in (before, now))
     what = f"{now} happens additionally" if now else f"{before} is missing"
     if now and before:
         what = f"{now} happens instead of {before}"

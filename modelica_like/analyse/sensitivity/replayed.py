@@ -34,25 +34,29 @@ def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> l
     _check_impacts(solution, outputs)
     span, integrals = replay.nodes[-1].t - replay.nodes[0].t, 0
     readings: list[Reading] = []
-    for one in outputs:
-        if one.kind in INTEGRATED:
-            readings.append(_integrated(replay, one, integrals, span))
+    for output in outputs:
+        if output.kind in INTEGRATED:
+            readings.append(_integrated(replay, output, integrals, span))
             integrals += 1
-        elif one.kind == "time":
-            readings.append(_event_time(solution, replay, one))
-        elif one.kind == "first":
-            readings.append(_first(replay, one))
-        elif one.kind in ("max", "min", "peak"):
-            signs = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}[one.kind]
-            largest = max((_scaled(_peak(replay, one.path, sign), sign) for sign in signs), key=lambda peak: peak.value)
-            readings.append(_scaled(largest, -1.0 if one.kind == "min" else 1.0))
+        elif output.kind == "time":
+            readings.append(_event_time(solution, replay, output))
+        elif output.kind == "first":
+            readings.append(_first(replay, output))
+        elif output.kind in ("max", "min", "peak"):
+            signs = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}[output.kind]
+            largest = max(
+                (_scaled(_peak(replay, output.path, sign), sign) for sign in signs), key=lambda peak: peak.value
+            )
+            readings.append(_scaled(largest, -1.0 if output.kind == "min" else 1.0))
         else:
-            readings.append(value_at(replay, one.path, _node_of(replay, one)))
+            readings.append(value_at(replay, output.path, _node_of(replay, output)))
     return readings
 
 
-def _scaled(one: Reading, by: float) -> Reading:
-    return Reading(by * one.value, tuple((node, by * part) for node, part in one.parts), by * one.quadratures)
+def _scaled(reading: Reading, by: float) -> Reading:
+    return Reading(
+        by * reading.value, tuple((node, by * part) for node, part in reading.parts), by * reading.quadratures
+    )
 
 
 def _integrated(replay: Replay, output: Output, number: int, span: float) -> Reading:
@@ -115,7 +119,7 @@ def _check_impacts(solution: Solution, outputs: Sequence[Output]) -> None:
     for output in outputs:
         owner, _, last = output.path.rpartition(".")
         lost = output.kind == "integral" and last == "loss_energy"
-        impacts = [one for one in solution.impacts if owner in ("", one.component)] if lost else []
+        impacts = [impact for impact in solution.impacts if owner in ("", impact.component)] if lost else []
         if impacts:
             raise NoGradient(
                 f"No gradient of {output.name}: {impacts[0].component} loses {impacts[0].energy:.6g} J in an impact at "

@@ -89,7 +89,7 @@ def choose(slaves: list[Slave], patterns: list[str] | None, *, own_names: bool) 
     for pattern in patterns:
         if not any(fits(name, pattern) for name in full):
             raise Refused(kind="no output", name=pattern, known=full)
-    return [[name for name, one in unique.items() if any(fits(one, p) for p in patterns)] for unique in names]
+    return [[name for name, variable in unique.items() if any(fits(variable, p) for p in patterns)] for unique in names]
 
 
 def fits(name: str, pattern: str) -> bool:

@@ -116,9 +116,9 @@ def _joined(wires: Iterable[Wire]) -> list[Wire]:
     """Join wires that share an end."""
     joined: list[Wire] = []
     for wire in wires:
-        touching = [*(one for one in joined if set(one.ends) & set(wire.ends)), wire]
-        ends = tuple(dict.fromkeys(end for one in touching for end in one.ends))
-        joined = [*(one for one in joined if one not in touching), replace(touching[0], ends=ends)]
+        touching = [*(other for other in joined if set(other.ends) & set(wire.ends)), wire]
+        ends = tuple(dict.fromkeys(end for other in touching for end in other.ends))
+        joined = [*(other for other in joined if other not in touching), replace(touching[0], ends=ends)]
     return joined
 
 
@@ -211,9 +211,11 @@ def _groups(assembly: Assembly, wires: Iterable[Wire]) -> tuple[tuple[str, ...],
     groups = [{name} for name in names]
     for wire in wires:
         parts = {part_of(end) for end in wire.ends}
-        groups = [one for one in groups if not one & parts] + [parts.union(*(one for one in groups if one & parts))]
+        groups = [group for group in groups if not group & parts] + [
+            parts.union(*(group for group in groups if group & parts))
+        ]
     return tuple(
-        sorted((tuple(sorted(group, key=names.index)) for group in groups), key=lambda one: names.index(one[0]))
+        sorted((tuple(sorted(group, key=names.index)) for group in groups), key=lambda group: names.index(group[0]))
     )
 
 

@@ -101,7 +101,7 @@ def _link(key: str, entry: Any) -> Link:
 
 
 def _bond(key: str, entry: Any) -> Bond:
-    if not isinstance(entry, list) or len(entry) != 2 or not all(isinstance(one, str) for one in entry):
+    if not isinstance(entry, list) or len(entry) != 2 or not all(isinstance(name, str) for name in entry):
         raise NetlistError(
             f"{key} must be a list of two connections, whose product is a power.",
             advice="First that of the torque, force or current, then that of the speed, velocity or potential.",

@@ -105,7 +105,7 @@ class _Joiner:
             raise NetlistError(f"{name} names no file.", advice=f'Write {{ is = "FMU", file = "{name}.fmu" }}.')
         file = self.path.parent / entry["file"]
         if not file.is_file():
-            near = [one.name for one in file.parent.glob("*.fmu")] if file.parent.is_dir() else []
+            near = [path.name for path in file.parent.glob("*.fmu")] if file.parent.is_dir() else []
             hint = did_you_mean(file.name, near) or "."
             raise NetlistError(
                 f"{name}: there is no file '{entry['file']}'{hint}", why="Paths are relative to the netlist."
@@ -187,7 +187,7 @@ class _Joiner:
 
     def _give(self, end: str, name: str) -> None:
         if (other := self.given.setdefault(end, name)) != name:
-            where = [self.document.lines.source("connect", one) for one in (other, name)]
+            where = [self.document.lines.source("connect", wire) for wire in (other, name)]
             raise NetlistError(f"{end} is given twice, by {other} and {name}.", where=where, advice="Remove one.")
 
     def _end(self, end: str, rest: Assembly | None) -> _End:

@@ -289,13 +289,13 @@ class Master:
         return max(errors, default=0.0), middle
 
     def _memory(self) -> Memory:
-        return [dict(vars(one)) for one in (*self.signals, *self.balances)]
+        return [dict(vars(item)) for item in (*self.signals, *self.balances)]
 
     def _back(self, states: Sequence[Any], memory: Memory) -> None:
         for slave, state in zip(self.slaves, states, strict=True):
             slave.load(state)
-        for one, values in zip((*self.signals, *self.balances), memory, strict=True):
-            vars(one).update(values)
+        for item, values in zip((*self.signals, *self.balances), memory, strict=True):
+            vars(item).update(values)
 
 
 def _moved(used: tuple[float, float], size: float) -> float:

@@ -145,8 +145,8 @@ class Maker:
 
 def _names(part: Component | list[Component]) -> list[str]:
     """Return the names in the formulas of a part."""
-    components = [one for item in (part if isinstance(part, list) else [part]) for one in item.walk()]
-    values = [value for one in components for value in (*one._values.values(), *one._starts.values())]
+    components = [node for item in (part if isinstance(part, list) else [part]) for node in item.walk()]
+    values = [value for component in components for value in (*component._values.values(), *component._starts.values())]
     formulas: list[Formula] = [value.formula for value in values if value.formula is not None]
     return [name for formula in formulas for name in formula.names()]
 

@@ -66,7 +66,7 @@ class CosimSolution(RecordedSolution):
         modes = np.array([column.kind == "discrete" for column in columns], dtype=bool)
         continuous = (*(one for one in columns if one.kind != "discrete"), *bond_columns(system))
         model = RecordedModel(
-            system.name, continuous, tuple(one for one in columns if one.kind == "discrete"), constants
+            system.name, continuous, tuple(column for column in columns if column.kind == "discrete"), constants
         )
         rows, values = table.T, table.T[1 : 1 + len(columns)]
         bonds = rows[1 + len(columns) : -4].reshape(-1, _TOLD, len(table))

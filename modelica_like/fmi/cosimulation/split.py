@@ -171,7 +171,7 @@ def _start_values(assembly: Assembly) -> dict[str, float]:
     whole = build(assembly)
     point = initialize(whole, 0.0, whole.settings.get("start", "given"))
     column = whole.variables(point.t, point.x, point.z, whole.p, whole.u, point.d).full().ravel()
-    return {one.path: float(value) for one, value in zip(whole.flat_variables, column, strict=True)}
+    return {variable.path: float(value) for variable, value in zip(whole.flat_variables, column, strict=True)}
 
 
 def _couplings(

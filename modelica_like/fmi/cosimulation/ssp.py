@@ -36,7 +36,7 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
     """
     target, chosen = target_file(path, ".ssp", "An SSP"), known_version(version, Version, "SSP")
     check_system(system)
-    for name in (system.name, *(one.name for one in (*system.links, *system.bonds))):
+    for name in (system.name, *(named.name for named in (*system.links, *system.bonds))):
         if not name.isprintable():
             raise NetlistError(f"The name '{printable(name)}' has characters that XML does not allow.")
     fmus = {unit.name: described(unit.file) for unit in system.units}

@@ -65,15 +65,17 @@ def ssd(system: System, fmus: Mapping[str, DescribedFmu], sources: Mapping[str, 
 def _component(
     parts: Element, unit: Unit, fmu: DescribedFmu, source: str, ports: list[Port], version: Version
 ) -> None:  # fmt: skip
-    one = element(parts, "ssd:Component", name=unit.name, type=FMU_TYPE, source=source, implementation="CoSimulation")
+    component = element(
+        parts, "ssd:Component", name=unit.name, type=FMU_TYPE, source=source, implementation="CoSimulation"
+    )
     variables = [fmu.variables[port.variable] for port in ports if port.unit == unit.name]
     if variables:
-        connectors = element(one, "ssd:Connectors")
+        connectors = element(component, "ssd:Connectors")
         for variable in variables:
             connector = element(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
             _type(connector, "ssc", variable, version)
     if unit.parameters:
-        binding = element(element(one, "ssd:ParameterBindings"), "ssd:ParameterBinding")
+        binding = element(element(component, "ssd:ParameterBindings"), "ssd:ParameterBinding")
         values = element(binding, "ssd:ParameterValues")
         group = element(values, "ssv:ParameterSet", version=version, name=PARAMETER_SET)
         given = element(group, "ssv:Parameters")

@@ -164,12 +164,12 @@ def read_element(xml: Any, path: ElementPath, files: Files) -> Element:
 
 def _named(element: Element, what: str, where: str) -> Iterator[tuple[str, Any]]:
     names: set[str] = set()
-    for one in element.xml.iterfind(where, NAMES):
-        name = needed(one, "name")
+    for child in element.xml.iterfind(where, NAMES):
+        name = needed(child, "name")
         if name in names:
-            raise DuplicateName(f"{element.label} has two {what}s '{name}'.", where=place(one))
+            raise DuplicateName(f"{element.label} has two {what}s '{name}'.", where=place(child))
         names.add(name)
-        yield name, one
+        yield name, child
 
 
 def _fmu(xml: Any, files: Files) -> Path:
@@ -194,7 +194,7 @@ def bound_values(root: Element, files: Files, units: Units) -> dict[Target, Boun
     Within one element the later binding wins; between two elements the outer one wins.
     """
     values: dict[Target, Bound] = {}
-    for element in sorted(root.walk(), key=lambda one: -len(one.path)):
+    for element in sorted(root.walk(), key=lambda source: -len(source.path)):
         for binding in element.xml.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", NAMES):
             prefix = binding.get("prefix", "")
             for name, bound in _parameters(binding, files, units):
@@ -225,12 +225,12 @@ def _parameters(binding: Any, files: Files, units: Units) -> Iterator[tuple[str,
     inside = binding.iterfind("ssd:ParameterValues/ssv:ParameterSet", NAMES)
     for group in [files.root(files.find(source, place(binding)))] if source else inside:
         all_units = {**units, **unit_definitions(group)}
-        for one in group.iterfind("ssv:Parameters/ssv:Parameter", NAMES):
-            yield needed(one, "name"), _value(one, all_units)
+        for element in group.iterfind("ssv:Parameters/ssv:Parameter", NAMES):
+            yield needed(element, "name"), _value(element, all_units)
 
 
 def _value(parameter: Any, units: Units) -> Bound:
-    typed = next((one for one in parameter if local(one) != "Annotations"), None)
+    typed = next((child for child in parameter if local(child) != "Annotations"), None)
     if typed is None or local(typed) in _NO_NUMBERS:
         what = "has no value" if typed is None else f"is of type {local(typed)}"
         name = needed(parameter, "name")

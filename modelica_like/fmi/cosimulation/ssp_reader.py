@@ -57,8 +57,8 @@ class _Reader:
 
     def __init__(self, top: Any, root: Element, files: Files) -> None:
         self.top, self.root, self.files = top, root, files
-        self.elements = {one.path: one for one in root.walk()}
-        self.files_of = {one.path: one.file for one in root.walk() if one.file is not None}
+        self.elements = {node.path: node for node in root.walk()}
+        self.files_of = {node.path: node.file for node in root.walk() if node.file is not None}
         self.names = _flat_names([self.elements[path] for path in self.files_of])
         self.fmus = {path: described(file) for path, file in self.files_of.items()}
         self.units = ssp.unit_definitions(top)
@@ -86,10 +86,10 @@ class _Reader:
     # -- connections -------------------------------------------------------------------------------------------------
 
     def _connect(self, system: Element, xml: Any) -> None:
-        for one in xml:
-            if ssp.local(one).endswith("Transformation") and not _is_identity(one):
+        for child in xml:
+            if ssp.local(child).endswith("Transformation") and not _is_identity(child):
                 raise NetlistError(
-                    f"A connection with a {ssp.local(one)} is not supported.", where=place(xml),
+                    f"A connection with a {ssp.local(child)} is not supported.", where=place(xml),
                     advice="Do the conversion in one of the FMUs.",
                 )  # fmt: skip
         ends = [self._end(system, xml, which) for which in ("start", "end")]
@@ -143,7 +143,9 @@ class _Reader:
             is_name = said != "" if own else said.isidentifier()
             chosen = said if is_name else _word(_text(source))
             used = [link.name for link in links]
-            name = next(one for one in chain([chosen], (f"{chosen}_{k}" for k in count(2))) if one not in used)
+            name = next(
+                candidate for candidate in chain([chosen], (f"{chosen}_{k}" for k in count(2))) if candidate not in used
+            )
             links.append(Link(name, self._port(source), tuple(map(self._port, taken))))
         return tuple(links)
 
@@ -217,13 +219,13 @@ def _bond(xml: Any) -> Bond:
 def _flat_names(components: list[Element]) -> dict[ElementPath, str]:
     """Return names of components without dots, blanks and special characters."""
     names: dict[ElementPath, str] = {}
-    for one in components:
-        name = _word("_".join(one.path))
+    for component in components:
+        name = _word("_".join(component.path))
         if name in names.values():
             raise DuplicateName(
-                f"Two FMUs would have the name {name}.", where=place(one.xml), advice="Rename one of them."
+                f"Two FMUs would have the name {name}.", where=place(component.xml), advice="Rename one of them."
             )
-        names[one.path] = name
+        names[component.path] = name
     return names
 
 

@@ -18,7 +18,7 @@ def powers() -> tuple[tuple[str, str], ...]:
     from modelica_like.netlist.registry import library_types  # the process of the FMUs needs no library
 
     terminals = (kind.terminal for kind in library_types().values())
-    return tuple(dict.fromkeys(one.power for one in terminals if one and one.power))
+    return tuple(dict.fromkeys(terminal.power for terminal in terminals if terminal and terminal.power))
 
 
 class Port(NamedTuple):

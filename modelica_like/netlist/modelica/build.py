@@ -127,8 +127,8 @@ class _Builder:
             for k in range(1, shape[0] + 1)
         ]
         if parts and isinstance(parts[0], Connector):
-            for k, one in enumerate(parts, 1):
-                setattr(self.component, f"{name}[{k}]", one)
+            for k, element_part in enumerate(parts, 1):
+                setattr(self.component, f"{name}[{k}]", element_part)
         else:
             setattr(self.component, name, parts)
 
@@ -165,7 +165,7 @@ class _Builder:
         if given.value is None and "start" in given.inner and given.inner["start"].value is not None:
             given = given.inner["start"]
             self.notes.tell(f"{f'{self.instance.path}.{name}'.lstrip('.')} has no value; its start value is taken.")
-        low, high = (self._number(basic.given.inner.get(one)) for one in ("min", "max"))
+        low, high = (self._number(basic.given.inner.get(limit)) for limit in ("min", "max"))
         fixed = self._known(basic.given.inner.get("fixed")) is not False
         parameter = param(self._unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
         outside = given.scope is not None and given.scope[0] is not self.instance
@@ -293,15 +293,15 @@ class _Builder:
         component = self.component
         joined: set[str] = set()
         wires: dict[str, tuple[str, ...]] = {}
-        for one in self.wires:
-            ends = tuple(end for end in one.ends if end.partition(".")[0].partition("[")[0] not in self.absent)
+        for wire in self.wires:
+            ends = tuple(end for end in wire.ends if end.partition(".")[0].partition("[")[0] not in self.absent)
             if len(ends) < 2:
                 continue
             key = f"wire_{len(wires) + 1}"
             wires[key] = ends
             joined.update(ends)
-            Assembly.place(component, f"connect.{key}", one.source)
-            self._attempt(one.source, self._check_ends, ends)
+            Assembly.place(component, f"connect.{key}", wire.source)
+            self._attempt(wire.source, self._check_ends, ends)
         component.__dict__["_wires"] = wires
         component.__dict__["_free"] = tuple(
             f"{name}.{end}"
@@ -315,8 +315,8 @@ class _Builder:
         kinds = {tuple(one.fields) for one in connectors if isinstance(one, WrittenConnector)}
         if len(kinds) > 1:
             raise ModelicaTextError(f"The connectors {', '.join(ends)} differ.")
-        for end, one in zip(ends, connectors, strict=True):
-            if not isinstance(one, Connector) and one.name in getattr(one.owner, "_instants", ()):
+        for end, connector in zip(ends, connectors, strict=True):
+            if not isinstance(connector, Connector) and connector.name in getattr(connector.owner, "_instants", ()):
                 raise ModelicaTextError(
                     f"{end} is true for instants only, which a connection does not carry here.",
                     advice="Write the 'when' in the class of the sample, or name the variable: when block.y then.",
@@ -340,8 +340,8 @@ def _connector(instance: Instance) -> WrittenConnector:
             raise refused(f"{name} in a connector", member.text, member.declaration.line)
         builder = _Builder(instance, Notes())
         unit = builder._unit(basic)
-        one = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
-        one.owner, one.name = instance.text.name, name
-        connector.__dict__["_own_fields"] = {**connector._own_fields, name: one}
+        quantity = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
+        quantity.owner, quantity.name = instance.text.name, name
+        connector.__dict__["_own_fields"] = {**connector._own_fields, name: quantity}
     connector.__dict__["kind"] = instance.text.path
     return connector

@@ -52,15 +52,21 @@ class Classes:
         Raises:
             ModelicaTextError: there is none.
         """
-        every = [inner for one in self.own for inner in one.walk()]
-        models = [one for one in every if one.kind in ("model", "block", "class") and not one.partial]
-        outermost = [one for one in models if one.owner is None] or models
-        matches = [one for one in every if one.path == name or one.name == name] if name else outermost[-1:]
+        every = [inner for outer in self.own for inner in outer.walk()]
+        models = [
+            candidate for candidate in every if candidate.kind in ("model", "block", "class") and not candidate.partial
+        ]
+        outermost = [model for model in models if model.owner is None] or models
+        matches = (
+            [candidate for candidate in every if candidate.path == name or candidate.name == name]
+            if name
+            else outermost[-1:]
+        )
         elsewhere = self.full(name) if name and not matches else None
         if isinstance(elsewhere, ClassText):
             return elsewhere
         if not matches:
-            names = ", ".join(one.name for one in models) or "none"
+            names = ", ".join(model.name for model in models) or "none"
             what = f"no class '{name}'" if name else "no model"
             raise ModelicaTextError(f"'{self.file.name}' has {what}. Its models: {names}.", where=self.own[0].place(1))
         return matches[0]
@@ -116,13 +122,13 @@ class Classes:
 
     def _imported(self, level: ClassText, head: str, rest: str) -> Found | None:
         after = f".{rest}" if rest else ""
-        for one in level.elements:
-            if not isinstance(one, Import):
+        for element in level.elements:
+            if not isinstance(element, Import):
                 continue
-            if not one.names and one.alias == head:
-                return self.full(one.path + after)
-            if head in one.names or "*" in one.names:
-                class_text = self.full(f"{one.path}.{head}{after}")
+            if not element.names and element.alias == head:
+                return self.full(element.path + after)
+            if head in element.names or "*" in element.names:
+                class_text = self.full(f"{element.path}.{head}{after}")
                 if class_text is not None:
                     return class_text
         return None
@@ -138,9 +144,11 @@ class Classes:
             return None
         self.open.add(key)
         try:
-            bases = [one for one in level.elements if isinstance(one, Extends)] + ([level.short] if level.short else [])
-            for one in bases:
-                base = self.find(one.base, level)
+            bases = [element for element in level.elements if isinstance(element, Extends)] + (
+                [level.short] if level.short else []
+            )
+            for extension in bases:
+                base = self.find(extension.base, level)
                 if isinstance(base, ClassText) and base is not level:
                     class_text = self._inside(base, name)
                     if class_text is not None:
@@ -154,11 +162,11 @@ class Classes:
         for old, new in _RENAMED:
             if path == old or path.startswith(f"{old}."):
                 path = f"{new}{path[len(old) :]}"
-        for one in self.own:
-            if path == one.path:
-                return one
-            if path.startswith(f"{one.path}."):
-                return self._inside(one, path[len(one.path) + 1 :])
+        for class_text in self.own:
+            if path == class_text.path:
+                return class_text
+            if path.startswith(f"{class_text.path}."):
+                return self._inside(class_text, path[len(class_text.path) + 1 :])
         if path in BASIC or _tabled(path):
             return _tabled(path) or path
         head, _, rest = path.partition(".")
@@ -185,10 +193,10 @@ class Classes:
 
     def _of_file(self, file: Path, name: str) -> ClassText | None:
         if file.resolve() == self.file.resolve():
-            return next((one for one in self.own if one.name == name), None)
+            return next((candidate for candidate in self.own if candidate.name == name), None)
         if file not in self.read:
             self.read[file] = parse_modelica(read_text(file), str(file))
-        return next((one for one in self.read[file] if one.name == name), None)
+        return next((candidate for candidate in self.read[file] if candidate.name == name), None)
 
 
 def _tabled(path: str) -> Known | str | None:

@@ -115,7 +115,7 @@ def by_component() -> dict[str, Known]:
 def built_in() -> dict[str, ClassText]:
     """Return the outermost classes of the built-in text."""
     file = _HERE / "builtin.mo"
-    return {one.name: one for one in parse_modelica(file.read_text(encoding="utf-8"), file.name)}
+    return {stored.name: stored for stored in parse_modelica(file.read_text(encoding="utf-8"), file.name)}
 
 
 def connector_type(path: str) -> type[Connector] | None:

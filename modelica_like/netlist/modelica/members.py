@@ -18,7 +18,7 @@ def named_array(path: str, shape: tuple[int, ...], kind: str) -> Expr:
     if not shape:
         return Expr("name" if kind != "Boolean" else "condition", ((path, ()),))
     inner = [f"{path[:-1]},{k}]" if path.endswith("]") else f"{path}[{k}]" for k in range(1, shape[0] + 1)]
-    return Expr("array", tuple(named_array(one, shape[1:], kind) for one in inner))
+    return Expr("array", tuple(named_array(index, shape[1:], kind) for index in inner))
 
 
 def unknown_name(what: str, text: ClassText, line: int) -> UnknownName:
@@ -30,15 +30,15 @@ def sizes(owner: Instance, member: Member) -> tuple[int, ...]:
     """Return the dimensions of a declared array; a colon takes the size of the value."""
     resolver = resolve.Resolver(owner, member.text, numeric=True)
     shape: list[int] = []
-    for k, one in enumerate(member.declaration.dimensions):
-        if one.kind != "all":
-            shape.append(resolver.count(one))
+    for k, dimension in enumerate(member.declaration.dimensions):
+        if dimension.kind != "all":
+            shape.append(resolver.count(dimension))
             continue
-        value = value_of(owner, member.declaration.name, member.text, one.line)
+        value = value_of(owner, member.declaration.name, member.text, dimension.line)
         for _ in range(k):
             value = value.args[0] if value.args and isinstance(value.args[0], Expr) else value
         if value.kind != "array":
-            raise refused(f"the size of {member.declaration.name} from this value", member.text, one.line)
+            raise refused(f"the size of {member.declaration.name} from this value", member.text, dimension.line)
         shape.append(len(value.args))
     if math.prod(shape) > fold.LONGEST:
         what = f"{member.declaration.name}, an array of {math.prod(shape)} elements (at most {fold.LONGEST})"
@@ -163,8 +163,8 @@ def _instance(owner: Instance, member: Member, text: ClassText, name: str, given
 def record_of(scope: Instance, name: Expr) -> Instance | None:
     """Return the record that a name means in an instance, None if it is none."""
     record = scope
-    for one, _ in name.args:
-        member = record.members.get(one)
+    for step, _ in name.args:
+        member = record.members.get(step)
         inner = part_of(record, member) if member is not None and basic_type(record, member) is None else None
         if not isinstance(inner, Instance):
             return None

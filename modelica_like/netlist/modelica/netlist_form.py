@@ -44,14 +44,14 @@ class _Form:
         self.model, self.notes = model, notes
         self.units: dict[tuple[str, str], Unit] = {}
         self.wires = list(model.wires.values())
-        self.parameters = {name: one.unit for name, one in model.fields.items() if isinstance(one, Parameter)}
+        self.parameters = {name: field.unit for name, field in model.fields.items() if isinstance(field, Parameter)}
 
     def assembly(self) -> Assembly:
         self._left_out()
         self._signal_units()
         self._parameter_units()
         parts = {
-            name: [self._part(f"{name}[{k}]", one) for k, one in enumerate(part, 1)]
+            name: [self._part(f"{name}[{k}]", element) for k, element in enumerate(part, 1)]
             if isinstance(part, list)
             else self._part(name, part)
             for name, part in self.model._parts.items()
@@ -74,7 +74,7 @@ class _Form:
 
     def _left_out(self) -> None:
         """Leave out variables that are only computed from the parts; refuse equations that the parts depend on."""
-        signals = {name for name, one in self.model.fields.items() if not isinstance(one, Parameter)}
+        signals = {name for name, field in self.model.fields.items() if not isinstance(field, Parameter)}
         joined = {end for ends in self.wires for end in ends}
         defined = {left.args[0][0] for left, _, _ in self.model._statements if left.kind == "name"}
         if defined != signals or signals & joined or self.model._happenings or self.model._initial:
@@ -95,7 +95,7 @@ class _Form:
 
     def _signal_units(self) -> None:
         """Find the units of signals whose blocks take any: from the ends that have one, through the blocks."""
-        sets = [[one for end in ends if (one := self._end(end)) is not None] for ends in self.wires]
+        sets = [[place for end in ends if (place := self._end(end)) is not None] for ends in self.wires]
         blocks = [part for part in self.model.walk() if part is not self.model]
         while True:
             while self._along(sets) or any(self._through(block) for block in blocks):
@@ -109,16 +109,18 @@ class _Form:
         changed = False
         for ends in sets:
             units = [unit for one in ends if (unit := self._unit(*one)) is not None]
-            for one in ends:
-                if units and self._unit(*one) is None:
-                    self._set(*one, units[0])
+            for end in ends:
+                if units and self._unit(*end) is None:
+                    self._set(*end, units[0])
                     changed = True
         return changed
 
     def _through(self, block: Component) -> bool:
         """Pass units through a block; tell whether one was found."""
         kind = type(block).__name__
-        ports = [name for name, one in block.fields.items() if isinstance(one, Input | Output) and one.unit == ANY]
+        ports = [
+            name for name, field in block.fields.items() if isinstance(field, Input | Output) and field.unit == ANY
+        ]
         if kind == "Product":
             y, u1, u2 = (self._unit(block, name) for name in ("y", "u1", "u2"))
             units_of = {
@@ -167,7 +169,7 @@ class _Form:
         if kind in _GAINS and name == "k":
             u, y = self._unit(part, "u") or ONE, self._unit(part, "y") or ONE
             return y / u * _SECOND ** _GAINS[kind]
-        ports = (self._unit(part, one) for one, field in part.fields.items() if isinstance(field, Input | Output))
+        ports = (self._unit(part, key) for key, field in part.fields.items() if isinstance(field, Input | Output))
         return next((unit for unit in ports if unit is not None), ONE)
 
     def _parameter_units(self) -> None:
@@ -198,18 +200,18 @@ class _Form:
         twin = part.copy()
         if isinstance(twin, Written):
             return twin
-        for name, one in part.fields.items():
+        for name, field in part.fields.items():
             value = part._values.get(name)
-            free = isinstance(one, Parameter) and one.unit == ANY
-            unit = self._own_unit(part, name) if free else one.unit
-            default = one.default if value is None and free and isinstance(one.default, int | float) else None
+            free = isinstance(field, Parameter) and field.unit == ANY
+            unit = self._own_unit(part, name) if free else field.unit
+            default = field.default if value is None and free and isinstance(field.default, int | float) else None
             if value is not None:
                 twin.give(name, self._text(value, unit, f"{path}.{name}"))
             elif default and not same_dimension(unit, ONE):
                 twin.give(name, _quantity(float(default), unit))
             start = part._starts.get(name)
             if start is not None:
-                text = self._text(start, one.unit, f"{path}.{name}")
+                text = self._text(start, field.unit, f"{path}.{name}")
                 twin.give(name, text if start.fixed else guess(text))
         return twin
 

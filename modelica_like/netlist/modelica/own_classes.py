@@ -70,7 +70,7 @@ def class_of_equations(
         if isinstance(statement, Equation):
             sides = ca.vertsplit(ca.cse(ca.vertcat(statement.left, statement.right)))
             events = event_steps(sides[0] - sides[1])
-            left, right = (_text(one, component, events=events) for one in sides)
+            left, right = (_text(side, component, events=events) for side in sides)
             lines.append(f"  {left} = {right};")
     return "\n".join([*lines, *_events(component), f"end {name};"])
 
@@ -85,46 +85,54 @@ def _events(component: Component) -> list[str]:
     for name, mode in component.modes.items():
         goes = [one for one in events if isinstance(one, Transition) and one.mode.mode is mode and not one.fails]
         begins = [one for one in events if isinstance(one, StartMode) and one.mode.mode is mode]
-        chosen = " else".join(f"if {_text(one.when, component, True)} then {mode.number(one.target)}" for one in begins)
+        chosen = " else".join(
+            f"if {_text(begin.when, component, True)} then {mode.number(begin.target)}" for begin in begins
+        )
         first = str(mode.number(component.start_mode(name)))
         first = f"{chosen} else {first}" if chosen else first
-        rest = "".join(f" elseif {_due(one, component)} then {mode.number(one.target)}" for one in goes)
+        rest = "".join(
+            f" elseif {_due(transition, component)} then {mode.number(transition.target)}" for transition in goes
+        )
         name = identifier(name)
         lines.append(f"  {name} = if initial() then ({first}){rest} else pre({name});")
     resets = [one for one in events if isinstance(one, Transition) and one.reset]
-    for k, one in enumerate(resets):
-        lines.append(f"  {'elsewhen' if k else 'when'} {_due(one, component)} then")
-        for target, value in one.reset.items():
+    for k, event in enumerate(resets):
+        lines.append(f"  {'elsewhen' if k else 'when'} {_due(event, component)} then")
+        for target, value in event.reset.items():
             symbol, new = symbols_in(target)[0], _text(value, component, True)
             field = symbol.owner.fields[symbol.name]
             _check_reset(component, symbol, value)
             path = identifier(relative_path(symbol.owner, component, symbol.name))
             lines.append(f"    {path} = {new};" if isinstance(field, Discrete) else f"    reinit({path}, {new});")
     lines += ["  end when;"] if resets else []
-    for one in ends:
-        conditions = ", ".join(_text(each, component) for each in one.conditions)
-        texts = (key.text.replace('"', "'") for _, new in one.branches for key in new if isinstance(key, Ending))
+    for event in ends:
+        conditions = ", ".join(_text(each, component) for each in event.conditions)
+        texts = (key.text.replace('"', "'") for _, new in event.branches for key in new if isinstance(key, Ending))
         written = (f'    terminate("{re.sub(r"[{}]", "", text)}");' for text in texts)
         lines += [f"  when {{{conditions}}} then", *written, "  end when;"]
-    for one in events:
-        if isinstance(one, Transition) and one.fails:
-            words = one.notice.replace('"', "'")
-            lines.append(f'  assert(not ({_due(one, component, False)}), "{words}");')
+    for event in events:
+        if isinstance(event, Transition) and event.fails:
+            words = event.notice.replace('"', "'")
+            lines.append(f'  assert(not ({_due(event, component, False)}), "{words}");')
     return lines
 
 
-def _only_ends(one: Any) -> bool:
+def _only_ends(event: Any) -> bool:
     """Return whether an event is a `when` that ends the run and does nothing else."""
-    whole = one.branches if isinstance(one, When) else ()
+    whole = event.branches if isinstance(event, When) else ()
     return len(whole) == 1 and all(isinstance(key, Ending) and not key.fails for key in whole[0][1])
 
 
-def _due(one: Transition, component: Component, before: bool = True) -> str:
+def _due(transition: Transition, component: Component, before: bool = True) -> str:
     """Return the condition of a transition, with modes and discrete values before the event or after it."""
-    name = identifier(one.mode.mode.name)
+    name = identifier(transition.mode.mode.name)
     name = f"pre({name})" if before else name
-    sources = " or ".join(f"{name} == {one.mode.mode.number(source)}" for source in one.sources)
-    when = f"time >= {_text(one.at, component, before)}" if one.when is None else _text(one.when, component, before)
+    sources = " or ".join(f"{name} == {transition.mode.mode.number(source)}" for source in transition.sources)
+    when = (
+        f"time >= {_text(transition.at, component, before)}"
+        if transition.when is None
+        else _text(transition.when, component, before)
+    )
     return f"({sources}) and {when}"
 
 
@@ -133,17 +141,28 @@ def _check_reset(component: Component, target: Symbol, value: Any) -> None:
     if not isinstance(component.fields.get(target.name), Discrete):
         return
     equations = (as_statement(item, source, "") for item, source in located(component.equations()))
-    sides = [side for one in equations if isinstance(one, Equation) for side in (one.left, one.right)]
+    sides = [
+        side for equation in equations if isinstance(equation, Equation) for side in (equation.left, equation.right)
+    ]
     states = {one.name for side in sides for one in symbols_in(side) if one.order}
-    for one in symbols_in(ca.SX(value)):
-        if one is not TIME and isinstance(one.owner.fields.get(one.name), Variable) and one.name not in states:
+    for symbol in symbols_in(ca.SX(value)):
+        if (
+            symbol is not TIME
+            and isinstance(symbol.owner.fields.get(symbol.name), Variable)
+            and symbol.name not in states
+        ):
             raise ModelicaTextError(
-                f"{component.label} sets {target.name} at an event by {one.name} before it, which has no Modelica text."
+                f"{component.label} sets {target.name} at an event by {symbol.name} before it, which has no Modelica "
+                "text."
             )
 
 
 def _declarations(component: Component, write_formula: Callable[[Formula], str], driven: frozenset[str]) -> list[str]:
-    lines = [f"  {connector_class(one)} {identifier(key)};" for key, one in component.connectors.items() if one.used]
+    lines = [
+        f"  {connector_class(connector)} {identifier(key)};"
+        for key, connector in component.connectors.items()
+        if connector.used
+    ]
     for key, field in component.fields.items():
         if isinstance(field, Parameter) or (isinstance(field, Input) and key not in driven):
             value = component.value(key)
@@ -166,7 +185,7 @@ def _declarations(component: Component, write_formula: Callable[[Formula], str],
             text = write_formula(start.formula) if start is not None and start.formula is not None else repr(number)
             lines.append(f"  discrete Real {identifier(key)}(start = {text});")
     for key, mode in component.modes.items():
-        numbers = ", ".join(f"{number}: {one}" for number, one in enumerate(mode.names))
+        numbers = ", ".join(f"{number}: {name}" for number, name in enumerate(mode.names))
         lines.append(f'  Integer {identifier(key)}(start = {mode.number(component.start_mode(key))}) "{numbers}";')
     return _arrays(lines)
 
@@ -183,7 +202,7 @@ def _arrays(lines: list[str]) -> list[str]:
 
 def _attributes(unit: str, *more: str) -> str:
     texts = [f'unit = "{unit}"'] if unit not in ("1", "*", "") else []
-    texts += [one for one in more if one]
+    texts += [operand for operand in more if operand]
     return f"({', '.join(texts)})" if texts else ""
 
 
@@ -222,7 +241,7 @@ def _text(expression: Any, component: Component, before: bool = False, events: C
         return "der(" * symbol.order + path + ")" * symbol.order
     if silence(node):
         return _text(node.dep(0), component, before)
-    operation, args = node.op(), [_text(one, component, before, events) for one in operands(node)]
+    operation, args = node.op(), [_text(operand, component, before, events) for operand in operands(node)]
     quiet = not _has_events(node, events)
     if operation in _SIGNS:
         return f"({args[0]} {_SIGNS[operation]} {args[1]})"
@@ -241,4 +260,4 @@ def _has_events(node: Any, identities: Collection[int]) -> bool:
     """Tell whether an expression has steps that make events."""
     if node.is_symbolic():
         return isinstance(symbols_in(node)[0], Marker)
-    return node.element_hash() in identities or any(_has_events(one, identities) for one in operands(node))
+    return node.element_hash() in identities or any(_has_events(operand, identities) for operand in operands(node))

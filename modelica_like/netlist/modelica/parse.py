@@ -276,10 +276,10 @@ class _Parser(Expressions):
             kind, text, line = self.tokens[self.at]
             if text == "experiment" and kind == "name" and depth == 1 and class_text is not None:
                 self.at += 1
-                for one in self.modification().arguments:
-                    value = one.modification.value
+                for argument in self.modification().arguments:
+                    value = argument.modification.value
                     if value is not None and value.kind == "number":
-                        class_text.experiment[one.name] = value.args[0]
+                        class_text.experiment[argument.name] = value.args[0]
                 continue
             if kind == "end of file":
                 self.refuse("An annotation has no end.", line)

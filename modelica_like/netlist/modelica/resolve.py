@@ -76,7 +76,7 @@ class Resolver:
         if kind == "if":
             return self._chosen(args, line)
         if kind == "range":
-            numbers = [self.number(one) for one in args]
+            numbers = [self.number(argument) for argument in args]
             start, step, stop = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
             return self._told(lambda: fold.row(start, step, stop, line), line)
         values = tuple(map(self, args))
@@ -165,13 +165,13 @@ class Resolver:
 
     def indexed(self, value: Expr, subscripts: tuple[Expr, ...], line: int) -> Expr:
         """Return an element of an array."""
-        for k, one in enumerate(subscripts):
+        for k, subscript in enumerate(subscripts):
             if value.kind != "array":
                 raise refused("a subscript of something that is not an array", self.text, line)
-            if one.kind == "all":
+            if subscript.kind == "all":
                 rest = subscripts[k + 1 :]
                 return Expr("array", tuple(self.indexed(item, rest, line) for item in value.args), line)
-            chosen = self.index(one, len(value.args))
+            chosen = self.index(subscript, len(value.args))
             if isinstance(chosen, Expr):
                 rest = subscripts[k + 1 :]
                 rows = tuple(self.indexed(value, (index, *rest), line) for index in chosen.args)
@@ -215,15 +215,15 @@ class Resolver:
         every = bool(shape) and (not subscripts or subscripts[0].kind == "all")
         chosen = self.index(whole if every else subscripts[0], shape[0]) if shape else 0
         if isinstance(chosen, Expr):
-            items = (((name, (one,)), *rest) for one in chosen.args)
-            return Expr("array", tuple(self._member(owner, before, one, line) for one in items), line)
+            items = (((name, (argument,)), *rest) for argument in chosen.args)
+            return Expr("array", tuple(self._member(owner, before, item, line) for item in items), line)
         part = members.part_of(owner, member, chosen)
         path = f"{before}{name}[{chosen}]" if chosen else f"{before}{name}"
         if not rest:
             raise refused(f"{name}, a component, as a value", self.text, line)
         if isinstance(part, Instance):
             return self._member(part, f"{path}.", rest, line)
-        inner = ".".join(one + "".join(f"[{int(self.number(index))}]" for index in subs) for one, subs in rest)
+        inner = ".".join(head + "".join(f"[{int(self.number(index))}]" for index in subs) for head, subs in rest)
         if isinstance(part, Known):
             inner = part.here(inner)
             if self.numeric:
@@ -275,9 +275,11 @@ class Resolver:
         """Return the package of a constant that is imported by its own name."""
         level: ClassText | None = self.text
         while level is not None:
-            for one in level.elements:
-                if isinstance(one, Import) and name in (one.alias, *one.names):
-                    class_text = self.classes.full(one.path if name in one.names else one.path.rpartition(".")[0])
+            for element in level.elements:
+                if isinstance(element, Import) and name in (element.alias, *element.names):
+                    class_text = self.classes.full(
+                        element.path if name in element.names else element.path.rpartition(".")[0]
+                    )
                     return class_text if isinstance(class_text, ClassText) else None
             level = level.owner
         return None
@@ -285,7 +287,7 @@ class Resolver:
     def _around(self, name: str) -> ClassText | None:
         level: ClassText | None = self.text if self.instance is None else self.text.owner
         while level is not None:
-            if any(isinstance(one, Declaration) and one.name == name for one in level.elements):
+            if any(isinstance(element, Declaration) and element.name == name for element in level.elements):
                 return level
             level = level.owner
         return None
@@ -321,7 +323,7 @@ class Resolver:
         if short == "size":
             items = self._sized(given[0])
             return functions.size(items, int(self.number(given[1])) if len(given) > 1 else 0, line)
-        values = tuple(self(one) for one in given)
+        values = tuple(self(argument) for argument in given)
         if short in functions.OF_ARRAYS:
             if not values or (short in ("sum", "product", "scalar", "transpose") and values[0].kind != "array"):
                 raise ModelicaTextError(f"{short}(…) needs an array.", where=self.text.place(line))

@@ -51,7 +51,7 @@ def _pairs(left: Expr, right: Expr, instance: Instance, source: Source) -> list[
         if len(ends[k]) == 1 and count > 1:  # an array of signals that a component has as single ones
             name, subscripts = end.args[-1]
             elements = (Expr("number", (float(position),)) for position in range(1, count + 1))
-            each = (Expr("name", (*end.args[:-1], (name, (*subscripts, one))), end.line) for one in elements)
+            each = (Expr("name", (*end.args[:-1], (name, (*subscripts, element))), end.line) for element in elements)
             ends[k] = [path for one in each for path in _ends(one, instance)]
     if len(ends[0]) != len(ends[1]):
         raise ModelicaTextError("The sizes of both ends differ.", where=source)
@@ -65,7 +65,7 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
     if member is None:
         raise unknown_name(f"{instance.text.name} has no '{name}'.", instance.text, end.line)
     shape = sizes(instance, member)
-    indices = [f"[{int(one.args[0])}]" for one in subscripts if one.kind == "number"]
+    indices = [f"[{int(subscript.args[0])}]" for subscript in subscripts if subscript.kind == "number"]
     if shape and not indices:
         indices = [f"[{k}]" for k in range(1, shape[0] + 1)]
     heads = [f"{name}{index}" for index in indices or [""]]

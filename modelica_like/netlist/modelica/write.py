@@ -61,7 +61,9 @@ class _Writer:
                 unit = str(coherent(value.unit))
                 attribute = f'(unit = "{unit}")' if unit not in ("1", "") else ""
                 lines.append(f"  parameter Real {identifier(key)}{attribute} = {self._value(value, assembly)};")
-        lines += [f"  {connector_class(one)} {identifier(key)};" for key, one in assembly.connectors.items()]
+        lines += [
+            f"  {connector_class(connector)} {identifier(key)};" for key, connector in assembly.connectors.items()
+        ]
         for key, field in assembly.fields.items():
             if isinstance(field, Input | Output):
                 lines.append(f"  {_BLOCKS}{type(field).__name__} {identifier(key)};")
@@ -81,7 +83,7 @@ class _Writer:
         if not isinstance(part, list):
             kind, values = self._part(owner, name, part, joined)
             return f"{kind} {identifier(name)}{_arguments(values)}"
-        arguments = [self._part(owner, f"{name}[{k}]", one, joined) for k, one in enumerate(part, 1)]
+        arguments = [self._part(owner, f"{name}[{k}]", element, joined) for k, element in enumerate(part, 1)]
         kinds = {kind for kind, _ in arguments}
         keys = {tuple(values) for _, values in arguments}
         if len(kinds) != 1 or len(keys) != 1:
@@ -109,8 +111,8 @@ class _Writer:
             return name, {}
         known = by_component().get(type(part).__name__)
         if known is None or known.type is not type(part):
-            for key, one in part.connectors.items():
-                one.__dict__["_used"] = not one.optional or f"{path}.{key}" in joined
+            for key, connector in part.connectors.items():
+                connector.__dict__["_used"] = not connector.optional or f"{path}.{key}" in joined
             name = f"{type(part).__name__}_{re.sub('[^a-zA-Z0-9]', '_', path)}"
             driven = frozenset(key for key in part.fields if f"{path}.{key}" in joined)
             text = class_of_equations(part, name, lambda formula: formula_text(formula, part), driven)
@@ -122,8 +124,12 @@ class _Writer:
 
     def _starts(self, part: Component, known: Known | None, owner: Assembly) -> dict[str, str]:
         starts: dict[str, dict[str, Value]] = {}
-        inside = [(f"{one.path.removeprefix(f'{part.path}.')}.", one) for one in part.walk() if one is not part]
-        given = [(f"{path}{name}", value) for path, one in [("", part), *inside] for name, value in one._starts.items()]
+        inside = [(f"{node.path.removeprefix(f'{part.path}.')}.", node) for node in part.walk() if node is not part]
+        given = [
+            (f"{path}{name}", value)
+            for path, component in [("", part), *inside]
+            for name, value in component._starts.items()
+        ]
         for name, value in given:
             there = known.there(name) if known else name
             if "." in there:
@@ -131,7 +137,7 @@ class _Writer:
             starts.setdefault(there.partition("[")[0], {})[there] = value
         if part._start_modes:
             raise ModelicaTextError(f"{part.label} has a start mode, which Modelica text does not say here.")
-        return dict.fromkeys((self._start(base, one, part, owner) for base, one in starts.items()), "")
+        return dict.fromkeys((self._start(base, start, part, owner) for base, start in starts.items()), "")
 
     def _start(self, base: str, given: dict[str, Value], part: Component, owner: Assembly) -> str:
         """Return the modification of a start value, or of those of all elements of an array."""
@@ -139,8 +145,8 @@ class _Writer:
             fixed = ", fixed = true" if given[base].fixed else ""
             return f"{identifier(base)}(start = {self._value(given[base], owner)}{fixed})"
         elements = [given.get(name) for name in part.fields if name.startswith(f"{base}[")]
-        values = ", ".join("0" if one is None else self._value(one, owner) for one in elements)
-        fixed = ", ".join(str(one is not None and one.fixed).lower() for one in elements)
+        values = ", ".join("0" if element is None else self._value(element, owner) for element in elements)
+        fixed = ", ".join(str(element is not None and element.fixed).lower() for element in elements)
         return f"{identifier(base)}(start = {{{values}}}, fixed = {{{fixed}}})"
 
     def _value(self, value: Value, owner: Component) -> str:
@@ -157,8 +163,8 @@ class _Writer:
     def _pairs(self, assembly: Assembly) -> Iterator[tuple[str, str]]:
         for ends in self._wires(assembly):
             texts = [_there(assembly, end) for end in ends]
-            for one in texts[1:]:
-                yield texts[0], one
+            for text in texts[1:]:
+                yield texts[0], text
 
 
 class _Arguments:
@@ -223,8 +229,8 @@ class _Arguments:
     def _scales(self, name: str) -> list[str]:
         """Return the parameters that scale the columns of a table, empty where none is given."""
         columns = self.part._tables[name].columns if name in self.part._tables else ()
-        given = (one.scale in self.part._values and one.scale not in self.known.names for one in columns)
-        return [one.scale if scaled else "" for one, scaled in zip(columns, given, strict=True)]
+        given = (column.scale in self.part._values and column.scale not in self.known.names for column in columns)
+        return [column.scale if scaled else "" for column, scaled in zip(columns, given, strict=True)]
 
     def _put(self, there: str, text: str) -> None:
         if text.startswith("connected "):
@@ -286,9 +292,11 @@ class _Arguments:
         if value and isinstance(value[0], tuple):
             factors = [f"*{self._expression(scale)}" if scale else "" for scale in self._scales(name)]
             factors += [factors[-1] if factors else ""] * len(value[0])
-            rows = (", ".join(f"{_number(one)}{by}" for one, by in zip(row, factors, strict=False)) for row in value)
+            rows = (
+                ", ".join(f"{_number(number)}{by}" for number, by in zip(row, factors, strict=False)) for row in value
+            )
             return f"[{'; '.join(rows)}]"
-        return "{" + ", ".join(self._plain(name, one) for one in value) + "}"
+        return "{" + ", ".join(self._plain(name, item) for item in value) + "}"
 
     def _refused(self, name: str, value: Any) -> ModelicaTextError:
         return ModelicaTextError(
@@ -313,7 +321,7 @@ def formula_text(formula: Formula, owner: Component, outer: int = 0) -> str:
     if kind == "neg":
         return f"(-{formula_text(operands[0], owner, 3)})"
     if kind not in _PRECEDENCE:
-        return f"{kind}({', '.join(formula_text(one, owner) for one in operands)})"
+        return f"{kind}({', '.join(formula_text(operand, owner) for operand in operands)})"
     precedence = _PRECEDENCE[kind]
     left, right = (
         formula_text(operands[0], owner, precedence + (kind == "**")),
@@ -326,7 +334,7 @@ def formula_text(formula: Formula, owner: Component, outer: int = 0) -> str:
 def _fields(text: str) -> list[str]:
     if text.startswith("connected "):
         return []
-    return sorted({one.path for one in names_in(parse_expression(text))}, key=len, reverse=True)
+    return sorted({name.path for name in names_in(parse_expression(text))}, key=len, reverse=True)
 
 
 def _there(assembly: Assembly, end: Any) -> str:
@@ -358,7 +366,7 @@ def _class_name(assembly: Assembly) -> str:
 def _arguments(values: Mapping[str, str]) -> str:
     texts = [f"{key} = {value}" if value else key for key, value in values.items()]
     # A modification has no dots: record.P = 1 is record(P = 1).
-    texts = [re.sub(r"^(each )?(\w+)\.(\w+ = .*)$", r"\1\2(\3)", one) for one in texts]
+    texts = [re.sub(r"^(each )?(\w+)\.(\w+ = .*)$", r"\1\2(\3)", text) for text in texts]
     return f"({', '.join(texts)})" if texts else ""
 
 

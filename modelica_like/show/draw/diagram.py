@@ -172,11 +172,11 @@ def _joined(component: Component) -> Iterator[list[Connector | Symbol]]:
             new = {
                 (id(end.owner), end.name) if isinstance(end, Symbol) else (id(end), ""): end for end in statement.ends
             }
-            for old in [one for one in sets if one.keys() & new.keys()]:
+            for old in [net for net in sets if net.keys() & new.keys()]:
                 new = old | new
                 sets.remove(old)
             sets.append(new)
-    yield from (list(one.values()) for one in sets)
+    yield from (list(net.values()) for net in sets)
 
 
 def _port(end: Connector | Symbol, scope: Component, nodes: dict[str, Node], outer: dict[str, Node]) -> Port:
@@ -253,7 +253,7 @@ def _orient(picture: Diagram) -> None:
         for port in node.ports.values() if node.component is None else ():
             port.side = _OPPOSITE[port.side]
     for first in sorted(picture.nodes, key=_rank):
-        if first in reached or (first.component is None and any(one.side == "W" for one in _ends(first))):
+        if first in reached or (first.component is None and any(end.side == "W" for end in _ends(first))):
             continue
         reached.add(first)
         pending = deque([first])

@@ -164,7 +164,7 @@ def _order(layers: Layers) -> None:
             places = _places(layers)
             crossings = sum(_crossings_in(channel, places) for channel in layers.channels)
             orders.append((crossings, [list(column) for column in layers.columns]))
-    layers.columns[:] = min(orders, key=lambda one: one[0])[1]
+    layers.columns[:] = min(orders, key=lambda candidate: candidate[0])[1]
 
 
 def _signals_first(slot: Slot) -> bool:

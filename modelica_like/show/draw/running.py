@@ -73,7 +73,7 @@ class Running:
                 key = y1, spelled(abs(power) * self.span, "J") if self.span else spelled(abs(power))
                 low, high, _ = stretches.get(key, (x1, x2, 0.0))
                 stretches[key] = min(low, x1, x2), max(high, x1, x2), abs(power)
-        for (y, text), (low, high, power) in sorted(stretches.items(), key=lambda one: one[1][0] - one[1][1]):
+        for (y, text), (low, high, power) in sorted(stretches.items(), key=lambda item: item[1][0] - item[1][1]):
             x = (low + high) / 2
             if high - low >= text_width(text, VALUE) and not self.span:
                 yield [Text(text, (x, y + 16.0), VALUE)]
@@ -184,7 +184,9 @@ def _looks(part: Component, run: Trajectories) -> Iterator[tuple[float, str, str
     path, mode = path_of(part), part.modes[name]
     values = run[f"{path}.{name}"].astype(int)
     # A hold knows its reaction only by the node of the flat system, and some have none.
-    held = next((one for one in getattr(run.model, "holds", ()) if one.component == path and one.reaction >= 0), None)
+    held = next(
+        (hold for hold in getattr(run.model, "holds", ()) if hold.component == path and hold.reaction >= 0), None
+    )
     carried = np.abs(run[run.model.flat_variables[held.reaction].path]) if held else np.ones(len(values))
     changes = [0, *(np.flatnonzero(np.diff(values)) + 1), len(values)]
     for k, end in pairwise(changes):
@@ -215,7 +217,7 @@ def _pieces(line: Line, run: Trajectories, at: float | None) -> list[Piece]:
     edges = dict[frozenset[Point], None]()
     for path in paths:
         for a, b in pairwise(path):
-            there = [one for one in corners if _between(one, a, b)]
+            there = [corner for corner in corners if _between(corner, a, b)]
             edges |= dict.fromkeys(frozenset(pair) for pair in pairwise(there) if pair[0] != pair[1])
     return [(min(edge), max(edge), _beyond(edge, edges, into)) for edge in edges]
 
@@ -234,7 +236,9 @@ def _beyond(cut: frozenset[Point], edges: Iterable[frozenset[Point]], into: Mapp
     reached, pending = {start}, [start]
     while pending:
         here = pending.pop()
-        for other in (one for edge in edges if here in edge and edge != cut for one in edge if one not in reached):
+        for other in (
+            value for edge in edges if here in edge and edge != cut for value in edge if value not in reached
+        ):
             reached.add(other)
             pending.append(other)
     return sum(power for tip, power in into.items() if tip in reached)

@@ -137,9 +137,9 @@ def sheet(diagram: Diagram) -> Sheet:
         west, east = (max((side * one.room[k] for one in there), default=0.0) for k, side in ((0, -1.0), (2, 1.0)))
         for slot in column:
             if slot.node:
-                one = placed[slot.node]
-                one.at = x + west, heights[slot]
-                _lead(one, (x, x + west + east), line_of)
+                item = placed[slot.node]
+                item.at = x + west, heights[slot]
+                _lead(item, (x, x + west + east), line_of)
             elif slot.net:
                 lines[slot.net].paths.append([(x, heights[slot]), (x + west + east, heights[slot])])
         x += west + east
@@ -227,7 +227,7 @@ def _heights(layers: Layers, placed: dict[Node, Placed]) -> dict[Slot, float]:
     apart: list[tuple[ca.SX, float]] = []
     for column in layers.columns:
         for a, b in pairwise(column):
-            low, high = (placed[one.node].room if one.node else (0.0, 0.0, 0.0, 0.0) for one in (a, b))
+            low, high = (placed[end.node].room if end.node else (0.0, 0.0, 0.0, 0.0) for end in (a, b))
             gap = _GAP if a.node and b.node else _PASSING
             apart.append((y[place[b]] - y[place[a]], low[3] - high[1] + gap))
     spans: list[tuple[list[ca.SX], int]] = []
@@ -239,7 +239,7 @@ def _heights(layers: Layers, placed: dict[Node, Placed]) -> dict[Slot, float]:
             chain = 1 + all(_single(end) for end in (*before, *after))
             spans.append((ends, net.stroke.weight * (1 + passing) * chain))
             # Of several branches, the one that continues stays straight.
-            through = [one for one, end in zip(ends, (*before, *after), strict=True) if _goes_on(end)]
+            through = [other for other, end in zip(ends, (*before, *after), strict=True) if _goes_on(end)]
             if 1 < len(through) < len(ends):
                 spans.append((through, net.stroke.weight))
     low, high, off = (
@@ -280,7 +280,7 @@ def _straighten(layers: Layers, heights: dict[Slot, float], placed: dict[Node, P
 def _single(end: End) -> bool:
     """Whether the part has one connector on this side."""
     ports = end.slot.node.ports.values() if end.slot.node else ()
-    return sum(not one.signal and end.port is not None and one.side == end.port.side for one in ports) <= 1
+    return sum(not port.signal and end.port is not None and port.side == end.port.side for port in ports) <= 1
 
 
 def _goes_on(end: End) -> bool:

@@ -43,9 +43,9 @@ class Runs:
     def __init__(self, drive: Assembly, model: CompiledDae, options: Options) -> None:
         self._drive, self._model, self._options = drive, model, options
         self._instance = Instance(model)
-        self.references = {name: one.reference for name, one in self._instance.native.variables.items()}
+        self.references = {name: variable.reference for name, variable in self._instance.native.variables.items()}
         self._names = {reference: name for name, reference in self.references.items()}
-        self._settable = {self.references[one.path] for one in model.flat_parameters if one.tunable}
+        self._settable = {self.references[parameter.path] for parameter in model.flat_parameters if parameter.tunable}
         self._settable |= {self.references[model.flat_variables[k].path] for k in model.inputs}
         self._running, self._analysing = threading.Lock(), threading.Lock()
 
@@ -104,7 +104,9 @@ class Runs:
 
     def _begin(self, values: Sequence[tuple[int, float]], until: float) -> None:
         instance = self._instance
-        references, numbers = (np.array([one[k] for one in values], kind) for k, kind in ((0, np.uint32), (1, float)))
+        references, numbers = (
+            np.array([value[k] for value in values], kind) for k, kind in ((0, np.uint32), (1, float))
+        )
         instance.reset(0.0, until, self._options.rtol, self._options.atol)
         place = references.ctypes.data, numbers.ctypes.data
         instance.check(instance.library.set(instance.address, len(values), *place))
@@ -146,8 +148,8 @@ class Runs:
             sensitivity = sensitivities(self._model, [output], until=until, parameters=given)
         (end,) = sensitivity.outputs
         rows = [
-            (one.name, relative if end.value else 0.01 * one.value * derivative)
-            for one, derivative, relative in sensitivity.ranking(output)
+            (quantity.name, relative if end.value else 0.01 * quantity.value * derivative)
+            for quantity, derivative, relative in sensitivity.ranking(output)
         ]
         rows = [row for row in rows if row[1]][:_MOST_BARS]
         caption = (

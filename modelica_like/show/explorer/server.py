@@ -219,10 +219,10 @@ class _Handler(BaseHTTPRequestHandler):
         if result is None:
             return
         about, arrays = result
-        head = json.dumps(about | {"sizes": [one.size for one in arrays]}).encode()
+        head = json.dumps(about | {"sizes": [array.size for array in arrays]}).encode()
         head += b" " * (-len(head) % 8)
-        parts = [np.array([len(head)], "<i8"), *(np.asarray(one, "<f8") for one in arrays)]
-        self._answer(HTTPStatus.OK, b"".join((parts[0].tobytes(), head, *(one.tobytes() for one in parts[1:]))))
+        parts = [np.array([len(head)], "<i8"), *(np.asarray(array, "<f8") for array in arrays)]
+        self._answer(HTTPStatus.OK, b"".join((parts[0].tobytes(), head, *(part.tobytes() for part in parts[1:]))))
 
     def _ranking(self, request: Mapping[str, Any]) -> None:
         rows = self.server.runs.ranking(

@@ -31,7 +31,7 @@ def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> Renderable
     """Return the powers of an operating point, its efficiency, and the values of variables."""
     model = point.model
     powers = point.powers
-    largest = max((abs(one) for pair in powers.values() for one in pair), default=0.0)
+    largest = max((abs(value) for pair in powers.values() for value in pair), default=0.0)
     rows = [
         (path or model.name, source, loss)
         for path, (source, loss) in powers.items()
@@ -47,7 +47,9 @@ def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> Renderable
 
 
 def _values(point: OperatingPoint, names: Sequence[str]) -> Listed:
-    units = {one.path: str(one.unit) for one in (*point.model.flat_variables, *point.model.flat_parameters)}
+    units = {
+        variable.path: str(variable.unit) for variable in (*point.model.flat_variables, *point.model.flat_parameters)
+    }
     rows = ((name, point[name], units.get(name, "")) for name in names)
     return table("values", "name", "value>.8g", "unit", rows=rows)
 
@@ -100,8 +102,8 @@ def sensitivity_report(result: Sensitivities) -> RenderableType:
     for output in result.outputs:
         title, texts = result.table(output.name)
         rows = (
-            (name, Shown(value, one.value), unit, Shown(text, derivative), Shown(per_cent, relative))
-            for (name, value, unit, text, per_cent), (one, derivative, relative) in zip(
+            (name, Shown(value, quantity.value), unit, Shown(text, derivative), Shown(per_cent, relative))
+            for (name, value, unit, text, per_cent), (quantity, derivative, relative) in zip(
                 texts, result.ranking(output.name), strict=True
             )
         )

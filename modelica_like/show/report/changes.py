@@ -42,7 +42,7 @@ class Change:
 
 def changes(run: Trajectories) -> list[Change]:
     """Return what happens at the events of a run, in their order."""
-    hidden = {one.path for one in run.model.flat_discretes if one.hidden}
+    hidden = {discrete.path for discrete in run.model.flat_discretes if discrete.hidden}
     result: list[Change] = []
     for _, group in groupby(zip(run.events, reasons(run), strict=True), key=lambda pair: pair[0].time):
         pairs = list(group)
@@ -84,17 +84,19 @@ def _visible(run: Trajectories, behind: Sequence[Change], *, timed: bool) -> lis
     first, last = np.searchsorted(run.time, at), max(np.searchsorted(run.time, at, "right") - 1, 0)
     result: list[Change] = []
     numbers: list[Change] = []
-    for one in (one for one in run.model.flat_discretes if not one.hidden and not one.names):
-        before, after = (float(run[one.path][side]) for side in (first, last))
+    for discrete in (one for one in run.model.flat_discretes if not one.hidden and not one.names):
+        before, after = (float(run[discrete.path][side]) for side in (first, last))
         if before != after:
-            owner = one.path.rpartition(".")[0]
+            owner = discrete.path.rpartition(".")[0]
             causes = [change for change in behind if change.owner == owner] or behind
             why = ", ".join(dict.fromkeys(change.because for change in causes if change.because))
-            visible = Change(at, one.path, _value(one.kind, before), _value(one.kind, after), why, causes[0].source)
-            (numbers if one.kind == "number" else result).append(visible)
+            visible = Change(
+                at, discrete.path, _value(discrete.kind, before), _value(discrete.kind, after), why, causes[0].source
+            )
+            (numbers if discrete.kind == "number" else result).append(visible)
     if timed or result:  # numbers change at every tick
         return result
-    owners = (Change(at, one.owner or run.model.name, "", "", one.because, one.source) for one in behind)
+    owners = (Change(at, change.owner or run.model.name, "", "", change.because, change.source) for change in behind)
     return numbers or list(dict.fromkeys(owners))  # several relations of one line say the same
 
 

@@ -60,7 +60,7 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
         fields = [field for field in kind._class_fields.values() if sort is _sort_of(field)]
         head = ("name", "symbol", "unit", "default", "range", "description")
         listings.append(filled(title, head, (_field_row(field, notation) for field in fields)))
-    described = {name: one.description for name, one in kind._tables.items()}
+    described = {name: table.description for name, table in kind._tables.items()}
     described |= {name: words for name, words in texts_of_fields(kind).items() if words}
     structure = (
         (
@@ -76,7 +76,7 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
         for name, mode in kind._class_modes.items()
     )
     listings.append(filled("modes", ("name", "one of (number)", "start", "description"), modes))
-    return [one for one in listings if one.rows]
+    return [listing for listing in listings if listing.rows]
 
 
 def _sort_of(field: Field) -> type[Field]:
@@ -85,7 +85,7 @@ def _sort_of(field: Field) -> type[Field]:
 
 def _connector_row(name: str, connector: Connector, notation: Notation) -> tuple[str, ...]:
     free = "optional" if connector.optional else "free" if connector.may_be_free else ""
-    flows = ", ".join(notation.flow(f"{name}.{one.name}", one.unit_text) for one in connector.fields.values())
+    flows = ", ".join(notation.flow(f"{name}.{field.name}", field.unit_text) for field in connector.fields.values())
     return notation.code(name), type(connector).__name__, flows, free, notation.text(connector.description)
 
 

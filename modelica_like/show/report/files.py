@@ -69,11 +69,11 @@ def write_solution(
         UnknownName, UnitError: a variable cannot be shown in a unit.
         OSError: the file cannot be written.
     """
-    more = [one for one in read_signals(solution.model, show) if not one.plain]
-    columns = {one.name: one.values(solution) for one in more}
+    more = [signal for signal in read_signals(solution.model, show) if not signal.plain]
+    columns = {column.name: column.values(solution) for column in more}
 
     def dataset() -> xarray.Dataset:
-        named = {one.name: ("time", columns[one.name], {"units": one.unit}) for one in more}
+        named = {column.name: ("time", columns[column.name], {"units": column.unit}) for column in more}
         return solution.to_xarray().assign(named)
 
     _write(
@@ -116,11 +116,13 @@ def _rows(
 ) -> None:
     signals = [*named(solution.model, solution.names), *more]
     values, shown = evaluated(solution, signals), Display(solution.model, display)
-    spelled = [one.shown_in(shown) if units else one.unit for one in signals]
-    columns = [shown.converted(values[one.name], one.unit, unit) for one, unit in zip(signals, spelled, strict=True)]
+    spelled = [signal.shown_in(shown) if units else signal.unit for signal in signals]
+    columns = [
+        shown.converted(values[signal.name], signal.unit, unit) for signal, unit in zip(signals, spelled, strict=True)
+    ]
     columns.insert(0, solution.time)
     writer = csv.writer(file)
-    writer.writerow(["time", *(one.name for one in signals)])
+    writer.writerow(["time", *(signal.name for signal in signals)])
     if units:
         writer.writerow(["s", *spelled])
     for row in np.column_stack(columns).tolist():

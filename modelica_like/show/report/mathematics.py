@@ -25,11 +25,11 @@ def mathematics(flat: FlatModel) -> str:
         flat: the model.
     """
     parts, places = dict[type[Component], dict[str, Component]](), dict[type[Component], dict[str, None]]()
-    for one in flat.instances:
-        if one.template.sources:
-            part = flat.components[one.path]
-            parts.setdefault(type(part), {})[one.path or flat.name] = part
-            places.setdefault(type(part), {}).update(dict.fromkeys(map(_place, one.template.sources)))
+    for instance in flat.instances:
+        if instance.template.sources:
+            part = flat.components[instance.path]
+            parts.setdefault(type(part), {})[instance.path or flat.name] = part
+            places.setdefault(type(part), {}).update(dict.fromkeys(map(_place, instance.template.sources)))
     lines = [f"## {flat.name}", f"{flat}."]
     for kind, parts_of in parts.items():
         lines += [
@@ -37,7 +37,11 @@ def mathematics(flat: FlatModel) -> str:
             _class(kind, [*parts_of.values()]),
         ]
         lines.append(f"Source: {', '.join(places[kind])}.")
-    ends = dict.fromkeys((one.origin.path, one.origin.source) for one in flat.linear if one.origin.kind == "connection")
+    ends = dict.fromkeys(
+        (equation.origin.path, equation.origin.source)
+        for equation in flat.linear
+        if equation.origin.kind == "connection"
+    )
     joined = table("", ("joined", "source"), [(cell(path), _place(source)) for path, source in ends])
     if joined:
         lines += ["### Connections", "Potentials are equal, and flows add up to zero.", joined]

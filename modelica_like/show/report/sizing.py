@@ -106,8 +106,13 @@ def check_page(name: str, check: Check) -> RenderableType:
     text = inspect.cleandoc(check.__doc__ or "").partition("\nArgs:")[0].rstrip()
     described = dict(meanings(inspect.cleandoc(check.__doc__ or "")))
     rows = (
-        (one.name, _kind(one), "" if one.required else str(one.default), described.get(one.name, ""))
-        for one in arguments_of(check).values()
+        (
+            argument.name,
+            _kind(argument),
+            "" if argument.required else str(argument.default),
+            described.get(argument.name, ""),
+        )
+        for argument in arguments_of(check).values()
     )
     tables = table("arguments", "name*", "unit", "default", "meaning", rows=rows)
     return Group(f"[bold]{name}[/]", escape(text), "", tables)

@@ -56,7 +56,7 @@ class _Reader:
 
     def defined(self, of: Function, name: str = "") -> list[str]:
         """Return the definition of a method or a function."""
-        arguments = ", ".join(one.arg for one in of.code.args.args if one.arg != "self")
+        arguments = ", ".join(argument.arg for argument in of.code.args.args if argument.arg != "self")
         head = shown(name or of.name)
         head += "" if isinstance(vars(of.owner or object).get(of.name), property) else f"({arguments})"
         lines = list(self.body(of, of.code.body, {}))
@@ -67,8 +67,8 @@ class _Reader:
     def body(self, of: Function, code: Sequence[ast.stmt], names: Names) -> Iterator[str]:
         """Yield the lines of statements, in which local names have a meaning."""
         names = dict(names)
-        for k, one in enumerate(code):
-            match one:
+        for k, statement in enumerate(code):
+            match statement:
                 case ast.Expr(value=ast.Constant()) | ast.Return(value=None) | ast.Raise():
                     pass
                 case ast.Return(value=ast.Call(func=ast.Name(id="iter"))):  # nothing is yielded
@@ -91,9 +91,9 @@ class _Reader:
                     pairs = [ast.Assign([a], b) for a, b in zip(targets, values, strict=True)]
                     yield from self._assigned(of, pairs, names)
                 case ast.Assign():
-                    yield from self._assigned(of, [one], names)
+                    yield from self._assigned(of, [statement], names)
                 case _:
-                    yield self.text(of, one, names)
+                    yield self.text(of, statement, names)
 
     def _either(
         self, of: Function, test: ast.expr, then: Sequence[ast.stmt], other: Sequence[ast.stmt], names: Names
@@ -106,15 +106,15 @@ class _Reader:
 
     def _assigned(self, of: Function, pairs: Sequence[ast.Assign], names: dict[str, ast.expr]) -> Iterator[str]:
         """Give local names to paths; others are lines."""
-        for one in pairs:
-            match one:
+        for pair in pairs:
+            match pair:
                 case ast.Assign(targets=[ast.Name(id=name)], value=ast.Attribute() as value) if _is_path(value):
                     names[name] = self._replaced(of, value, names)
                 case _:
-                    for target in one.targets:
+                    for target in pair.targets:
                         names.pop(ast.unparse(target), None)
-                    targets = " = ".join(self.text(of, target, names) for target in one.targets)
-                    yield f"{targets} = {self.text(of, one.value, names)}"
+                    targets = " = ".join(self.text(of, target, names) for target in pair.targets)
+                    yield f"{targets} = {self.text(of, pair.value, names)}"
 
     def _inlined(self, of: Function, call: ast.Call, names: Names) -> Iterator[str]:
         """Yield what another method yields, in the place of its call."""
@@ -134,8 +134,10 @@ class _Reader:
                 yield self.text(of, call, names)
                 return
         if function is not None:
-            formal = [one.arg for one in function.code.args.args if one.arg != "self"]
-            given = dict(zip(formal, arguments, strict=False)) | {one.arg or "": one.value for one in call.keywords}
+            formal = [argument.arg for argument in function.code.args.args if argument.arg != "self"]
+            given = dict(zip(formal, arguments, strict=False)) | {
+                keyword.arg or "": keyword.value for keyword in call.keywords
+            }
             meant = {name: self._replaced(of, value, names) for name, value in given.items()}
             yield from self.body(function, function.code.body, meant)
 

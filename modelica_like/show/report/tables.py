@@ -111,15 +111,15 @@ def as_data(*shown: Any) -> dict[str, Any]:
     """
     tables: dict[str, list[Any]] = {}
     texts: list[str] = []
-    for one in map(rich_cast, shown):
-        if isinstance(one, Group | Padding):
-            inner = as_data(*(one.renderables if isinstance(one, Group) else (one.renderable,)))
+    for item in map(rich_cast, shown):
+        if isinstance(item, Group | Padding):
+            inner = as_data(*(item.renderables if isinstance(item, Group) else (item.renderable,)))
             for name, records in inner["tables"].items():
                 tables.setdefault(name, []).extend(records)
             texts += inner["text"]
-        elif isinstance(one, Listed | Lines):
-            tables.setdefault(one.name, []).extend(one.records)
+        elif isinstance(item, Listed | Lines):
+            tables.setdefault(item.name, []).extend(item.records)
         else:
-            text = one if isinstance(one, Text) else Text.from_markup(str(one))
+            text = item if isinstance(item, Text) else Text.from_markup(str(item))
             texts += [text.plain] if text.plain.strip() else []
     return {"tables": tables, "text": texts}

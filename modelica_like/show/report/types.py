@@ -43,7 +43,7 @@ def library_table(types: Mapping[str, type[Component]], words: Sequence[str] = (
         UnknownName: there is no such group, or no such type.
     """
     groups = {name: kind.__module__.partition(".")[2] or kind.__module__ for name, kind in types.items()}
-    search = sorted({one for path in groups.values() for one in path.split(".")})
+    search = sorted({word for path in groups.values() for word in path.split(".")})
     if group is not None and group not in search:
         raise UnknownName(
             f"There is no group '{group}'{did_you_mean(group, search) or '.'}", advice=f"There are {', '.join(search)}."
@@ -64,7 +64,7 @@ def library_table(types: Mapping[str, type[Component]], words: Sequence[str] = (
     for column in result.columns:
         column.no_wrap = True
     for column, k in zip(result.columns, (1, 0), strict=False):
-        column.min_width = max((len(one[k]) for one in chosen), default=0)
+        column.min_width = max((len(name[k]) for name in chosen), default=0)
     return result
 
 
@@ -104,7 +104,7 @@ def _part_rows(kind: type[Component], name: str) -> list[tuple[str, ...]]:
     part = kind._class_parts[name]
     which = "replaceable" if name in kind._replaceable else ""
     if isinstance(part, list):
-        return [(f"{name}[{k}]", type(one).__name__, _given(one), which) for k, one in enumerate(part, 1)]
+        return [(f"{name}[{k}]", type(element).__name__, _given(element), which) for k, element in enumerate(part, 1)]
     return [(name, type(part).__name__, _given(part), which)]
 
 

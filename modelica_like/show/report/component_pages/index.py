@@ -19,9 +19,9 @@ def index(types: Mapping[str, type[Component]]) -> str:
         types: by name.
     """
     domains: dict[str, list[str]] = {}
-    for name, kind in sorted(types.items(), key=lambda one: (one[1].__module__.rpartition(".")[2], one[0])):
+    for name, kind in sorted(types.items(), key=lambda item: (item[1].__module__.rpartition(".")[2], item[0])):
         domains.setdefault(domain(kind), []).append(name)
-    largest = sorted(domains.items(), key=lambda one: (one[0] == _SIGNALS, " and " in one[0], -len(one[1])))
+    largest = sorted(domains.items(), key=lambda item: (item[0] == _SIGNALS, " and " in item[0], -len(item[1])))
     links = " · ".join(f"[{title}](#{title.replace(' ', '-')})" for title, _ in largest)
     sections = [
         "# Components",
@@ -40,7 +40,7 @@ def domain(kind: type[Component]) -> str:
     Connectors that may be missing count only if there are no others.
     """
     connectors = kind._class_connectors.values()
-    always = [one for one in connectors if not one.optional] or connectors
+    always = [connector for connector in connectors if not connector.optional] or connectors
     names = sorted({one.stroke.name if one.stroke else type(one).__name__ for one in always})
     return " and ".join(names) or _SIGNALS
 

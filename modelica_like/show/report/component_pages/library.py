@@ -76,8 +76,8 @@ def examples_by_type(folder: Path) -> dict[str, list[Example]]:
 def _once(examples: Sequence[Example]) -> list[Example]:
     """Return one example per file, with its simplest line."""
     files: dict[Path, list[Example]] = {}
-    for one in examples:
-        files.setdefault(one.path, []).append(one)
+    for example in examples:
+        files.setdefault(example.path, []).append(example)
     return [min(of, key=lambda one: simplicity(one.line)) for of in files.values()]
 
 
@@ -98,7 +98,7 @@ def _inline(value: Any) -> str:
     """Return a value as TOML in one line."""
     if isinstance(value, dict):
         entries = cast("dict[str, Any]", value).items()
-        return "{ " + ", ".join(f"{_key(key)} = {_inline(one)}" for key, one in entries) + " }"
+        return "{ " + ", ".join(f"{_key(key)} = {_inline(entry)}" for key, entry in entries) + " }"
     if isinstance(value, list):
         return f"[{', '.join(map(_inline, cast('list[Any]', value)))}]"
     return json.dumps(value, ensure_ascii=False)

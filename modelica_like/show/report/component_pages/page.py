@@ -60,7 +60,7 @@ def page(kind: type[Component], file: Path, examples: Sequence[Example] = ()) ->
     definitions = written(source.definitions())
     listings = {title: table("", head, rows) for title, head, rows in declared(kind, _notation(_optional(source)))}
     first = {title: listings.pop(title) for title in _FIRST if title in listings}
-    lines = [one.line for one in examples if one.line]
+    lines = [example.line for example in examples if example.line]
     sections = [
         f"# {kind.__name__}",
         f"[All components](../README.md) · {module_title(kind.__module__)} · {source_link(kind, file)}",
@@ -121,7 +121,9 @@ def _optional(source: Source) -> dict[str, str]:
 def _parts(kind: type[Component]) -> list[str]:
     """Return the parts that the class declares, and how it builds others."""
     by_name = {name: part if isinstance(part, list) else [part] for name, part in kind._class_parts.items()}
-    rows = ((f"`{name}`", page_link(type(one)), _values(one)) for name, part in by_name.items() for one in part)
+    rows = (
+        (f"`{name}`", page_link(type(element)), _values(element)) for name, part in by_name.items() for element in part
+    )
     code = dedent(inspect.getsource(kind.build)).strip() if kind.build is not Component.build else ""
     parts = [table("", ("part", "type", "values"), rows), code and f"```python\n{code}\n```"]
     return ["## Parts", *parts] if any(parts) else []
@@ -145,7 +147,7 @@ def _bases(kind: type[Component], file: Path) -> list[str]:
 def _example_links(examples: Sequence[Example], file: Path) -> list[str]:
     if not examples:
         return []
-    links = [f"- [{one.path.name}]({relative(one.path, file)}): {cell(one.title)}" for one in examples]
+    links = [f"- [{example.path.name}]({relative(example.path, file)}): {cell(example.title)}" for example in examples]
     more = _folded(f"{len(links) - _FEW} more netlists", "\n".join(links[_FEW:]))
     return ["## In netlists", "\n".join(links[:_FEW]), more]
 
@@ -159,9 +161,9 @@ def written(says: Iterable[Said]) -> str:
     parts: list[str] = []
     for _, group in groupby(says, type):
         many = list(group)
-        parts += [one for one in many if isinstance(one, str) and one]
-        parts += filter(None, [_equations([one for one in many if isinstance(one, Term)])])
-        parts += filter(None, [_events([one for one in many if isinstance(one, Event)])])
+        parts += [item for item in many if isinstance(item, str) and item]
+        parts += filter(None, [_equations([item for item in many if isinstance(item, Term)])])
+        parts += filter(None, [_events([item for item in many if isinstance(item, Event)])])
     # Consecutive ends become one list, consecutive source texts one text.
     return "\n\n".join(parts).replace("`\n\n- `", "`\n- `").replace("\n```\n\n```python\n", "\n")
 

@@ -40,17 +40,17 @@ def curves(run: Trajectories, patterns: Sequence[str] = ()) -> dict[str, Any]:
     rows = np.unique(np.concatenate([spread, beside])).astype(np.intp)
     shown, curve = Display(run.model), evaluated(run, signals)
     panels: dict[str, dict[str, Any]] = {}
-    for one in signals:
-        unit = one.shown_in(shown)
-        title = with_unit(quantity_of(one), unit)
-        values = one.driving * shown.converted(curve[one.name][rows], one.unit, unit)
+    for signal in signals:
+        unit = signal.shown_in(shown)
+        title = with_unit(quantity_of(signal), unit)
+        values = signal.driving * shown.converted(curve[signal.name][rows], signal.unit, unit)
         curve_data = {
-            "name": one.label,
-            "path": one.name if one.plain else "",
+            "name": signal.label,
+            "path": signal.name if signal.plain else "",
             "values": [float(f"{v:.6g}") for v in values],
         }
         panels.setdefault(title, {"title": title, "curves": []})["curves"].append(curve_data)
-    hidden = {one.path for one in run.model.flat_discretes if one.hidden}
+    hidden = {discrete.path for discrete in run.model.flat_discretes if discrete.hidden}
     modes = dict.fromkeys(event.mode for event in run.events if event.mode not in hidden)
     return {
         "times": [float(f"{t:.9g}") for t in run.time[rows]],

@@ -66,7 +66,7 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
     """
     folder, drawn = Path(__file__).parent, curves(run, show)
     # Of the parts that are not inside of others, the last one is closest to the load.
-    paths = ([one["path"] for one in panel["curves"] if one["path"]] for panel in drawn["panels"])
+    paths = ([curve["path"] for curve in panel["curves"] if curve["path"]] for panel in drawn["panels"])
     ends = [min(reversed(some), key=lambda path: path.count(".")) for some in paths if some]
     left = escape(drawn.pop("left")).replace("--show", "<code>--show</code>")
     hint = f"{_READ} {left}" if drawn["panels"] else _NO_CURVES
@@ -94,7 +94,7 @@ def _of_equations(drive: Component, run: Solution, ends: Sequence[str]) -> Itera
     yield "What matters", _attempt(lambda: ranking(run, ends))
     yield "Small motions at the end", _attempt(lambda: small_motions(drive, run))
     values = zip(run.model.flat_parameters, run.model.p, strict=True)
-    rows = [(one.path, f"{value:.6g}", str(one.unit), one.description) for one, value in values]
+    rows = [(parameter.path, f"{value:.6g}", str(parameter.unit), parameter.description) for parameter, value in values]
     yield "Parameters", details(table(("parameter", "value>", "unit", "description"), rows))
     yield "Start", _attempt(lambda: _start(drive, run))
     packages = f"{tool()}, CasADi {ca.__version__}, Python {platform.python_version()}"
@@ -115,10 +115,10 @@ def _attempt(make: Callable[[], str]) -> str:
 def _happens(drive: Component | None, run: Trajectories) -> str:
     """Events in words, grouped by time, and the notices of the run."""
     instants: dict[float, dict[str, list[Change]]] = {}
-    for one in changes(run):
-        if one.before == one.after and one.after:  # a kink of a curve
+    for change in changes(run):
+        if change.before == change.after and change.after:  # a kink of a curve
             continue
-        instants.setdefault(one.time, {}).setdefault(one.path, []).append(one)
+        instants.setdefault(change.time, {}).setdefault(change.path, []).append(change)
     lines = [
         f"<li><b>{time:.6g} s</b> {'; '.join(escape(_told(run, some)) for some in paths.values())}.</li>"
         for time, paths in list(instants.items())[:_MOST_EVENTS]
@@ -135,7 +135,7 @@ def _happens(drive: Component | None, run: Trajectories) -> str:
 def _told(run: Trajectories, some: Sequence[Change]) -> str:
     """Return the changes of one thing at an instant: `clutch becomes stuck (slip reached zero)`."""
     last = some[-1]
-    why = ", ".join(dict.fromkeys(filter(None, (*(one.because for one in some), _slid(run, last)))))
+    why = ", ".join(dict.fromkeys(filter(None, (*(change.because for change in some), _slid(run, last)))))
     if not last.after:
         return f"{last.path}: {why}"
     discrete = next((one for one in run.model.flat_discretes if one.path == last.path), None)
@@ -151,8 +151,8 @@ def _slid(run: Trajectories, change: Change) -> str:
     held = {(mode.path, mode.names[number]) for mode, number in modes}
     if (change.path, change.after) not in held:
         return ""
-    left = (one.time for one in run.events if one.time < change.time and (one.mode, one.before) in held and
-            one.mode == change.path)  # fmt: skip
+    left = (event.time for event in run.events if event.time < change.time and (event.mode, event.before) in held and
+            event.mode == change.path)  # fmt: skip
     begin = max(left, default=float(run.time[0]))
     lost = run.energy(begin, change.time)[change.owner].lost if change.time > begin else 0.0
     size, unit = (_KILO, "kJ") if lost >= 10.0 * _KILO else (1.0, "J")
