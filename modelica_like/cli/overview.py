@@ -119,12 +119,7 @@ def _candidates(before: list[str], now: str) -> Iterable[tuple[str, str]]:
     parameters_of_command = parameters(command(before[0])) if before else []
     if action and action.nargs != 0:
         begin = f"{name}=" if equals else ""
-        return (
-            (begin + value, "")
-            for parameter in parameters_of_command
-            if parameter.name == action.dest
-            for value in _values(parameter)
-        )
+        return ((begin + value, "") for p in parameters_of_command if p.name == action.dest for value in _values(p))
     if now.startswith("-"):
         return [(word, action.help or "") for word, action in of._option_string_actions.items()]
     if not before:

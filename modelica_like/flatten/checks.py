@@ -46,12 +46,8 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
     """
     variables = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
     unknowns = [n for n in variables if n not in joined]
-    used = {
-        name: connector for name, connector in component.connectors.items() if connector.used and name not in joined
-    }
-    unknowns += [
-        f"{name}.{n}" for name, connector in used.items() for n, f in connector.quantities.items() if f.is_flow
-    ]
+    used = {name: c for name, c in component.connectors.items() if c.used and name not in joined}
+    unknowns += [f"{name}.{n}" for name, c in used.items() for n, f in c.quantities.items() if f.is_flow]
     if len(equations) == len(unknowns):
         return
     kind = type(component).__name__
@@ -80,11 +76,7 @@ def _driven_input(component: Component, equations: list[Equation]) -> str:
     leaves = (symbol for e in equations for side in (e.left, e.right) for symbol in symbols_in(side))
     foreign = (symbol for symbol in leaves if isinstance(symbol.owner, Component) and symbol.owner is not component)
     prefix = component.path
-    paths = (
-        f"{symbol.owner.path}.{symbol.name}"
-        for symbol in foreign
-        if isinstance(symbol.owner.fields.get(symbol.name), Input)
-    )
+    paths = (f"{s.owner.path}.{s.name}" for s in foreign if isinstance(s.owner.fields.get(s.name), Input))
     return next((path.removeprefix(f"{prefix}.") for path in paths), "")
 
 

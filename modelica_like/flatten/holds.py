@@ -68,8 +68,7 @@ def ideal_forms(component: Component, residuals: list[Any]) -> tuple[IdealForm, 
         for row, residual in enumerate(residuals):
             cases = [ca.substitute(residual, symbol, ca.SX(k)) for k in range(2)]
             if all(
-                _only(case, zero) and _number(ca.jacobian(case, zero)) != 0.0
-                for case, zero in zip(cases, zeros, strict=True)
+                _only(c, zero) and _number(ca.jacobian(c, zero)) != 0.0 for c, zero in zip(cases, zeros, strict=True)
             ):
                 forms.append(IdealForm(mode.name, (zeros[0].name, zeros[1].name), row))
                 break

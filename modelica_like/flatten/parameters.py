@@ -180,9 +180,7 @@ class Parameters:
             [parameter.value for parameter in self.flat]
         )
         pairs = zip(self.derived, numbers.full().ravel(), strict=True)
-        self.derived = [
-            replace(parameter, value=parameter.checked(float(number), f"{number:g}")) for parameter, number in pairs
-        ]
+        self.derived = [replace(p, value=p.checked(float(number), f"{number:g}")) for p, number in pairs]
 
     def formulas(self) -> Any:
         """Return the expressions of the parameters that follow from others."""

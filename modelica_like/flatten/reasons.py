@@ -33,9 +33,7 @@ def reason(transition: Transition, path: Callable[[Symbol], str]) -> str:
     text = _condition(transition.when, path)
     if len(text) <= _LONGEST and "…" not in text:
         return text
-    named = dict.fromkeys(
-        path(symbol) for symbol in symbols_in(transition.when) if not isinstance(_field(symbol), Parameter)
-    )
+    named = dict.fromkeys(path(s) for s in symbols_in(transition.when) if not isinstance(_field(s), Parameter))
     return f"its condition on {', '.join(named)} holds"
 
 

@@ -150,9 +150,7 @@ class _Points:
 
     def __init__(self, whole: Any) -> None:
         symbols = symbols_in(whole)
-        moving = [
-            symbol for symbol in symbols if symbol is TIME or (symbol.owner is not None and is_a(symbol, Variable))
-        ]
+        moving = [s for s in symbols if s is TIME or (s.owner is not None and is_a(s, Variable))]
         others = [symbol for symbol in symbols if not any(symbol is other for other in moving)]
         fixed = [symbol for symbol in others if symbol.owner is not None and is_fixed(symbol)]
         whole_numbers = [symbol for symbol in others if not any(symbol is other for other in fixed)]

@@ -253,9 +253,7 @@ def _build(component: Component) -> Template:
         discretes=tuple(names.discretes),
         residual=residual,
         sources=sources,
-        initial=tuple(
-            (start.name, e.source.text.removeprefix("yield ")) for start, e in zip(starts, initial, strict=True)
-        ),
+        initial=tuple((s.name, e.source.text.removeprefix("yield ")) for s, e in zip(starts, initial, strict=True)),
         incidence=_rows(residual.jac_sparsity(0, 0)),
         linear=linear,
         coefficients=coefficients,

@@ -123,10 +123,7 @@ class Wiring:
         for driver, sink, source in self.signals:
             if not all((symbol.owner._owner or symbol.owner).units_checked for symbol in (driver, sink)):
                 continue
-            units = [
-                self.inferred.get((id(symbol.owner), symbol.name)) or unit_of_field(symbol.owner, symbol.name)
-                for symbol in (driver, sink)
-            ]
+            units = [self.inferred.get((id(s.owner), s.name)) or unit_of_field(s.owner, s.name) for s in (driver, sink)]
             if not same_dimension(*units):
                 what = f"{_name(driver)} is in {units[0]}, {_name(sink)} expects {units[1]}."
                 self._refuse(what, source, "Give the source's parameters in that unit.")

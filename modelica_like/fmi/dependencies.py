@@ -116,9 +116,7 @@ class Dependencies(Following):
 
     def _start_value(self, position: int) -> set[Known]:
         """A start value: set by an importer, or its formula."""
-        return {("start", position)} | {
-            quantity for quantity in self._row("start_values", position) if quantity[0] in "tpu"
-        }
+        return {("start", position)} | {q for q in self._row("start_values", position) if q[0] in "tpu"}
 
     @cached_property
     def _initial_states(self) -> Rows:
@@ -178,9 +176,7 @@ class Dependencies(Following):
         return references
 
     def _references(self, quantities: Iterable[Known], names: Sequence[str]) -> list[int]:
-        return sorted(
-            self._reference[quantity] for quantity in quantities if quantity[0] in names and quantity in self._reference
-        )
+        return sorted(self._reference[q] for q in quantities if q[0] in names and q in self._reference)
 
 
 def sparsity_rows(function: Any, output: int = 0) -> Rows:

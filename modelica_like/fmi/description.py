@@ -154,9 +154,7 @@ class _Writer:
 
     def _units(self, top: Element) -> None:
         """Define every unit, with its base units, and how people read it."""
-        used = {
-            name: variable.unit for variable in self.face.variables if (name := unit_name(variable.unit)) is not None
-        }
+        used = {name: v.unit for v in self.face.variables if (name := unit_name(v.unit)) is not None}
         definitions = element(top, "UnitDefinitions") if used else top
         for name, unit in sorted(used.items()):
             defined = element(definitions, "Unit", name=name)
@@ -216,10 +214,9 @@ class _Writer:
         face = self.face
         listed = {*face.states, *face.derivatives, *face.outputs}
         initial = (
-            variable.reference
-            for variable in face.variables
-            if (variable.reference in listed and variable.initial != "exact")
-            or variable.causality == "calculatedParameter"
+            v.reference
+            for v in face.variables
+            if (v.reference in listed and v.initial != "exact") or v.causality == "calculatedParameter"
         )
         groups = (
             ("Output", "Outputs", face.outputs), ("ContinuousStateDerivative", "Derivatives", face.derivatives),

@@ -48,11 +48,7 @@ def index_page(interface: Interface, description: str, tool: str, equations: Lis
         f"{escape(tool)} from an acausal model; the C sources are in <code>sources/</code>.</p>",
     ]  # fmt: skip
     for heading, causalities in _GROUPS:
-        variables = [
-            variable
-            for variable in interface.variables
-            if variable.causality in causalities and variable.slot[0] != "guard"
-        ]
+        variables = [v for v in interface.variables if v.causality in causalities and v.slot[0] != "guard"]
         if variables:
             parts += [f"<h2>{heading}</h2>", _table(variables)]
     if equations:

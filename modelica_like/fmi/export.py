@@ -177,9 +177,7 @@ def compiled_open(
     if tables:
         drive = with_tunable_tables(drive, tables)
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
-    lines = (
-        (instance, [source.text or str(source) for source in instance.template.sources]) for instance in flat.instances
-    )
+    lines = ((i, [source.text or str(source) for source in i.template.sources]) for i in flat.instances)
     equations = [(instance.path, instance.template.component, texts) for instance, texts in lines if texts]
     return as_asked(compile(reduce(flat))), str(getattr(drive, "_description", "") or ""), equations
 

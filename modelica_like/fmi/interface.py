@@ -225,9 +225,7 @@ class _Builder:
     def discretes(self, modes: ModesAs) -> None:
         """Modes, and other discrete values, which are local; equations determine some at the start, too."""
         determined = {row.reset.index for row in self.model.update_rows if row.at_start}
-        for k, discrete in (
-            (k, discrete) for k, discrete in enumerate(self.model.flat_discretes) if not discrete.hidden
-        ):
+        for k, discrete in ((k, d) for k, d in enumerate(self.model.flat_discretes) if not d.hidden):
             values = ", ".join(f"{k}: {name}" for k, name in enumerate(discrete.names))
             description = " – ".join(text for text in (discrete.description, values) if text)
             slot, about = ("discrete", k), {"unit": discrete.unit, "description": description}
@@ -255,9 +253,7 @@ class _Builder:
 
     def arrays(self) -> Iterator[FmuVariable]:
         """Tables: parameters `clutch.mu_pos[2,1]` belong together."""
-        cells = (
-            variable for variable in self.found if variable.causality == "parameter" and variable.name.endswith("]")
-        )
+        cells = (v for v in self.found if v.causality == "parameter" and v.name.endswith("]"))
         for number, (name, group) in enumerate(groupby(cells, lambda variable: variable.name.rpartition("[")[0])):
             numbers = tuple(group)
             dimensions = tuple(int(size) for size in numbers[-1].name[len(name) + 1 : -1].split(","))

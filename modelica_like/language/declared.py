@@ -191,11 +191,7 @@ def refuse_collection(label: str, value: object, where: Callable[[], Source] | N
     if not isinstance(value, list | tuple | dict):
         return
     elements = list(cast("Iterable[Any]", value.values() if isinstance(value, dict) else value))
-    inner = [
-        part
-        for element in elements
-        for part in cast("Iterable[Any]", element if isinstance(element, tuple) else (element,))
-    ]
+    inner = [part for e in elements for part in cast("Iterable[Any]", e if isinstance(e, tuple) else (e,))]
     if any(isinstance(connector, Connector) for connector in inner):
         advice = "Give each a name of its own: flange_1 and flange_2; where their number varies, by setattr in `build`."
     elif any(isinstance(connector, Declared) for connector in inner):

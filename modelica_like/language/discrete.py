@@ -68,11 +68,7 @@ def marker(kind: MarkerKind, of: Expr, offset: Scalar = 0.0) -> Marker:
     wanted: Any = ca.vertcat(of, offset)
     owner = _owner_in(of)
     markers: list[Marker] = _timed if owner is None else owner.__dict__.setdefault("_markers", [])
-    same = (
-        marker_
-        for marker_ in markers
-        if marker_.kind == kind and ca.is_equal(ca.vertcat(marker_.of, marker_.offset), wanted, 99)
-    )
+    same = (m for m in markers if m.kind == kind and ca.is_equal(ca.vertcat(m.of, m.offset), wanted, 99))
     match = next(same, None)
     if match is None:
         markers.append(match := Marker(kind, of, offset))
@@ -87,9 +83,7 @@ def _owner_in(expression: Expr) -> Any:
 
 def moves(expression: Expr) -> bool:
     """Return whether an expression changes between events: it has time or a variable in it."""
-    return any(
-        symbol is TIME or (symbol.owner is not None and is_a(symbol, Variable)) for symbol in symbols_in(expression)
-    )
+    return any(s is TIME or (s.owner is not None and is_a(s, Variable)) for s in symbols_in(expression))
 
 
 def is_a(symbol: Symbol, kind: type | tuple[type, ...]) -> bool:
@@ -358,9 +352,7 @@ def when(condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> W
 def _at_tick(value: Scalar) -> Expr:
     """Return a new value with what `sample` and `previous` mean at a tick."""
     whole: Any = ca.SX(cast(Any, value))
-    marked = [
-        symbol for symbol in symbols_in(whole) if isinstance(symbol, Marker) and symbol.kind in ("sample", "previous")
-    ]
+    marked = [s for s in symbols_in(whole) if isinstance(s, Marker) and s.kind in ("sample", "previous")]
     if not marked:
         return whole
     meant = (pre(marker_.of) if marker_.kind == "previous" else _at_tick(marker_.of) for marker_ in marked)

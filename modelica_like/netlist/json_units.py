@@ -52,9 +52,7 @@ class Quantities:
 
     def _of(self, unit: Unit) -> str:
         return _whole(
-            pattern
-            for listed, pattern in self._patterns.items()
-            if same_dimension(listed, unit) and not counts_turns(listed, unit)
+            pattern for u, pattern in self._patterns.items() if same_dimension(u, unit) and not counts_turns(u, unit)
         )
 
 

@@ -128,9 +128,7 @@ class Curves(Shown):
         )
         scales = (row.largest / row.relative for row in rows)
         return tuple(
-            difference
-            for difference, scale in zip(differences, scales, strict=True)
-            if abs(difference.second - difference.first) > _SAME_START * scale
+            d for d, scale in zip(differences, scales, strict=True) if abs(d.second - d.first) > _SAME_START * scale
         )
 
     def __getitem__(self, signal: str) -> Deviation:

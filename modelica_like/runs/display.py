@@ -33,9 +33,7 @@ class Display:
 
     def __init__(self, model: Any, chosen: Mapping[str, str] | None = None) -> None:
         self._own = {variable.path: str(variable.unit) for variable in (*model.flat_variables, *model.flat_discretes)}
-        self._differences = {
-            variable.path for variable in model.flat_variables if getattr(variable, "difference", False)
-        }
+        self._differences = {v.path for v in model.flat_variables if getattr(v, "difference", False)}
         wanted = {**getattr(model, "settings", {}).get("display", {}), **(chosen or {})}
         self._quantities: dict[str, str] = {}
         self._paths: dict[str, str] = {}

@@ -45,10 +45,9 @@ def read_columns(path: Path) -> dict[str, tuple[Vector, str]]:
         if said
         else next(
             (
-                separator_
-                for separator_ in ";\t"
-                if separator_
-                in next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+                s
+                for s in ";\t"
+                if s in next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
             ),
             ",",
         )

@@ -152,11 +152,7 @@ def unit_of(formula: Formula, units: dict[str, str], model: str) -> str:
     if str(formula_unit) in QUANTITIES:
         return str(formula_unit)
     return next(
-        (
-            quantity
-            for quantity in QUANTITIES
-            if quantity not in _KEPT and same_dimension(parse_unit(quantity), formula_unit)
-        ),
+        (q for q in QUANTITIES if q not in _KEPT and same_dimension(parse_unit(q), formula_unit)),
         str(formula_unit),
     )
 

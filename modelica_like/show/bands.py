@@ -74,11 +74,7 @@ def mode_spans(run: Trajectories, mode: str) -> tuple[tuple[float, float, str], 
         number = int(run[mode][0])
         names = [
             next(
-                (
-                    discrete.names[number]
-                    for discrete in run.model.flat_discretes
-                    if discrete.path == mode and discrete.names
-                ),
+                (d.names[number] for d in run.model.flat_discretes if d.path == mode and d.names),
                 "",
             )
         ]

@@ -207,11 +207,7 @@ def quantity(unit: str) -> str:
 
 def _of_parts(solution: Trajectories) -> list[Any]:
     """Return the variables of parts without their connectors and inputs."""
-    return [
-        variable
-        for variable in solution.model.flat_variables
-        if variable.kind in ("local", "output") and not variable.hidden
-    ]
+    return [v for v in solution.model.flat_variables if v.kind in ("local", "output") and not v.hidden]
 
 
 def _quantities_left(solution: Trajectories, drawn: Sequence[str]) -> list[str]:

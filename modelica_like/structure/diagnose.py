@@ -153,9 +153,7 @@ def _network(
 ) -> list[str]:
     """Return the parts that the connections of a domain join with those found."""
     sets = [origin.path.split(" – ") for equation in model.linear if (origin := equation.origin).kind == "connection"]
-    joined = [
-        {ends[end][0] for end in nodes} for nodes in sets if nodes[0] in ends and ends[nodes[0]][1].domain is domain
-    ]
+    joined = [{ends[end][0] for end in n} for n in sets if n[0] in ends and ends[n[0]][1].domain is domain]
     network = {path for path, connector in connectors if connector.domain is domain}
     while larger := [nodes for nodes in joined if not (nodes <= network or nodes.isdisjoint(network))]:
         network = network.union(*larger)

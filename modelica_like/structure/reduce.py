@@ -301,15 +301,11 @@ def _assemble(
         nominals=tuple(levels[s].nominal for s in states),
         z_guesses=tuple(levels[n].guess for n in z_levels),
         blocks=tuple(solved.blocks),
-        determinants=tuple(
-            (*blocks[number], determinant) for number, determinant in zip(numbers, determinants, strict=True)
-        ),
+        determinants=tuple((*blocks[number], d) for number, d in zip(numbers, determinants, strict=True)),
         index=max(counts, default=0) + 1,
         differentiated=tuple(system.origins[k] for k, count in enumerate(counts) if count),
         system=system,
-        implicit_blocks=tuple(
-            pair for pair, block in zip(blocks, solved.blocks, strict=True) if block.kind == "implicit"
-        ),
+        implicit_blocks=tuple(pair for pair, b in zip(blocks, solved.blocks, strict=True) if b.kind == "implicit"),
         level_values=level_values,
         explicit=tuple((unknowns[k], expression) for k, expression in solved.order),
     )

@@ -107,9 +107,7 @@ def open_loop(drive: Component | str | Path, signal: str, at: At = None) -> Loop
         raise LanguageError("A compiled drive has no loop to open.", advice="Give the component or the netlist.")
     flat = flatten(drive if isinstance(drive, Component) else load(drive), disturbed=signal)
     added = flat.inputs[-1]
-    sends = any(
-        flat.variables[equation.terms[0][0]].path == signal for equation in flat.linear if added in dict(equation.terms)
-    )
+    sends = any(flat.variables[e.terms[0][0]].path == signal for e in flat.linear if added in dict(e.terms))
     name = flat.variables[added].path
     closed = linearize(compile(reduce(flat)), at, inputs=[name], outputs=[signal])
     # What arrives at an input is what comes back, and what is added.

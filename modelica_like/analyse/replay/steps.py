@@ -249,8 +249,7 @@ class StepFunctions:
         slopes = self._equations(t, x, z, p, u, d)[1]
         rate = ca.mtimes(of_x, slopes)
         shifted = [
-            ca.kron(ca.SX.eye(len(block)), of_x + slopes - rate) - h * ca.kron(ca.SX(ca.DM(block)), rate)
-            for block in blocks
+            ca.kron(ca.SX.eye(len(b)), of_x + slopes - rate) - h * ca.kron(ca.SX(ca.DM(b)), rate) for b in blocks
         ]
         return ca.Function(name, [t, h, x, z, p, u, d], shifted)
 

@@ -143,9 +143,7 @@ def either_first(model: CompiledDae, before: Point, events: tuple[Event, ...], a
     """
     pair = [model.transitions[event.transition] for event in events if not event.round and event.transition >= 0]
     held = {(model.holds[k].mode, model.holds[k].number) for k in holding(model, after)}
-    if len(pair) != 2 or any(
-        transition.timed or (transition.mode, transition.target) not in held for transition in pair
-    ):
+    if len(pair) != 2 or any(t.timed or (t.mode, t.target) not in held for t in pair):
         return False
     for first, second in (pair, pair[::-1]):
         alone = before.copy()

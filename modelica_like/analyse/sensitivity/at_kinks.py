@@ -126,9 +126,7 @@ def _in_other_modes(chain: Replay, position: int) -> Iterator[Point]:
     for node in (chain.nodes[0], chain.nodes[-1]):
         yield node
         by = slopes(model, node, "guards").theta[:, position]
-        for mode in {
-            transition.mode for transition in model.transitions if not transition.timed and by[transition.index]
-        }:
+        for mode in {t.mode for t in model.transitions if not t.timed and by[t.index]}:
             for number in range(len(model.flat_discretes[mode].names)):
                 other = node.copy()
                 other.d[mode] = number
@@ -241,10 +239,7 @@ class Sides:
         """Errors of what is read."""
         looser = self._here(_LOOSER)
         tolerances = _SAFE * self._options(1.0).atol * self.solution.model.nominals
-        rest = [
-            sum(float(np.abs(row[: len(tolerances)]) @ tolerances) for _, row in reading.parts)
-            for reading in self.readings
-        ]
+        rest = [sum(float(np.abs(row[: len(tolerances)]) @ tolerances) for _, row in r.parts) for r in self.readings]
         return np.array(rest) + (np.abs(here) if looser is None else np.abs(looser - here))
 
     def error(self, candidate: Candidate) -> NoGradient | None:

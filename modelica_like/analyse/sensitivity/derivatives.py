@@ -184,8 +184,8 @@ def _of_rounding(solution: Solution, outputs: Sequence[Output], values: Sequence
             if abs(value) <= _NOTHING * largest:
                 yield (
                     f"{output.name} is zero up to rounding, and so are its derivatives: {output.path} has the other "
-                    f"sign, up to {largest * largest.sign:.6g} {largest.unit}. Ask for peak({output.path}), the largest "
-                    "amount."
+                    f"sign, up to {largest * largest.sign:.6g} {largest.unit}. Ask for peak({output.path}), the "
+                    "largest amount."
                 )
 
 

@@ -112,9 +112,7 @@ class Sensitivities(Shown):
             most: largest number of parameters.
         """
         quantity = self.outputs[_position(self.outputs, output, "output")]
-        ranking = [
-            (parameter, derivative) for parameter, derivative, _ in self.ranking(output) if parameter.value * derivative
-        ]
+        ranking = [(p, derivative) for p, derivative, _ in self.ranking(output) if p.value * derivative]
         rest = f"Not drawn: {len(ranking) - most} parameters with less effect." if len(ranking) > most else ""
         ranking = ranking[:most]
         places, unit = np.arange(len(ranking))[::-1], quantity.unit_text

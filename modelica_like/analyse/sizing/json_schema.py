@@ -56,9 +56,7 @@ def schema() -> dict[str, Any]:
 def _check(check: Check, quantities: Quantities) -> dict[str, Any]:
     text = inspect.cleandoc(check.__doc__ or "")
     described = dict(meanings(text))
-    properties = {
-        name: _argument(argument, described.get(name, ""), quantities) for name, argument in arguments_of(check).items()
-    }
+    properties = {name: _argument(a, described.get(name, ""), quantities) for name, a in arguments_of(check).items()}
     result = hints(check)["return"]
     lines = [field.name for field in dataclasses.fields(result)] if dataclasses.is_dataclass(result) else []
     common = {

@@ -143,9 +143,7 @@ class _Reader:
             is_name = said != "" if own else said.isidentifier()
             chosen = said if is_name else _word(_text(source))
             used = [link.name for link in links]
-            name = next(
-                candidate for candidate in chain([chosen], (f"{chosen}_{k}" for k in count(2))) if candidate not in used
-            )
+            name = next(c for c in chain([chosen], (f"{chosen}_{k}" for k in count(2))) if c not in used)
             links.append(Link(name, self._port(source), tuple(map(self._port, taken))))
         return tuple(links)
 

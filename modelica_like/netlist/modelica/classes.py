@@ -53,9 +53,7 @@ class Classes:
             ModelicaTextError: there is none.
         """
         every = [inner for outer in self.own for inner in outer.walk()]
-        models = [
-            candidate for candidate in every if candidate.kind in ("model", "block", "class") and not candidate.partial
-        ]
+        models = [c for c in every if c.kind in ("model", "block", "class") and not c.partial]
         outermost = [model for model in models if model.owner is None] or models
         matches = (
             [candidate for candidate in every if candidate.path == name or candidate.name == name]

@@ -118,9 +118,7 @@ class _Form:
     def _through(self, block: Component) -> bool:
         """Pass units through a block; tell whether one was found."""
         kind = type(block).__name__
-        ports = [
-            name for name, field in block.fields.items() if isinstance(field, Input | Output) and field.unit == ANY
-        ]
+        ports = [name for name, f in block.fields.items() if isinstance(f, Input | Output) and f.unit == ANY]
         if kind == "Product":
             y, u1, u2 = (self._unit(block, name) for name in ("y", "u1", "u2"))
             units_of = {

@@ -85,14 +85,10 @@ def _events(component: Component) -> list[str]:
     for name, mode in component.modes.items():
         goes = [one for one in events if isinstance(one, Transition) and one.mode.mode is mode and not one.fails]
         begins = [one for one in events if isinstance(one, StartMode) and one.mode.mode is mode]
-        chosen = " else".join(
-            f"if {_text(begin.when, component, True)} then {mode.number(begin.target)}" for begin in begins
-        )
+        chosen = " else".join(f"if {_text(b.when, component, True)} then {mode.number(b.target)}" for b in begins)
         first = str(mode.number(component.start_mode(name)))
         first = f"{chosen} else {first}" if chosen else first
-        rest = "".join(
-            f" elseif {_due(transition, component)} then {mode.number(transition.target)}" for transition in goes
-        )
+        rest = "".join(f" elseif {_due(t, component)} then {mode.number(t.target)}" for t in goes)
         name = identifier(name)
         lines.append(f"  {name} = if initial() then ({first}){rest} else pre({name});")
     resets = [one for one in events if isinstance(one, Transition) and one.reset]
@@ -141,9 +137,7 @@ def _check_reset(component: Component, target: Symbol, value: Any) -> None:
     if not isinstance(component.fields.get(target.name), Discrete):
         return
     equations = (as_statement(item, source, "") for item, source in located(component.equations()))
-    sides = [
-        side for equation in equations if isinstance(equation, Equation) for side in (equation.left, equation.right)
-    ]
+    sides = [side for e in equations if isinstance(e, Equation) for side in (e.left, e.right)]
     states = {one.name for side in sides for one in symbols_in(side) if one.order}
     for symbol in symbols_in(ca.SX(value)):
         if (
@@ -158,11 +152,7 @@ def _check_reset(component: Component, target: Symbol, value: Any) -> None:
 
 
 def _declarations(component: Component, write_formula: Callable[[Formula], str], driven: frozenset[str]) -> list[str]:
-    lines = [
-        f"  {connector_class(connector)} {identifier(key)};"
-        for key, connector in component.connectors.items()
-        if connector.used
-    ]
+    lines = [f"  {connector_class(c)} {identifier(key)};" for key, c in component.connectors.items() if c.used]
     for key, field in component.fields.items():
         if isinstance(field, Parameter) or (isinstance(field, Input) and key not in driven):
             value = component.value(key)

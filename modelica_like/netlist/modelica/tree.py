@@ -197,9 +197,7 @@ def substituted(expression: Expr, values: dict[str, Expr]) -> Expr:
         name, given, named = expression.args
         named = tuple((key, substituted(value, values)) for key, value in named)
         return Expr("call", (name, tuple(substituted(argument, values) for argument in given), named), expression.line)
-    args = tuple(
-        substituted(argument, values) if isinstance(argument, Expr) else argument for argument in expression.args
-    )
+    args = tuple(substituted(a, values) if isinstance(a, Expr) else a for a in expression.args)
     return Expr(expression.kind, args, expression.line)
 
 

@@ -61,9 +61,7 @@ class _Writer:
                 unit = str(coherent(value.unit))
                 attribute = f'(unit = "{unit}")' if unit not in ("1", "") else ""
                 lines.append(f"  parameter Real {identifier(key)}{attribute} = {self._value(value, assembly)};")
-        lines += [
-            f"  {connector_class(connector)} {identifier(key)};" for key, connector in assembly.connectors.items()
-        ]
+        lines += [f"  {connector_class(c)} {identifier(key)};" for key, c in assembly.connectors.items()]
         for key, field in assembly.fields.items():
             if isinstance(field, Input | Output):
                 lines.append(f"  {_BLOCKS}{type(field).__name__} {identifier(key)};")
@@ -125,11 +123,7 @@ class _Writer:
     def _starts(self, part: Component, known: Known | None, owner: Assembly) -> dict[str, str]:
         starts: dict[str, dict[str, Value]] = {}
         inside = [(f"{node.path.removeprefix(f'{part.path}.')}.", node) for node in part.walk() if node is not part]
-        given = [
-            (f"{path}{name}", value)
-            for path, component in [("", part), *inside]
-            for name, value in component._starts.items()
-        ]
+        given = [(f"{path}{name}", value) for path, c in [("", part), *inside] for name, value in c._starts.items()]
         for name, value in given:
             there = known.there(name) if known else name
             if "." in there:

@@ -188,8 +188,7 @@ def _sort(layers: Layers, n: int, east: bool) -> None:
                 wanted[end.slot].append((places[other.slot] + _port_shift(other) - offset, net.stroke.weight))
     column = layers.columns[n]
     mean = {
-        slot: sum(place * weight for place, weight in heights) / sum(weight for _, weight in heights)
-        for slot, heights in wanted.items()
+        slot: sum(place * weight for place, weight in h) / sum(weight for _, weight in h) for slot, h in wanted.items()
     }
     fixed = [slot for slot in column if slot not in mean]
     movable = sorted((slot for slot in column if slot in mean), key=lambda slot: mean[slot])

@@ -236,9 +236,7 @@ def _beyond(cut: frozenset[Point], edges: Iterable[frozenset[Point]], into: Mapp
     reached, pending = {start}, [start]
     while pending:
         here = pending.pop()
-        for other in (
-            value for edge in edges if here in edge and edge != cut for value in edge if value not in reached
-        ):
+        for other in (v for edge in edges if here in edge and edge != cut for v in edge if v not in reached):
             reached.add(other)
             pending.append(other)
     return sum(power for tip, power in into.items() if tip in reached)

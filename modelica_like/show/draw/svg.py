@@ -41,10 +41,7 @@ def svg(
     strokes = {item.stroke.name: item.stroke for _, item in drawn.everything() if isinstance(item, Line)}
     dark = _DARK | {name: colour for name, (_, colour) in _LOOKS.items() if run.modes}
     rules = [f".{key}{{fill:{colour}}}.{key}-line{{stroke:{colour}}}" for key, colour in dark.items()]
-    rules += [
-        f".{_css(stroke)}{{stroke:{stroke.dark}}}.{_css(stroke)}-dot{{fill:{stroke.dark}}}"
-        for stroke in strokes.values()
-    ]
+    rules += [f".{_css(s)}{{stroke:{s.dark}}}.{_css(s)}-dot{{fill:{s.dark}}}" for s in strokes.values()]
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{_n(width)}" height="{_n(height)}" '
         f'viewBox="0 0 {_n(width)} {_n(height)}" font-family="{_FONT}">',

@@ -47,9 +47,7 @@ def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> Renderable
 
 
 def _values(point: OperatingPoint, names: Sequence[str]) -> Listed:
-    units = {
-        variable.path: str(variable.unit) for variable in (*point.model.flat_variables, *point.model.flat_parameters)
-    }
+    units = {v.path: str(v.unit) for v in (*point.model.flat_variables, *point.model.flat_parameters)}
     rows = ((name, point[name], units.get(name, "")) for name in names)
     return table("values", "name", "value>.8g", "unit", rows=rows)
 

@@ -117,9 +117,7 @@ def _rows(
     signals = [*named(solution.model, solution.names), *more]
     values, shown = evaluated(solution, signals), Display(solution.model, display)
     spelled = [signal.shown_in(shown) if units else signal.unit for signal in signals]
-    columns = [
-        shown.converted(values[signal.name], signal.unit, unit) for signal, unit in zip(signals, spelled, strict=True)
-    ]
+    columns = [shown.converted(values[s.name], s.unit, unit) for s, unit in zip(signals, spelled, strict=True)]
     columns.insert(0, solution.time)
     writer = csv.writer(file)
     writer.writerow(["time", *(signal.name for signal in signals)])

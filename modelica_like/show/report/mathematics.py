@@ -37,11 +37,7 @@ def mathematics(flat: FlatModel) -> str:
             _class(kind, [*parts_of.values()]),
         ]
         lines.append(f"Source: {', '.join(places[kind])}.")
-    ends = dict.fromkeys(
-        (equation.origin.path, equation.origin.source)
-        for equation in flat.linear
-        if equation.origin.kind == "connection"
-    )
+    ends = dict.fromkeys((e.origin.path, e.origin.source) for e in flat.linear if e.origin.kind == "connection")
     joined = table("", ("joined", "source"), [(cell(path), _place(source)) for path, source in ends])
     if joined:
         lines += ["### Connections", "Potentials are equal, and flows add up to zero.", joined]

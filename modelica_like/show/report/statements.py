@@ -135,9 +135,7 @@ class _Reader:
                 return
         if function is not None:
             formal = [argument.arg for argument in function.code.args.args if argument.arg != "self"]
-            given = dict(zip(formal, arguments, strict=False)) | {
-                keyword.arg or "": keyword.value for keyword in call.keywords
-            }
+            given = dict(zip(formal, arguments, strict=False)) | {k.arg or "": k.value for k in call.keywords}
             meant = {name: self._replaced(of, value, names) for name, value in given.items()}
             yield from self.body(function, function.code.body, meant)
 

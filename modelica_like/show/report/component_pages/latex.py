@@ -251,10 +251,7 @@ class Writer:
             return Written(rf"{names.text(path.path)} = {names.text(chosen)}", RELATION)
         if name == "choose":
             mode = self.which_mode(path.path)
-            rows = [
-                (self.latex(keyword.value), "" if keyword.arg == "otherwise" else mode, keyword.arg)
-                for keyword in node.keywords
-            ]
+            rows = [(self.latex(k.value), "" if k.arg == "otherwise" else mode, k.arg) for k in node.keywords]
             return cases([(value, names.text(f"{which}{name}")) for value, which, name in rows])
         if name == "given":
             (parameter,) = (argument.value for argument in node.args if isinstance(argument, ast.Constant))

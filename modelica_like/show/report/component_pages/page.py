@@ -121,9 +121,7 @@ def _optional(source: Source) -> dict[str, str]:
 def _parts(kind: type[Component]) -> list[str]:
     """Return the parts that the class declares, and how it builds others."""
     by_name = {name: part if isinstance(part, list) else [part] for name, part in kind._class_parts.items()}
-    rows = (
-        (f"`{name}`", page_link(type(element)), _values(element)) for name, part in by_name.items() for element in part
-    )
+    rows = ((f"`{name}`", page_link(type(e)), _values(e)) for name, part in by_name.items() for e in part)
     code = dedent(inspect.getsource(kind.build)).strip() if kind.build is not Component.build else ""
     parts = [table("", ("part", "type", "values"), rows), code and f"```python\n{code}\n```"]
     return ["## Parts", *parts] if any(parts) else []

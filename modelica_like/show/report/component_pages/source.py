@@ -105,11 +105,7 @@ class Source:
     def symbol(self, name: str, dots: int = 0) -> str:
         """Return the symbol of a method or property: words if a connector has the same symbol."""
         letter = names.name(name.lstrip("_"), dots)
-        ends = (
-            f"{end}.{quantity}"
-            for end, connector in self.kind._class_connectors.items()
-            for quantity in connector.fields
-        )
+        ends = (f"{end}.{q}" for end, connector in self.kind._class_connectors.items() for q in connector.fields)
         return names.text(name) if letter in map(names.name, ends) else letter
 
     def method(self, name: str, after: type | None = None) -> Function | None:
@@ -240,9 +236,7 @@ class _Reader(Writer):
                 raise Unwritable
         if function is not None:
             formal = [argument.arg for argument in function.code.args.args if argument.arg != "self"]
-            given = dict(zip(formal, arguments, strict=False)) | {
-                keyword.arg or "": keyword.value for keyword in call.keywords
-            }
+            given = dict(zip(formal, arguments, strict=False)) | {k.arg or "": k.value for k in call.keywords}
             local: dict[str, Meaning] = {name: self.path(value) or self.write(value) for name, value in given.items()}
             yield from _reader(self.source, function, local).body(function.code.body)
 

@@ -80,9 +80,7 @@ def ranking(run: Solution, ends: Sequence[str]) -> str:
          *(f"{round(value, 3) + 0.0:.3f}" for value in percents[:, k]))
         for k in order for quantity in [sensitivity.parameters[k]]
     ]  # fmt: skip
-    at_the_end = ", ".join(
-        f"{output.name} = {output.value:.5g} {output.unit_text}".rstrip() for output in sensitivity.outputs
-    )
+    at_the_end = ", ".join(f"{o.name} = {o.value:.5g} {o.unit_text}".rstrip() for o in sensitivity.outputs)
     said = f"<p>Change in percent of what the run ends with: {escape(at_the_end)}.</p>"
     left = "".join(f"<p>{escape(note)}</p>" for note in sensitivity.notes())
     return (said + table(heads, rows) if rows else "") + details(
