@@ -183,7 +183,14 @@ class DiscreteEquations:
                     continue
                 if isinstance(marker, Part):
                     seen.update(map(id, parts(marker.whole)))
-                    pending += self._write_delay(marker.whole, source)
+                    # Before the start, a delay is its value at the start.
+                    marker.whole.of = with_events(marker.whole.of)
+                    self.delays.append((marker.whole, source))
+                    for k, part in enumerate(parts(marker.whole)):
+                        part.name = f"delay[{len(self.delays)}][{k}]"
+                        self.hidden.append(Hidden(part.name, f"delay {marker.whole.of}"))
+                    self.updates.append(Update(parts(marker.whole)[0], INITIAL, marker.whole.of, source, at_start=True))
+                    pending += [(marker.whole.of, source), (marker.whole.offset, source), (INITIAL, source)]
                     continue
                 if marker.kind in ("sample", "previous"):
                     what = (
@@ -218,16 +225,6 @@ class DiscreteEquations:
         value = argument if marker.kind == "was" else edge(argument)
         self.updates.append(Update(marker, _ONE, value, source, at_start=marker.kind == "was"))
         return (value,)
-
-    def _write_delay(self, marker: Marker, source: Source) -> list[Located]:
-        """Name the numbers of a delay; return further expressions. Before the start, it is the value at the start."""
-        marker.of = with_events(marker.of)
-        self.delays.append((marker, source))
-        for k, part in enumerate(parts(marker)):
-            part.name = f"delay[{len(self.delays)}][{k}]"
-            self.hidden.append(Hidden(part.name, f"delay {marker.of}"))
-        self.updates.append(Update(parts(marker)[0], INITIAL, marker.of, source, at_start=True))
-        return [(marker.of, source), (marker.offset, source), (INITIAL, source)]
 
     def _write_floor(self, marker: Marker, source: Source) -> None:
         """Count up and down by what is passed; the value itself may still be on the other side by rounding."""

@@ -54,7 +54,15 @@ class Parameters:
         if value is None:
             return None
         if value.formula is None:
-            expression = self._independent(component, name, path, value)
+            field = component.fields[name]
+            expression = ca.SX.sym(path)
+            self._by_leaf[leaf_id(expression)] = len(self.flat)
+            unit = coherent(unit_of_field(component, name))
+            read = read_quantity(value.given) if field.unit_text == "*" and isinstance(value.given, str) else None
+            tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
+            number, bounds, written = cast(float, value.number), field.bounds, read[1] if read else None
+            self.flat.append(FlatParameter(path, unit, field.description, number, *bounds, tunable, above, written))
+            self._symbols.append(expression)
         else:
             with component.at_its_place(name):
                 expression = self._dependent(component, name, path, value)
@@ -65,18 +73,6 @@ class Parameters:
         """Append an expression to q; return its position."""
         self._q.append(expression)
         return len(self._q) - 1
-
-    def _independent(self, component: Component, name: str, path: str, value: Value) -> Any:
-        field = component.fields[name]
-        symbol = ca.SX.sym(path)
-        self._by_leaf[leaf_id(symbol)] = len(self.flat)
-        unit = coherent(unit_of_field(component, name))
-        read = read_quantity(value.given) if field.unit_text == "*" and isinstance(value.given, str) else None
-        tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
-        number, bounds, written = cast(float, value.number), field.bounds, read[1] if read else None
-        self.flat.append(FlatParameter(path, unit, field.description, number, *bounds, tunable, above, written))
-        self._symbols.append(symbol)
-        return symbol
 
     def _dependent(self, component: Component, name: str, path: str, value: Value) -> Any:
         if path in self._open:

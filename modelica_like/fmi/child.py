@@ -57,16 +57,13 @@ class EventLocator:
     def _modes(self, row: tuple[Any, ...]) -> list[Any]:
         return [row[k] for k in self._columns]
 
-    def _sample(self, time: float) -> tuple[Any, ...]:
-        self._recorder.sample(time, force=True)
-        return self._recorder.rows.pop()
-
     def _probe(self, step: float) -> tuple[Any, ...]:
         """Step from the saved state."""
         self._load(self._state)
         if step > 0.0:
             self._fmu.doStep(currentCommunicationPoint=self._from, communicationStepSize=step)
-        return self._sample(self._from + step)
+        self._recorder.sample(self._from + step, force=True)
+        return self._recorder.rows.pop()
 
     def _step_through(self, end: float) -> None:
         """Repeat the step to its end, with both sides of every mode change."""
@@ -117,17 +114,6 @@ class Ending:
             return done
 
         return watched
-
-
-def choose_kind(description: Any, kind: str | None) -> str:
-    """Return me or cs."""
-    has = {"cs": description.coSimulation is not None, "me": description.modelExchange is not None}
-    chosen = kind or ("cs" if has["cs"] else "me")
-    if not any(has.values()):
-        raise Refused(kind="scheduled")
-    if not has[chosen]:
-        raise Refused(kind="no kind", wanted=KINDS[chosen])
-    return chosen
 
 
 def take_arrays(parameters: dict[str, Any], arrays: dict[str, tuple[int, ...]]) -> None:
@@ -307,7 +293,12 @@ def run(job: Job) -> None:
     """Run the job of a folder."""
     request, fmu = job.asked, str(job.folder / "0")
     description: Any = fmpy.read_model_description(fmu, validate=False)
-    kind = choose_kind(description, request["kind"])
+    has = {"cs": description.coSimulation is not None, "me": description.modelExchange is not None}
+    kind = request["kind"] or ("cs" if has["cs"] else "me")
+    if not any(has.values()):
+        raise Refused(kind="scheduled")
+    if not has[kind]:
+        raise Refused(kind="no kind", wanted=KINDS[kind])
     numbers = [v for v in description.modelVariables if v.type in (*REAL, *DISCRETE)]
     scalars = {v.name: v for v in numbers if v.name != "time" and not v.shape}
     arrays = {v.name: tuple(v.shape) for v in numbers if v.shape}

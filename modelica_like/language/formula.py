@@ -224,7 +224,13 @@ def _not_a_formula(text: str, why: str = "") -> NetlistError:
 
 def _convert(node: ast.expr, text: str, quantities: dict[str, str]) -> Formula:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
-        return Formula("number", (_finite(node.value, text),))
+        try:
+            number = float(node.value)
+        except OverflowError:
+            number = math.inf
+        if math.isinf(number):
+            raise _not_a_formula(text, "a number in it is too large")
+        return Formula("number", (number,))
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
         return Formula(
             _BINARY[type(node.op)], (_convert(node.left, text, quantities), _convert(node.right, text, quantities))
@@ -241,16 +247,6 @@ def _convert(node: ast.expr, text: str, quantities: dict[str, str]) -> Formula:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
         return _call(node, node.func.id, text, quantities)
     raise _not_a_formula(text)
-
-
-def _finite(value: float, text: str) -> float:
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if math.isinf(number):
-        raise _not_a_formula(text, "a number in it is too large")
-    return number
 
 
 def _call(node: ast.Call, name: str, text: str, quantities: dict[str, str]) -> Formula:

@@ -122,7 +122,15 @@ def parse(text: str, file: str) -> Document:
         )
     data = parse_toml(text, lines)
     errors: list[ModelicaLikeError] = []
-    document = _document(data, lines, errors)
+    sections = read_sections(data, "A netlist", _READERS, lines, errors)
+    document = Document(lines, **{"name": Path(lines.file).stem, **sections})
+    for name in document.parts.keys() & document.parameters.keys():
+        places = (lines.source("parameters", name), lines.source("parts", name))
+        errors.append(DuplicateName(f"'{name}' is both a parameter and a part.", where=places))
+    if not document.parts and not errors:
+        errors.append(
+            NetlistError(f"{document.name} has no parts.", where=Source(lines.file), advice="Declare them in [parts].")
+        )
     if errors:
         raise raise_together_or_one(errors)
     return document
@@ -164,19 +172,6 @@ def _not_toml(message: str, lines: Lines) -> ModelicaLikeError:
 
 
 # --- the form -------------------------------------------------------------------------------------------------------
-
-
-def _document(data: dict[str, Any], lines: Lines, errors: list[ModelicaLikeError]) -> Document:
-    sections = read_sections(data, "A netlist", _READERS, lines, errors)
-    document = Document(lines, **{"name": Path(lines.file).stem, **sections})
-    for name in document.parts.keys() & document.parameters.keys():
-        places = (lines.source("parameters", name), lines.source("parts", name))
-        errors.append(DuplicateName(f"'{name}' is both a parameter and a part.", where=places))
-    if not document.parts and not errors:
-        errors.append(
-            NetlistError(f"{document.name} has no parts.", where=Source(lines.file), advice="Declare them in [parts].")
-        )
-    return document
 
 
 def read_sections(

@@ -136,7 +136,14 @@ class _Elimination:
         terms, products = self._reduce(equation)
         self.remaining.discard(number)
         if not terms:
-            self.contradictions.append(self._causes(number))
+            causes = [number]
+            for one in causes:
+                for node, _ in self.model.linear[one].terms:
+                    cause = self.cause.get(self.find(node)[0])
+                    if cause is not None and cause not in causes:
+                        causes.append(cause)
+            ends = [one for one in causes if len(self.model.linear[one].terms) == 1]
+            self.contradictions.append(tuple(ends if len(ends) > 1 else dict.fromkeys([number, *ends])))
             return set()
         match [*terms.items()]:
             case [(root, float(slope))] if root not in self.integral and root not in self.inputs:
@@ -155,17 +162,6 @@ class _Elimination:
         for root in terms:
             self.watchers.setdefault(root, set()).add(number)
         return set()
-
-    def _causes(self, number: int) -> tuple[int, ...]:
-        """Follow the values of the unknowns of an equation back to the equations that gave them."""
-        causes = [number]
-        for one in causes:
-            for node, _ in self.model.linear[one].terms:
-                cause = self.cause.get(self.find(node)[0])
-                if cause is not None and cause not in causes:
-                    causes.append(cause)
-        ends = [one for one in causes if len(self.model.linear[one].terms) == 1]
-        return tuple(ends if len(ends) > 1 else dict.fromkeys([number, *ends]))
 
     def _learn(self, root: int, value: Any) -> set[int]:
         """Store the constant value of a class; its derivatives are zero."""

@@ -189,7 +189,15 @@ def _choose(flat: FlatModel, aliases: Aliases, groups: tuple[Group, ...]) -> _Ch
     following = follow(system, groups)
     holds = add_approaches(system)
     flags = Flags(system)
-    _check_input_rates(system)
+    # A motion prescribed by an input has no known derivative.
+    for level in system.inputs:
+        rate = system.derivative(level)
+        if rate is not None and rate not in system.inputs:
+            raise StructureError(
+                f"{system.levels[rate].name} is the derivative of the input {system.levels[level].name}, "
+                "which is not known.",
+                advice="Give the derivative as a separate input, or filter the input before it prescribes a motion.",
+            )
     prefer_relative_states(system)
     contradictions = [flat.linear[k].origin for group in aliases.contradictions for k in group]
     incidence: list[list[int]] = [[] for _ in range(system.residual.numel())]
@@ -200,18 +208,6 @@ def _choose(flat: FlatModel, aliases: Aliases, groups: tuple[Group, ...]) -> _Ch
     prefer(system, groups, following)
     states = select_states(system, counts, _top_slopes(system, counts), incidence)
     return _Chosen(system, counts, states, holds, flags, following)
-
-
-def _check_input_rates(system: System) -> None:
-    """Refuse a motion prescribed by an input if its derivative is needed, because that is not known."""
-    for level in system.inputs:
-        rate = system.derivative(level)
-        if rate is not None and rate not in system.inputs:
-            raise StructureError(
-                f"{system.levels[rate].name} is the derivative of the input {system.levels[level].name}, "
-                "which is not known.",
-                advice="Give the derivative as a separate input, or filter the input before it prescribes a motion.",
-            )
 
 
 def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:

@@ -120,7 +120,12 @@ def build_system(model: FlatModel, aliases: Aliases) -> System:
     node_level = [pair and (pair[0], pair[1] / scale[pair[0]]) for pair in node_level]
     levels = _levels(model, chains, _ranked(model, node_level))
     symbols = [ca.SX.sym(level.name) for level in levels]
-    node_values = _node_values(aliases, node_level, symbols)
+    vector = ca.vertcat(ca.SX(0, 1), *symbols, *aliases.known.values())
+    position = {root: len(symbols) + k for k, root in enumerate(aliases.known)}
+    nodes = zip(node_level, aliases.root, aliases.factor, strict=True)
+    placed = [pair or (position[root], factor) for pair, root, factor in nodes]
+    # A vector of one entry, indexed by a list, gives a row.
+    node_values = ca.vec(vector[[level for level, _ in placed]]) * ca.SX(ca.DM([factor for _, factor in placed]))
     system = System(model, levels, chains, symbols, None, [], node_level, node_values)
     system.inputs = [place[aliases.root[node]][0] for node in model.inputs]
     _collect_residuals(system, aliases)
@@ -178,15 +183,6 @@ def _levels(model: FlatModel, chains: list[list[int]], ranked: dict[int, list[_N
             guess = next((variable.guess / factor for variable, factor in base if variable.guess), 0.0)
             levels.append(Level(chain, order, model.node_name(node), preference, named.nominal, guess, not connected))
     return levels
-
-
-def _node_values(aliases: Aliases, node_level: list[tuple[int, float] | None], symbols: list[Any]) -> Any:
-    vector = ca.vertcat(ca.SX(0, 1), *symbols, *aliases.known.values())
-    position = {root: len(symbols) + k for k, root in enumerate(aliases.known)}
-    nodes = zip(node_level, aliases.root, aliases.factor, strict=True)
-    placed = [pair or (position[root], factor) for pair, root, factor in nodes]
-    # A vector of one entry, indexed by a list, gives a row.
-    return ca.vec(vector[[level for level, _ in placed]]) * ca.SX(ca.DM([factor for _, factor in placed]))
 
 
 def _collect_residuals(system: System, aliases: Aliases) -> None:

@@ -55,7 +55,13 @@ def free_motions(model: CompiledDae, point: Point) -> Motions:
     """
     count = len(model.states)
     motions = Motions(list(range(count)), np.eye(count))
-    speeds = _independent(list(_held_speeds(model, point)))
+    # Combinations that follow from those before are dropped.
+    slopes = list(_held_speeds(model, point))
+    kept: list[Vector] = []
+    for slope in slopes:
+        if np.linalg.matrix_rank(np.array([*kept, slope]), tol=_ZERO) > len(kept):
+            kept.append(slope)
+    speeds = np.array(kept)
     if not len(speeds):
         return motions
     motions = motions.without(speeds)
@@ -106,15 +112,6 @@ def _null(matrix: Matrix) -> Matrix:
     _, sizes, right = np.linalg.svd(matrix)
     rank = int(np.sum(sizes > _ZERO * sizes.max(initial=1e-300)))
     return right[rank:].T
-
-
-def _independent(slopes: list[Vector]) -> Matrix:
-    """Drop combinations that follow from those before."""
-    kept: list[Vector] = []
-    for slope in slopes:
-        if np.linalg.matrix_rank(np.array([*kept, slope]), tol=_ZERO) > len(kept):
-            kept.append(slope)
-    return np.array(kept)
 
 
 def _rate_slopes(model: CompiledDae, point: Point) -> Matrix:

@@ -71,22 +71,18 @@ class Converter:
             inner = get_args(kind)[0]
             return tuple(self._value(inner, item, f"{where}[{k}]") for k, item in enumerate(value))
         if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-            return self._structure(kind, value, where)
+            if isinstance(value, dict):
+                return kind(**self.arguments(kind, value, where))
+            result = self.result(value) if isinstance(value, str) else None
+            if not isinstance(result, kind):
+                raise NetlistError(
+                    f"{where} must be a table: {{ {_example(kind)} }}.",
+                    advice=f"Or name a check whose result is a {kind.__name__}." if is_result(kind) else "",
+                )
+            return result
         if kind in _TEXTS and type(value) is not _TEXTS[kind]:
             raise NetlistError(f"{where} must be {_article(kind)}, not {value!r}.")
         return value
-
-    def _structure(self, kind: type, value: Any, where: str) -> Any:
-        """Return a dataclass from a table of its fields, or from the name of a check with this result."""
-        if isinstance(value, dict):
-            return kind(**self.arguments(kind, value, where))
-        result = self.result(value) if isinstance(value, str) else None
-        if not isinstance(result, kind):
-            raise NetlistError(
-                f"{where} must be a table: {{ {_example(kind)} }}.",
-                advice=f"Or name a check whose result is a {kind.__name__}." if is_result(kind) else "",
-            )
-        return result
 
     def quantity(self, unit: Unit, value: Any, where: str) -> Any:
         """Return a number, or an array from a list, in SI units."""

@@ -126,19 +126,6 @@ def _check_extremes(job: Job, plan: Plan, done: Done) -> None:
     Reference(job).compare(done, plan.points, sorted(k for k in wanted if k % ONE_IN))
 
 
-def _notices(done: Done) -> list[str]:
-    """Return the notices about native runs."""
-    notes: list[str] = []
-    if done.by_idas:
-        notes.append(f"IDAS did {done.by_idas} of {len(done.values)} runs, where the native run-time failed.")
-    if done.differences:
-        listed = [f"  run {k}: {done.differences[k]}" for k in sorted(done.differences)[:_TOLD]]
-        notes.append(
-            f"In {len(done.differences)} of {done.checked} repeated runs IDAS has other results:\n" + "\n".join(listed)
-        )
-    return notes
-
-
 def _workers(job: Job, processes: int | None, scheduler: str | None, runs: int) -> Callable[..., Generator[Done]]:
     if scheduler is not None:
         return lambda chunks: on_cluster(job, chunks, scheduler)
@@ -190,6 +177,14 @@ def _dataset(model: CompiledDae, plan: Plan, job: Job, done: Done, why: str) -> 
         name: (name if plan.axes is not None else "sample", column, {"units": unit})
         for name, unit, column in zip(plan.names, plan.units, columns, strict=True)
     }
-    notice = "\n".join(filter(None, [why, *_notices(done)]))
+    notes: list[str] = []
+    if done.by_idas:
+        notes.append(f"IDAS did {done.by_idas} of {len(done.values)} runs, where the native run-time failed.")
+    if done.differences:
+        listed = [f"  run {k}: {done.differences[k]}" for k in sorted(done.differences)[:_TOLD]]
+        notes.append(
+            f"In {len(done.differences)} of {done.checked} repeated runs IDAS has other results:\n" + "\n".join(listed)
+        )
+    notice = "\n".join(filter(None, [why, *notes]))
     attrs = {"model": model.name, "solver": job.settings["solver"], "checked": done.checked, "notice": notice}
     return extra_module("xarray", "data").Dataset(data, coords=coords, attrs=attrs)

@@ -226,21 +226,16 @@ def _check_apart(assembly: Assembly, netlist: CutNetlist, cut: Cut) -> None:
     near, far = part_of(cut.near), part_of(inside[0])
     if near == far:
         raise NetlistError(f"{cut.near} is inside the array {near}, which cannot be cut.", where=cut.source)
-    raise NetlistError(
-        f"{assembly.label} does not separate between {cut.near} and {inside[0]}.", where=cut.source,
-        why=f"{near} and {far} are also joined by {' – '.join(_way(netlist.wires, near, far))}.",
-        advice="Cut there as well: --at can be given several times.",
-    )  # fmt: skip
-
-
-def _way(wires: Sequence[Wire], start: str, end: str) -> list[str]:
-    """Return the parts along the shortest way from one to the other."""
-    ways = {start: [start]}
-    for part in (queue := [start]):
-        for wire in wires:
+    ways = {near: [near]}
+    for part in (queue := [near]):
+        for wire in netlist.wires:
             parts = [part_of(one) for one in wire.ends]
             for other in parts if part in parts else ():
                 if other not in ways:
                     ways[other] = [*ways[part], other]
                     queue.append(other)
-    return ways[end]
+    raise NetlistError(
+        f"{assembly.label} does not separate between {cut.near} and {inside[0]}.", where=cut.source,
+        why=f"{near} and {far} are also joined by {' – '.join(ways[far])}.",
+        advice="Cut there as well: --at can be given several times.",
+    )  # fmt: skip

@@ -35,7 +35,17 @@ def load_system(path: Path, work: Path) -> System:
         from modelica_like.fmi.cosimulation.fmu_parts import system_of_netlist
 
         return system_of_netlist(path, work)
-    return _system(data, lines, path)
+    errors: list[ModelicaLikeError] = []
+    read = toml.read_sections(data, "A system", _READERS, lines, errors)
+    if errors:
+        raise raise_together_or_one(errors)
+    fmus, links, bonds = (tuple(read.get(name, {}).values()) for name in ("fmus", "connect", "bonds"))
+    units = tuple(replace(unit, file=path.parent / unit.file) for unit in fmus)
+    settings = Settings(**read.get("simulate", {}))
+    own_names = read.get("own_names", False)
+    system = System(read.get("name", path.stem), units, links, bonds or find_bonds(links), settings, own_names)
+    check_system(system)
+    return system
 
 
 def describes_system(path: Path) -> bool:
@@ -59,20 +69,6 @@ def _read_toml(path: Path) -> tuple[dict[str, Any], Lines]:
     text = toml.read_text(path)
     lines = locate(text, str(path))
     return toml.parse_toml(text, lines), lines
-
-
-def _system(data: Mapping[str, Any], lines: Lines, path: Path) -> System:
-    errors: list[ModelicaLikeError] = []
-    read = toml.read_sections(data, "A system", _READERS, lines, errors)
-    if errors:
-        raise raise_together_or_one(errors)
-    fmus, links, bonds = (tuple(read.get(name, {}).values()) for name in ("fmus", "connect", "bonds"))
-    units = tuple(replace(unit, file=path.parent / unit.file) for unit in fmus)
-    settings = Settings(**read.get("simulate", {}))
-    own_names = read.get("own_names", False)
-    system = System(read.get("name", path.stem), units, links, bonds or find_bonds(links), settings, own_names)
-    check_system(system)
-    return system
 
 
 def _unit(key: str, entry: Any) -> Unit:

@@ -58,7 +58,14 @@ def ssd(system: System, fmus: Mapping[str, DescribedFmu], sources: Mapping[str, 
     _units(top, [(fmus[port.unit], port.variable) for port in ports])
     if system.settings.until is not None:
         element(top, "ssd:DefaultExperiment", startTime=0.0, stopTime=system.settings.until)
-    _annotation(top, system)
+    settings = system.settings
+    note = element(element(top, "ssd:Annotations"), "ssc:Annotation", type=COSIMULATION)
+    inner = element(
+        note, "ml:Cosimulation", master=settings.master, inputs=settings.inputs, step=settings.step,
+        tolerance=settings.tolerance, ownNames=system.own_names,
+    )  # fmt: skip
+    for bond in system.bonds:
+        element(inner, "ml:Bond", name=bond.name, flow=bond.flow, rate=bond.rate)
     return document(top).encode()
 
 
@@ -123,15 +130,3 @@ def _units(top: Element, used: list[tuple[DescribedFmu, str]]) -> None:
             base |= {} if one.factor == 1.0 else {"factor": one.factor}
             base |= {} if one.offset == 0.0 else {"offset": one.offset}
             element(element(group, "ssc:Unit", name=name), "ssc:BaseUnit", **base)
-
-
-def _annotation(top: Element, system: System) -> None:
-    """Write the settings of the run and the bonds."""
-    settings = system.settings
-    note = element(element(top, "ssd:Annotations"), "ssc:Annotation", type=COSIMULATION)
-    inner = element(
-        note, "ml:Cosimulation", master=settings.master, inputs=settings.inputs, step=settings.step,
-        tolerance=settings.tolerance, ownNames=system.own_names,
-    )  # fmt: skip
-    for bond in system.bonds:
-        element(inner, "ml:Bond", name=bond.name, flow=bond.flow, rate=bond.rate)

@@ -59,7 +59,17 @@ class _Reader:
         self.top, self.root, self.files = top, root, files
         self.elements = {node.path: node for node in root.walk()}
         self.files_of = {node.path: node.file for node in root.walk() if node.file is not None}
-        self.names = _flat_names([self.elements[path] for path in self.files_of])
+        # Names of components have no dots, blanks and special characters.
+        components = [self.elements[path] for path in self.files_of]
+        names: dict[ElementPath, str] = {}
+        for component in components:
+            name = _word("_".join(component.path))
+            if name in names.values():
+                raise DuplicateName(
+                    f"Two FMUs would have the name {name}.", where=place(component.xml), advice="Rename one of them."
+                )
+            names[component.path] = name
+        self.names = names
         self.fmus = {path: described(file) for path, file in self.files_of.items()}
         self.units = ssp.unit_definitions(top)
         self.drives: dict[Target, _Drive] = {}
@@ -212,19 +222,6 @@ def _is_identity(transformation: Any) -> bool:
 
 def _bond(xml: Any) -> Bond:
     return Bond(needed(xml, "name"), needed(xml, "flow"), needed(xml, "rate"))
-
-
-def _flat_names(components: list[Element]) -> dict[ElementPath, str]:
-    """Return names of components without dots, blanks and special characters."""
-    names: dict[ElementPath, str] = {}
-    for component in components:
-        name = _word("_".join(component.path))
-        if name in names.values():
-            raise DuplicateName(
-                f"Two FMUs would have the name {name}.", where=place(component.xml), advice="Rename one of them."
-            )
-        names[component.path] = name
-    return names
 
 
 def _word(text: str) -> str:

@@ -184,7 +184,10 @@ class _Parser:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.tokens = self._tokens(_plain(text))
+        text = unicodedata.normalize("NFKC", _SUPERSCRIPTS.sub(lambda match: "^" + match.group(), text))
+        for typographic, plain in _SPELLINGS.items():
+            text = text.replace(typographic, plain)
+        self.tokens = self._tokens(text)
         self.next = 0
 
     def parse(self) -> Unit:
@@ -246,10 +249,3 @@ class _Parser:
         return UnitError(
             f"'{self.text}' is not a unit.", advice="Write units as in kg.m2, N.m.s/rad, J/(kg.K) or 1/min."
         )
-
-
-def _plain(text: str) -> str:
-    text = unicodedata.normalize("NFKC", _SUPERSCRIPTS.sub(lambda match: "^" + match.group(), text))
-    for typographic, plain in _SPELLINGS.items():
-        text = text.replace(typographic, plain)
-    return text

@@ -78,13 +78,28 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
     if kind == "array":
         return Expr("array", args, line)
     if any(argument.kind == "array" for argument in args):
-        return _of_arrays(kind, args, line)
+        if kind == "*" and all(argument.kind == "array" for argument in args):
+            return _product(args[0], args[1], line)
+        length = next(len(argument.args) for argument in args if argument.kind == "array")
+        if any(argument.kind == "array" and len(argument.args) != length for argument in args):
+            raise Unfit("The sizes of two arrays differ")
+        rows = (
+            tuple(argument.args[k] if argument.kind == "array" else argument for argument in args)
+            for k in range(length)
+        )
+        return Expr("array", tuple(operation(kind, row, line) for row in rows), line)
     if kind == "neg":
         return number(-args[0].args[0], line) if args[0].kind == "number" else Expr("neg", args, line)
     if kind == "not":
         return Expr("boolean", (not args[0].args[0],), line) if args[0].kind == "boolean" else Expr("not", args, line)
     if kind in ("and", "or"):
-        return _joined(kind, args, line)
+        decides = kind == "or"
+        if any(argument.kind == "boolean" and argument.args[0] is decides for argument in args):
+            return Expr("boolean", (decides,), line)
+        left = [argument for argument in args if argument.kind != "boolean"]
+        if not left:
+            return Expr("boolean", (not decides,), line)
+        return left[0] if len(left) == 1 else Expr(kind, args, line)
     if kind in _RELATIONS and all(argument.kind in KNOWN for argument in args):
         return Expr("boolean", (_RELATIONS[kind](args[0].args[0], args[1].args[0]),), line)
     if kind in _BINARY and all(argument.kind == "number" for argument in args):
@@ -103,28 +118,6 @@ def _computed(function: Callable[..., float], args: tuple[Expr, ...], line: int)
     if isinstance(result, complex) or not math.isfinite(result):
         raise Unfit(f"A formula of {', '.join(f'{value:g}' for value in values)} has no value")
     return number(result, line)
-
-
-def _joined(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
-    decides = kind == "or"
-    if any(argument.kind == "boolean" and argument.args[0] is decides for argument in args):
-        return Expr("boolean", (decides,), line)
-    left = [argument for argument in args if argument.kind != "boolean"]
-    if not left:
-        return Expr("boolean", (not decides,), line)
-    return left[0] if len(left) == 1 else Expr(kind, args, line)
-
-
-def _of_arrays(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
-    if kind == "*" and all(argument.kind == "array" for argument in args):
-        return _product(args[0], args[1], line)
-    length = next(len(argument.args) for argument in args if argument.kind == "array")
-    if any(argument.kind == "array" and len(argument.args) != length for argument in args):
-        raise Unfit("The sizes of two arrays differ")
-    rows = (
-        tuple(argument.args[k] if argument.kind == "array" else argument for argument in args) for k in range(length)
-    )
-    return Expr("array", tuple(operation(kind, row, line) for row in rows), line)
 
 
 def _product(left: Expr, right: Expr, line: int) -> Expr:

@@ -74,7 +74,14 @@ class Resolver:
         if kind == "for":
             return self._built(args[0], list(args[1]))
         if kind == "if":
-            return self._chosen(args, line)
+            kept: list[Expr] = []
+            for condition, value in zip(args[:-1:2], args[1::2], strict=True):
+                choice = self(condition)
+                if choice.kind != "boolean":
+                    kept += [choice, self(value)]
+                elif choice.args[0]:
+                    return Expr("if", (*kept, self(value)), line) if kept else self(value)
+            return Expr("if", (*kept, self(args[-1])), line) if kept else self(args[-1])
         if kind == "range":
             numbers = [self.number(argument) for argument in args]
             start, step, stop = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
@@ -90,17 +97,6 @@ class Resolver:
         except ModelicaTextError as error:
             error.where = error.where or (self.text.place(line),)
             raise
-
-    def _chosen(self, args: tuple[Expr, ...], line: int) -> Expr:
-        """Resolve an `if`; branches that are known not to be taken are not looked at."""
-        kept: list[Expr] = []
-        for condition, value in zip(args[:-1:2], args[1::2], strict=True):
-            choice = self(condition)
-            if choice.kind != "boolean":
-                kept += [choice, self(value)]
-            elif choice.args[0]:
-                return Expr("if", (*kept, self(value)), line) if kept else self(value)
-        return Expr("if", (*kept, self(args[-1])), line) if kept else self(args[-1])
 
     def _built(self, element: Expr, iterators: list[tuple[str, Expr | None]]) -> Expr:
         """Resolve an array built by iterators, the last one innermost."""

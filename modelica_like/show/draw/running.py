@@ -145,7 +145,7 @@ def running(
 
 def _write(drawn: Sheet, result: Running) -> None:
     """Choose texts at lines that meet no other text, no ground and no other line."""
-    taken = [_moved(box, _sum(at, item.at)) for at, item in drawn.everything()
+    taken = [_moved(box, (at[0] + item.at[0], at[1] + item.at[1])) for at, item in drawn.everything()
              if isinstance(item, Placed) for box in [*(text.box for text in texts(item)), *_marks(item)]]  # fmt: skip
     lines = [(at, item) for at, item in drawn.everything() if isinstance(item, Line)]
     pieces = [(item if a[1] == b[1] else None, _moved((*min(a, b), *max(a, b)), at))
@@ -166,10 +166,6 @@ def _marks(part: Placed) -> Iterator[Box]:
         if port.mark:
             x, y = {"W": -part.half[0] - MARK, "E": part.half[0] + MARK}.get(port.side, port.along), port.along
             yield x - MARK, y - MARK / 2, x + MARK, y + MARK
-
-
-def _sum(a: Point, b: Point) -> Point:
-    return a[0] + b[0], a[1] + b[1]
 
 
 def _moved(box: Box, by: Point) -> Box:
