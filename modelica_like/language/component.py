@@ -49,24 +49,22 @@ class Component(Declared):
     def __init_subclass__(cls, partial: bool = False, **options: Any) -> None:
         super().__init_subclass__(**options)
         cls._partial = partial
-        attributes = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
+        body = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
         hints = {name: str(text) for name, text in annotated(cls).items() if not name.startswith("_")}
         annotations = [name for name, text in hints.items() if not text.startswith(("ClassVar", "typing.ClassVar"))]
         # A class may extend several bases, as in Modelica: declarations are collected along all ancestors.
         ancestors = [base for base in reversed(cls.__mro__[1:]) if issubclass(base, Component)]
         cls._class_connectors = _of_kind(cls, Connector)
         cls._class_modes = _of_kind(cls, Mode)
-        parts = {name: value for name, value in attributes.items() if _is_part(value)}
+        parts = {name: value for name, value in body.items() if _is_part(value)}
         cls._class_parts = {name: part for base in ancestors for name, part in base._class_parts.items()} | parts
         cls._replaceable = frozenset(parts.keys() & {*annotations}).union(*(base._replaceable for base in ancestors))
         declared = (Field, Connector, Mode)
-        for name, value in attributes.items():
+        for name, value in body.items():
             if type(value) is list and name not in parts and (name in annotations or name not in hints):
                 refuse_collection(f"{cls.__name__}.{name}", cast(object, value))
         plain = {
-            n: attributes.get(n, REQUIRED)
-            for n in annotations
-            if not isinstance(attributes.get(n), declared) and n not in parts
+            n: body.get(n, REQUIRED) for n in annotations if not isinstance(body.get(n), declared) and n not in parts
         }
         tables = {name: value for name, value in plain.items() if isinstance(value, Rows)}
         plain |= {name: table.default for name, table in tables.items()}
