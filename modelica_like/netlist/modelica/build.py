@@ -35,6 +35,10 @@ from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConne
 
 
 @dataclass
+
+_STATE_SELECT = {"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}
+
+
 class Notes:
     """What a reader should know: values that were taken, units that were left out."""
 
@@ -194,38 +198,31 @@ class _Builder:
 
     def _variable(self, path: str, name: str, member: Member, basic: Basic) -> None:
         description = member.declaration.description
-        field_made: Field
+        declared: Field
         signal = bool(basic.prefixes & {"input", "output"}) and (
             not {"input", "output"} & member.declaration.prefixes or member.text.kind == "block"
         )
         if basic.kind == "Boolean" and not signal:
-            field_made = boolean(description)
+            declared = boolean(description)
         elif basic.kind == "Integer" and not signal:
-            field_made = integer(description)
+            declared = integer(description)
         elif path in self.statements.assigned or "discrete" in basic.prefixes:
-            field_made = discrete(self._unit(basic), description, start=0.0)
+            declared = discrete(self._unit(basic), description, start=0.0)
         elif "input" in basic.prefixes and signal:
-            field_made = signal_in(self._unit(basic), description)
+            declared = signal_in(self._unit(basic), description)
         elif "output" in basic.prefixes and signal:
-            field_made = signal_out(self._unit(basic), description)
+            declared = signal_out(self._unit(basic), description)
         else:
             nominal = self._number(basic.given.inner.get("nominal"))
-            wanted = self._known(basic.given.inner.get("stateSelect"))
-            field_made = var(
-                self._unit(basic),
-                description,
-                state={"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}.get(
-                    wanted, "default"
-                ),
-                nominal=nominal or 1.0,
-            )
+            select: Any = _STATE_SELECT.get(self._known(basic.given.inner.get("stateSelect")), "default")
+            declared = var(self._unit(basic), description, state=select, nominal=nominal or 1.0)
         if path in self.statements.outputs:
             memory = boolean(description)
             self.component._declare(f"{path}{MEMORY}", memory)
             self._start(path, basic, memory)
-        self.component._declare(path, field_made)
+        self.component._declare(path, declared)
         self._display(path, basic)
-        self._start(path, basic, field_made)
+        self._start(path, basic, declared)
 
     def _start(self, path: str, basic: Basic, declared: Field) -> None:
         """Give the start value; it is fixed, or a first guess."""
