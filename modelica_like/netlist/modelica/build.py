@@ -35,10 +35,6 @@ from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConne
 
 
 @dataclass
-
-_STATE_SELECT = {"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}
-
-
 class Notes:
     """What a reader should know: values that were taken, units that were left out."""
 
@@ -62,6 +58,9 @@ def build_component(instance: Instance, notes: Notes) -> Written:
         ModelicaTextError: something is not supported; several errors come as `WiringErrors`.
     """
     return _Builder(instance, notes).run()
+
+
+_STATE_SELECT = {"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}
 
 
 class _Builder:
