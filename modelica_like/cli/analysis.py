@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from modelica_like.cli.declare import Option
 from modelica_like.cli.models import Start
+from modelica_like.cli.reader import Option
 from modelica_like.cli.shared import TABLE, Assignments, Debug, Json, Netlist, Plot, Until, load_netlist, told
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from modelica_like.cli.declare import Argument, Option
 from modelica_like.cli.export import Fmi
+from modelica_like.cli.reader import Argument, Option
 from modelica_like.cli.shared import (
     Assignments,
     Csv,

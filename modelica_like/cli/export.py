@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from modelica_like.cli.declare import Option
-from modelica_like.cli.shared import Assignments, Debug, Json, Netlist, load_netlist, say, told
+from modelica_like.cli.reader import Argument, Option
+from modelica_like.cli.shared import Assignments, Debug, Json, Netlist, load_netlist, note, say, told
+from modelica_like.writing import write_text
 
 Fmi = Annotated[Literal["2.0", "3.0"], Option(help="Version of FMI.")]
 Takes = Literal["flow", "potential"]
@@ -92,3 +93,42 @@ def runtimes(
                 runtime_library(name, status.update)
         libraries = ((name, str(found_runtime(name) or "not compiled")) for name in RUNTIMES)
         page.print(table("run-times", "platform", "library", rows=libraries))
+
+
+def from_modelica(
+    text: Annotated[Path, Argument(metavar="FILE", help="Modelica text (.mo).")],
+    output: Annotated[
+        Path | None, Option("--output", "-o", metavar="FILE", help="Netlist; by default FILE.toml.")
+    ] = None,
+    *,
+    name: Annotated[
+        str, Option("--class", metavar="NAME", help="Model to read; by default the last one of the file.")
+    ] = "",
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Write a model of Modelica text as a netlist."""
+    target = output or text.parent / f"{text.stem or 'model'}.toml"
+    with told(debug, files=[target]):
+        from modelica_like.netlist.modelica.netlist_form import netlist_text
+        from modelica_like.netlist.modelica.read import read_modelica
+
+        model, notes = read_modelica(text, name)
+        write_text(target, netlist_text(model, target.parent, notes))
+        note(*notes)
+        say(f"{target}: {len(model.parts)} parts; next, modelica-like simulate {target}")
+
+
+def to_modelica(
+    netlist: Netlist, assignments: Assignments = None, *,
+    output: Annotated[
+        Path | None, Option("--output", "-o", metavar="FILE", help="Modelica text; by default NETLIST.mo.")
+    ] = None,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Write a netlist as Modelica text on classes of the Modelica Standard Library."""
+    target = output or netlist.parent / f"{netlist.stem or 'model'}.mo"
+    with told(debug, files=[target]):
+        from modelica_like.netlist.modelica.write import modelica_text
+
+        write_text(target, modelica_text(load_netlist(netlist, assignments)))
+        say(str(target))

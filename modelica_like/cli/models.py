@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from modelica_like.cli.declare import Option
+from modelica_like.cli.reader import Option
 from modelica_like.cli.shared import (
     Assignments,
     Csv,

@@ -5,12 +5,35 @@ from __future__ import annotations
 import argparse
 import inspect
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, NoReturn, get_args, get_origin, get_type_hints
 
-from modelica_like.cli.declare import Option
 from modelica_like.errors import did_you_mean
+
+
+class Argument:
+    """A value by its position.
+
+    Args:
+        names: of an option, with their dashes; by default that of the parameter.
+        metavar: name of the value in the help.
+        help: description.
+        choices: returns the values that a shell completes.
+    """
+
+    def __init__(
+        self, *names: str, metavar: str | None = None, help: str, choices: Callable[[], Iterable[str]] | None = None
+    ) -> None:
+        self.names = names
+        self.metavar = metavar
+        self.help = help
+        self.choices = choices
+
+
+class Option(Argument):
+    """A value by its name."""
+
 
 _NONE = inspect.Parameter.empty
 _NUMBERS = {int: "a whole number", float: "a number"}

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.reader import Argument, Option
 from modelica_like.errors import InitializationError, ModelicaLikeError, NetlistError, SolveError, Source
 from modelica_like.writing import check_writable
 

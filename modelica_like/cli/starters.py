@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.reader import Argument, Option
 from modelica_like.cli.shared import Debug, say, told
 from modelica_like.cli.validation import DEMO
 from modelica_like.errors import NetlistError

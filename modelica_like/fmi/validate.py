@@ -21,7 +21,7 @@ from modelica_like.fmi.failures import tell_error
 from modelica_like.fmi.process import run_child, workplace
 from modelica_like.fmi.run import TIMEOUT, Kind, Solver, run_fmu
 from modelica_like.fmi.unpack import unpack
-from modelica_like.runs.ranges import ranges
+from modelica_like.runs.curves import ranges
 from modelica_like.runs.recorded import RecordedSolution
 from modelica_like.runs.trajectories import Values
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like import upper
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
-from modelica_like.language.declared import Connector, Declared, annotated, refuse_collection, unknown
+from modelica_like.language.declared import Connector, Declared, Terminal, annotated, refuse_collection, unknown
 from modelica_like.language.equation import Equations
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
@@ -18,7 +18,6 @@ from modelica_like.language.icon import Icon
 from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
-from modelica_like.language.terminal import Terminal
 from modelica_like.language.transition import Events
 
 

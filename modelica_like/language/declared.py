@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, Literal, Self, cast
 
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.language.expr import Expr, Symbol, symbol_of
@@ -203,3 +203,21 @@ def refuse_collection(label: str, value: object, where: Callable[[], Source] | N
     raise LanguageError(
         f"{label} is a {kind} that is no array of parts: it has {kinds}.", where=where() if where else (), advice=advice
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    """The terminal formed by the signals of an adaptor.
+
+    Attributes:
+        kind: kind of the terminal; ends of one kind can be connected.
+        takes: quantity from outside: the `flow` (torque, force, current, heat flow) or the `potential` (angle,
+            position, voltage, temperature).
+        rates: pairs of an input and the input that is its time derivative.
+        power: the flow and the signal whose product is the power through it, such as torque and speed.
+    """
+
+    kind: str
+    takes: Literal["flow", "potential"]
+    rates: tuple[tuple[str, str], ...] = ()
+    power: tuple[str, str] | None = None

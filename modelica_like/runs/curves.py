@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,6 @@ import numpy as np
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import UnknownName, ValueOutOfRange
 from modelica_like.runs.display import Display
-from modelica_like.runs.ranges import ranges
 from modelica_like.runs.trajectories import Trajectories, fitting
 from modelica_like.solve.recorder import Event
 from modelica_like.style import COLOURS, picture, text_width, with_unit
@@ -19,6 +18,7 @@ from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 
 _Rows = np.ndarray[Any, np.dtype[np.intp]]
 _Marks = np.ndarray[Any, np.dtype[np.bool_]]
@@ -295,3 +295,25 @@ def _deviation(first: Trajectories, second: Trajectories, name: str, grid: _Grid
     k = int(np.argmax(difference))
     largest = float(difference[k])
     return Deviation(name, first.unit_of(name), largest, largest / scale, float(grid.times[k]))
+
+
+_NOISE = 1e-6
+
+
+def ranges(solution: Trajectories, names: Iterable[str], least: float = _NOISE) -> dict[str, float]:
+    """Return the range of each signal, largest minus smallest value.
+
+    The slip of a stuck clutch is rounding noise without a range. So the range is at least a share of the largest value
+    among the signals of its unit.
+
+    Args:
+        solution: the run.
+        names: signals.
+        least: that share.
+    """
+    spans = {name: float(np.ptp(solution[name])) for name in names}
+    largest: dict[str, float] = {}
+    for name in spans:
+        unit = solution.unit_of(name)
+        largest[unit] = max(largest.get(unit, 0.0), float(np.abs(solution[name]).max()))
+    return {name: max(span, least * largest[solution.unit_of(name)]) or 1.0 for name, span in spans.items()}

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
@@ -13,7 +14,6 @@ from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.options import Options
 from modelica_like.runs.energy import EnergyBalance, energy_balance
-from modelica_like.runs.rates import differentiated, rate_along
 from modelica_like.runs.reading import TOGETHER, blocks, energy_term, variables
 from modelica_like.runs.trajectories import ENERGY_TERMS, Statistics, Trajectories, Values
 from modelica_like.solve.dense import Dense
@@ -204,3 +204,44 @@ class Solution(Trajectories):
             f"<Solution of {self.model.name}: {len(self.model.flat_variables)} variables, {span}, "
             f"{len(self.events)} mode changes, {self.statistics.steps} steps in {self.statistics.seconds * 1e3:.1f} ms>"
         )
+
+
+def differentiated(path: str) -> str:
+    """Return the variable in `der(variable)`, or an empty text for other paths."""
+    return path[4:-1].strip() if path.startswith("der(") and path.endswith(")") else ""
+
+
+def rate_along(model: CompiledDae, name: str, times: Any, x: Vector, z: Vector, d: Vector) -> Vector:
+    """Return the time derivative of one variable, with the inputs held.
+
+    Args:
+        model: the compiled model.
+        name: path of the variable.
+        times: shape (n,), in s.
+        x: states, shape (nx, n).
+        z: implicit unknowns, shape (nz, n).
+        d: modes and discrete values, shape (nd, n).
+
+    Returns:
+        Shape (n,), in the variable's unit per second.
+
+    Raises:
+        UnknownName: there is no such variable, or it changes only at events.
+    """
+    if name not in model.position:
+        near = did_you_mean(name, list(model.position)) or "."
+        raise UnknownName(f"{model.name} has no continuous variable '{name}'{near}")
+    row, arguments = model.position[name], list(model.arguments.values())
+
+    def make() -> ca.Function:
+        parts = model.motion.parts(model.variables(*arguments)[row])
+        return ca.Function("rate", arguments, [ca.densify(part) for part in parts])
+
+    parts = model.once(("rate", name), make)(np.reshape(times, (1, -1)), x, z, model.p, model.u, d)
+    direct, by_z, drift, jacobian = (np.asarray(part.full()) for part in parts)
+    if not model.implicit:
+        return direct.ravel()
+    count, size = len(times), len(model.implicit)
+    slopes = jacobian.reshape(size, count, size).transpose(1, 0, 2)
+    z_rates = -np.linalg.solve(slopes, drift.T[:, :, None])[:, :, 0]
+    return direct.ravel() + np.sum(by_z.reshape(count, size) * z_rates, axis=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from types import MappingProxyType
@@ -14,7 +14,6 @@ from modelica_like.compile.compiled import Vector
 from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean, extra_module
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
-from modelica_like.runs.branches import member, next_names
 from modelica_like.solve.initialize import Point
 from modelica_like.solve.recorder import Ended, Event
 from modelica_like.upper import Shown
@@ -25,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from modelica_like.runs.energy import EnergyBalance
+    from modelica_like.runs.trajectories import Trajectories
+
 
 ENERGY_TERMS = ("stored_energy", "loss_power", "source_power")
 
@@ -259,3 +260,45 @@ def fitting(candidates: Sequence[str], patterns: Sequence[str], missing: str) ->
             raise UnknownName(f"{missing} '{pattern}'{did_you_mean(pattern, candidates) or '.'}")
         names.update(dict.fromkeys(some))
     return list(names)
+
+
+class Branch:
+    """Variables of a run below a path.
+
+    Args:
+        run: the run.
+        path: path of a part.
+    """
+
+    def __init__(self, run: Trajectories, path: str) -> None:
+        self._run, self._path = run, path
+
+    def __getattr__(self, name: str) -> Any:
+        return member(self._run, f"{self._path}.{name}")
+
+    def __dir__(self) -> list[str]:
+        return next_names(self._run.names, f"{self._path}.")
+
+    def __repr__(self) -> str:
+        return f"<{self._path}: {', '.join(dir(self))}>"
+
+
+def member(run: Trajectories, path: str) -> Any:
+    """Return a variable, shape (n,), or what is below a part.
+
+    Raises:
+        AttributeError: there is no such path.
+    """
+    if path in run.names:
+        return run[path]
+    if next_names(run.names, f"{path}."):
+        return Branch(run, path)
+    before, dot, name = path.rpartition(".")
+    near = did_you_mean(name, next_names(run.names, before + dot))
+    raise AttributeError(f"The run of {run.model.name} has no '{path}'{near or '.'}")
+
+
+def next_names(names: Iterable[str], before: str) -> list[str]:
+    """Return the words that follow the beginning of a path, each once."""
+    after = (name.removeprefix(before) for name in names if name.startswith(before))
+    return [*dict.fromkeys(word for name in after if (word := name.partition(".")[0]).isidentifier())]
