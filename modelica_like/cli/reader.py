@@ -120,7 +120,7 @@ def paragraphs(command: Callable[..., None]) -> list[str]:
 def reader(name: str, command: Callable[..., None]) -> Reader:
     """Return the reader of a command."""
     declared = parameters(command)
-    places, options = [one for one in declared if not one.option], [one for one in declared if one.option]
+    places, options = [d for d in declared if not d.option], [d for d in declared if d.option]
     result = Reader(name, " ".join(["[OPTIONS]", *(place.place() for place in places)]), paragraphs(command))
     for title, those in ("Arguments", places), ("Options", options):
         group = result.add_argument_group(title)

@@ -84,7 +84,7 @@ class DiscreteEquations:
     ) -> None:
         self._component, self._kind = component, type(component).__name__
         self.updates = [self._of_equation(equation) for equation in equations]
-        self.events: list[Transition | StartMode] = [one for one in events if isinstance(one, Transition | StartMode)]
+        self.events: list[Transition | StartMode] = [e for e in events if isinstance(e, Transition | StartMode)]
         self.hidden: list[Hidden] = []
         self.delays: list[tuple[Marker, Source]] = []
         self._kept: list[Symbol] = []
@@ -93,7 +93,7 @@ class DiscreteEquations:
                 self.updates += self._of_when(event)
             elif isinstance(event, Assertion):
                 self._write_assertion(event, f"assertion[{number}]")
-        expressions = [(expression, one.source) for one in self.events for expression in _expressions(one)]
+        expressions = [(expression, e.source) for e in self.events for expression in _expressions(e)]
         for expression, source in expressions:
             for symbol in symbols_in(expression) if is_expression(expression) else ():
                 if isinstance(symbol, Pre):

@@ -89,7 +89,7 @@ class _Flattener:
 
     def run(self) -> FlatModel:
         templates = self._elaborate()
-        used = {self._owner(one, _plain(name)) for one, template in templates for name in template.discretes}
+        used = {self._owner(c, _plain(name)) for c, template in templates for name in template.discretes}
         for component, template in templates:
             self._declare(component, used)
             for path, text in template.initial:

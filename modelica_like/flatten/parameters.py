@@ -137,7 +137,7 @@ class Parameters:
         owner = scope.find(owner_path)
         field = owner.fields.get(name)
         if not isinstance(field, Parameter | Input):
-            names = [key for key, one in owner.fields.items() if isinstance(one, Parameter)]
+            names = [key for key, f in owner.fields.items() if isinstance(f, Parameter)]
             raise unknown("parameter", f"{label}: {owner.label}", path, names, {path: owner.renamed.get(name, "")})
         value = self._q[self.position(owner, name)]
         # A constant has a unit, too.

@@ -117,12 +117,12 @@ class _Written:
 
     def _of_node(self, node: Any, parts: list[Any]) -> Any:
         olds = [part.element_hash() for part in parts]
-        news = [self._known[one][1] for one in olds]
+        news = [self._known[x][1] for x in olds]
         operation = node.op()
         if operation == ca.OP_SIGN and moves(node):
             key, (old,), (new,) = node.element_hash(), parts, news
             return self._step((key, 0), old > 0, new > 0) - self._step((key, 1), old < 0, new < 0)
-        if olds != [one.element_hash() for one in news]:
+        if olds != [n.element_hash() for n in news]:
             whole = ca.SX.unary(operation, *news) if len(news) == 1 else ca.SX.binary(operation, *news)
         else:
             whole = node

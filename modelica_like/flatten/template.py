@@ -196,7 +196,7 @@ def path_of(symbol: Symbol, root: Component) -> str:
     """Return the path of a symbol, seen from a component: `n`, `clutch.n`, `pre(n)`, `relation[1]`, `time`."""
     if isinstance(symbol, Pre):
         return f"pre({path_of(symbol.of, root)})"
-    global_one = isinstance(symbol, Marker) or any(symbol is one for one in (TIME, INITIAL, TERMINAL, HOMOTOPY))
+    global_one = isinstance(symbol, Marker) or any(symbol is x for x in (TIME, INITIAL, TERMINAL, HOMOTOPY))
     return symbol.name if global_one else relative_path(symbol.owner, root, symbol.name)
 
 

@@ -53,7 +53,7 @@ class Wiring:
             if type(end) is not type(ends[0]):
                 self.errors.append(_different_kinds(ends[0], end, source))
                 # Their missing connection is a consequence, not another error.
-                self.freed.update(id(one) for one in ends)
+                self.freed.update(id(e) for e in ends)
                 return
         first, *others = (self._key(scope, end, source) for end in ends)
         for key in others:

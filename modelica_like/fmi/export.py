@@ -238,7 +238,9 @@ def _contents(
         kinds = dict.fromkeys(icon_name(terminal.kind) for terminal in model.terminals)
         shown = [_PICTURES / f"{kind}.{suffix}" for kind in kinds for suffix in ("png", "svg")]
         pictures = {f"terminalsAndIcons/{picture.name}": picture.read_bytes() for picture in shown}
-        pictures |= {f"terminalsAndIcons/icon.{ending}": one for ending, one in zip(("svg", "png"), icon, strict=True)}
+        pictures |= {
+            f"terminalsAndIcons/icon.{ending}": drawn for ending, drawn in zip(("svg", "png"), icon, strict=True)
+        }
     seen = variables.variables + (variables.arrays if about.version == "3.0" else ())
     data = model_file(make_tables(model, variables.start), seen, _TOKEN, about.tolerance, about.fixed_step)
     # A GUID that is a hash of the content.

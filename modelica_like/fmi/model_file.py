@@ -211,7 +211,7 @@ def _contents(
         "state_names": [text(name) for name in model.states],
         "implicit_names": [text(name) for name in model.implicit],
         "singular_names": [text(", ".join(names[:6])) for names, _ in model.singular],
-        "variables": [_variable(variable, text) for variable in sorted(variables, key=lambda one: one.reference)],
+        "variables": [_variable(variable, text) for variable in sorted(variables, key=lambda v: v.reference)],
         "rising": [(*pair, *(text(model.flat_parameters[k].path) for k in pair)) for pair in model.rising],
         "delays": [
             (text(model.flat_discretes[first].path.removesuffix("[0]")), first) for first, *_ in model.delay_parts
@@ -241,7 +241,7 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
             (transition.mode, transition.target, int(transition.timed), ends, transition.index, *texts, sources)
         )
         resets += [(_place(model, r), r.value, k, -1, r.factor) for r in transition.resets]
-    guards = {one.index: k for k, one in enumerate(model.transitions) if not one.timed}
+    guards = {t.index: k for k, t in enumerate(model.transitions) if not t.timed}
     names = [text(name) for discrete in model.flat_discretes for name in discrete.names]
     return {
         "transitions": transitions,
@@ -249,13 +249,13 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
         "resets": resets,
         "reset_nodes": model.reset_nodes,
         "updates": [
-            (_place(model, r), k, 0, r.index if one.at_start else -1, r.factor)
-            for k, (one, r) in enumerate((row, row.reset) for row in model.update_rows)
+            (_place(model, r), k, 0, r.index if e.at_start else -1, r.factor)
+            for k, (e, r) in enumerate((row, row.reset) for row in model.update_rows)
         ],
         "modes": [
             (*place, int(discrete.hidden))
             for place, discrete in zip(
-                _counted(len(one.names) for one in model.flat_discretes), model.flat_discretes, strict=True
+                _counted(len(d.names) for d in model.flat_discretes), model.flat_discretes, strict=True
             )
         ],
         "mode_names": names,

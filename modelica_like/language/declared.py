@@ -57,7 +57,7 @@ class Declared:
             size: how many; what was declared under this name before is gone.
             field: of each, such as `var("N.m", "torque")`.
         """
-        kept = {key: one for key, one in self._own_fields.items() if not key.startswith(f"{name}[")}
+        kept = {key: f for key, f in self._own_fields.items() if not key.startswith(f"{name}[")}
         for key in (f"{name}[{k}]" for k in range(1, size + 1)):
             kept[key] = copy(field)
             kept[key].owner, kept[key].name = type(self).__name__, key
@@ -153,7 +153,7 @@ class Connector(Declared):
     @property
     def quantities(self) -> dict[str, Variable]:
         """Its potentials and flows by name."""
-        return {name: one for name, one in self.fields.items() if isinstance(one, Variable)}
+        return {name: f for name, f in self.fields.items() if isinstance(f, Variable)}
 
     def power(self) -> Expr | float:
         """Power in W that flows into the component."""

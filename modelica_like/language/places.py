@@ -129,7 +129,7 @@ def source_of(code: CodeType, instruction: int) -> Source:
         lines[-1] = lines[-1].encode()[:end_column].decode(errors="ignore")
         lines[0] = lines[0].encode()[column:].decode(errors="ignore")
     # Reading tokens is slow at first, and few statements have comments inside.
-    text = _without_comments(lines) if len(lines) > 1 and any("#" in one for one in lines) else " ".join(lines)
+    text = _without_comments(lines) if len(lines) > 1 and any("#" in line for line in lines) else " ".join(lines)
     return Source(code.co_filename, line, " ".join(text.split()))
 
 

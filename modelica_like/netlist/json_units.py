@@ -71,7 +71,7 @@ def _pattern(unit: Unit) -> str:
 
 def _factor(name: str, power: Exponent) -> str:
     names = _alike(ATOMS[name].exponents) if name in ATOMS else (name,)
-    alternatives = "|".join(re.escape(one) if one == "%" else one for one in names)
+    alternatives = "|".join(re.escape(n) if n == "%" else n for n in names)
     spelled = "" if power == 1 else rf"\^?{power}" if isinstance(power, int) else re.escape(f"^({power})")
     return f"({alternatives}){spelled}"
 

@@ -111,7 +111,7 @@ class Collector:
         span, first = float(segments[-1].times[-1] - segments[0].times[0]), 0
         numbers: list[Number] = []
         for output, parts in zip(self.outputs, self._parts, strict=True):
-            values, times = (one[first : first + len(parts)] for one in (self._values, self._times))
+            values, times = (x[first : first + len(parts)] for x in (self._values, self._times))
             best = int(np.argmax(values)) if output.kind == "peak" else 0
             number = Number(output.combined(values, span))
             number.name, number.unit, number.time = output.name, str(output.unit), float(times[best])

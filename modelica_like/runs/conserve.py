@@ -162,7 +162,7 @@ class _Places:
 
 def _between(segments: Sequence[Segment], low: int, high: int) -> Iterator[Segment]:
     """Yield the part of a run from interval `low` to `high`, which is not included."""
-    counts = [len(one.times) - 1 for one in segments]
+    counts = [len(s.times) - 1 for s in segments]
     for segment, first, count in zip(segments, accumulate(counts, initial=0), counts, strict=False):
         begin, end = max(low - first, 0), min(high - first, count)
         if begin < end:

@@ -221,10 +221,10 @@ class Curves:
                 break
             middles = 0.5 * (begins + ends)[rough]
             begins, ends = _mixed(begins[rough], middles), _mixed(middles, ends[rough])
-            owner, before, stuck = (np.repeat(one[rough], 2) for one in (owner, excess, stuck))
-        begins, ends = (np.concatenate([one[k] for one in kept]) for k in (0, 1))
+            owner, before, stuck = (np.repeat(x[rough], 2) for x in (owner, excess, stuck))
+        begins, ends = (np.concatenate([x[k] for x in kept]) for k in (0, 1))
         order = np.argsort(begins, kind="stable")
-        return Fitted(begins[order], ends[order], np.concatenate([one[2] for one in kept], axis=1)[:, order])
+        return Fitted(begins[order], ends[order], np.concatenate([k[2] for k in kept], axis=1)[:, order])
 
     def _values(self, dense: Dense, owner: Any, begins: Vector, ends: Vector) -> Vector:
         times = begins[:, None] + 0.5 * (1.0 + NODES) * (ends - begins)[:, None]

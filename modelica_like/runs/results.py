@@ -73,7 +73,7 @@ class OfResults(Dense):
 
     def _through(self, pieces: Any, times: Vector, width: int) -> tuple[Vector, Vector]:
         """Values at times of the polynomials through results around pieces, and the ranges of those results."""
-        left, low, high = (one[pieces] for one in (self._left, self._first, self._last))
+        left, low, high = (x[pieces] for x in (self._left, self._first, self._last))
         widths = np.minimum(width, high - low + 1)
         values, spread = np.zeros((2, len(self._values), len(times)))
         for size in np.unique(widths).tolist():

@@ -60,7 +60,7 @@ class Solution(Trajectories):
     @property
     def ended(self) -> Ended | None:
         """Where and why a component has ended the run, or None."""
-        ends = (one for one in self.events if one.transition >= 0 and self.model.transitions[one.transition].ends)
+        ends = (e for e in self.events if e.transition >= 0 and self.model.transitions[e.transition].ends)
         if (event := next(ends, None)) is None:
             return None
         component, dot, _ = event.mode.rpartition(".")

@@ -142,7 +142,7 @@ class _Elimination:
                     cause = self.cause.get(self.find(node)[0])
                     if cause is not None and cause not in causes:
                         causes.append(cause)
-            ends = [one for one in causes if len(self.model.linear[one].terms) == 1]
+            ends = [c for c in causes if len(self.model.linear[c].terms) == 1]
             self.contradictions.append(tuple(ends if len(ends) > 1 else dict.fromkeys([number, *ends])))
             return set()
         match [*terms.items()]:

@@ -99,9 +99,9 @@ def complete(reduced: ReducedDae, ideals: list[IdealElement], rows: list[int]) -
     rates = ca.jtimes(reduced.alg, reduced.x, reduced.ode) + ca.jtimes(reduced.alg, flat.time, ca.SX(1))
     rates += _BACK * reduced.alg
     missed = ca.substitute(reduced.alg, reduced.z, ca.SX.zeros(size))  # linear: what is left of it is the condition
-    zeros = [reduced.values[list(one.zeros)] for one in elements]
-    reactions = [ca.if_else(flat.d[one.mode] == 0, pair[1], pair[0]) for one, pair in zip(elements, zeros, strict=True)]
-    reacting = [one.row for one in elements]
+    zeros = [reduced.values[list(e.zeros)] for e in elements]
+    reactions = [ca.if_else(flat.d[e.mode] == 0, pair[1], pair[0]) for e, pair in zip(elements, zeros, strict=True)]
+    reacting = [e.row for e in elements]
     alg = ca.SX(reduced.alg)
     for k, element in enumerate(elements):
         replaced, impulse, is_norm, weights = *ca.vertsplit(table[:HEAD, k]), table[HEAD:, k]

@@ -153,7 +153,7 @@ def calibrate(
             f"{model.name} could not be calibrated: {failures[-1].what}", where=failures[-1].where,
             advice="Give a guess for which the model can be solved, or narrower bounds.",
         )  # fmt: skip
-    best = min(results, key=lambda one: one.cost)
+    best = min(results, key=lambda r: r.cost)
     return problem.result(best, tuple(2 * result.cost for result in results))
 
 

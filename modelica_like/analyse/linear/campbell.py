@@ -91,10 +91,10 @@ class Campbell:
     def plot(self) -> Figure:
         """Draw frequencies over speed with the lines of the orders; crossings have numbers, with their text below."""
         rpm, top = self.speeds * _RPM, 1.1 * float(np.nanmax(self.frequencies, initial=1.0))
-        met = sorted(self.crossings(), key=lambda one: one.speed)
+        met = sorted(self.crossings(), key=lambda c: c.speed)
         labels = [f"{k}: {name}" for k, name in enumerate(self.modes or [""] * len(self.frequencies), 1)]
         legend = 0.5 + max((text_width(label, 8.0) for label in labels), default=0.0)
-        width, below = max(8.0, 5.0 + legend), [[f"{k}  {one}" for k, one in enumerate(met, 1)]]
+        width, below = max(8.0, 5.0 + legend), [[f"{k}  {c}" for k, c in enumerate(met, 1)]]
         with picture(f"Campbell diagram of {self.name}", 1, 4.2, width=width, below=below) as (figure, (axes,)):
             for mode, curve in enumerate(self.frequencies):
                 axes.plot(rpm, curve, color=COLOURS[mode % len(COLOURS)], label=labels[mode])
@@ -110,7 +110,7 @@ class Campbell:
                 )
             axes.set(xlabel=f"{self.speed} in rpm", ylabel="frequency in Hz", ylim=(0, top), xlim=(rpm[0], rpm[-1]))
             axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title="modes", title_fontsize=8)
-            numbered(axes, [(one.speed * _RPM - rpm[0]) / (rpm[-1] - rpm[0]) for one in met], width - 1.0 - legend)
+            numbered(axes, [(c.speed * _RPM - rpm[0]) / (rpm[-1] - rpm[0]) for c in met], width - 1.0 - legend)
         return figure
 
     def __str__(self) -> str:
@@ -144,7 +144,7 @@ def campbell(
     if len(linear) < 2:
         raise ValueOutOfRange(f"A Campbell diagram needs at least two values of {path}.")
     row = model.position[speed]
-    speeds = np.array([call(one.model, one.model.variables, one.point)[row] for one in linear])
+    speeds = np.array([call(m.model, m.model.variables, m.point)[row] for m in linear])
     order = np.argsort(speeds, kind="stable")
     ahead = [(values := linear[k].eigenvalues())[values.imag > 0] for k in order]
     # Each mode continues as the nearest one.

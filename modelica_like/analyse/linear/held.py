@@ -79,7 +79,7 @@ def _held_speeds(model: CompiledDae, point: Point) -> Iterator[Vector]:
         free.d[hold.mode] = free.d[hold.mode] if hold.loose < 0 else hold.loose
     share(model, free)
     rates = _rate_slopes(model, point), _rate_slopes(model, free)
-    for slope in variable_slopes(model, point, [one.motion for one in held]):
+    for slope in variable_slopes(model, point, [h.motion for h in held]):
         # A creep speed follows its torque: its rate depends on something; compare it with the rate of a free motion.
         present, let_go = (np.abs(slope @ rate).max() for rate in rates)
         if np.any(slope) and not present > _ZERO * let_go:

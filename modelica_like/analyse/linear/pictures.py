@@ -40,10 +40,8 @@ def bode(linear: LinearModel, f: Any = None) -> Figure:
         f = np.unique([*f, *(np.geomspace(min(limits) / 3, max(limits) * 3, 300) if limits else ())])
     gains = linear.response(f)
     curves = _curves(linear, gains)
-    modes = [one for one in linear.modes() if one.oscillates and f[0] <= one.frequency <= f[-1]]
-    texts = [
-        f"{k}  {one.frequency:.4g} Hz, damping {one.damping:.3g}: {mode_name(one)}" for k, one in enumerate(modes, 1)
-    ]
+    modes = [m for m in linear.modes() if m.oscillates and f[0] <= m.frequency <= f[-1]]
+    texts = [f"{k}  {m.frequency:.4g} Hz, damping {m.damping:.3g}: {mode_name(m)}" for k, m in enumerate(modes, 1)]
     labels = max((text_width(label, 8.0) for label in curves), default=0.0) + 0.5
     width = max(8.0, 5.0 + labels)
     below = [margins.lines() if margins else [], texts]
@@ -65,9 +63,7 @@ def bode(linear: LinearModel, f: Any = None) -> Figure:
         for axes in (size, phase):
             for mode in modes:
                 axes.axvline(mode.frequency, color="#999999", linewidth=0.7, linestyle=":", zorder=0.5)
-        numbered(
-            size, [float(np.log(one.frequency / f[0]) / np.log(f[-1] / f[0])) for one in modes], width - 1.2 - labels
-        )
+        numbered(size, [float(np.log(m.frequency / f[0]) / np.log(f[-1] / f[0])) for m in modes], width - 1.2 - labels)
         if margins:
             _mark_margins(size, phase, margins, gains[0, 0], f)
         figure.align_ylabels([size, phase])

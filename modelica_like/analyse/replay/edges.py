@@ -97,7 +97,7 @@ def _ties(later: _Later) -> list[Edge]:
         still = np.all(still_at[first : last + 1], axis=0)
         if isinstance(move := chain.moves[last] if last < len(chain.moves) else None, Jump):
             # A guard that fires at the end of the segment was approaching zero.
-            fired = [model.transitions[one.transition] for one in move.events if one.transition >= 0 and not one.round]
+            fired = [model.transitions[e.transition] for e in move.events if e.transition >= 0 and not e.round]
             still[[guards.positions[id(transition)] for transition in fired if not transition.timed]] = False
         if chain.nodes[last].t > chain.nodes[first].t:
             segments.append((first, last, still))
@@ -143,7 +143,7 @@ def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
     """
     chain, readings, model = later.chain, later.readings, later.chain.model
     size, end = Sizes.of(model), len(chain.moves)
-    held = [k for k, one in enumerate(model.holds) if one.mode == mode]
+    held = [k for k, h in enumerate(model.holds) if h.mode == mode]
     until = min(last + 1, end)
     for hold, begin in product(held, dict.fromkeys((last, first))):
         change = _sliding(model, chain.nodes[begin], hold)

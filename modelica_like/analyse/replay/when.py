@@ -89,7 +89,7 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
     theta = np.concatenate([model.p, model.u, before.d])
     weights = np.concatenate([np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)])
     nx = len(before.x)
-    spans = [float(np.max(np.abs(one.by[:nx]) * weights[:nx])) for _, one in triggers]
+    spans = [float(np.max(np.abs(t.by[:nx]) * weights[:nx])) for _, t in triggers]
     size = SAME * max(before.t - begin.t, abs(before.t), *spans)
     apart: list[Coincidence] = []
     for other, second in triggers[1:]:

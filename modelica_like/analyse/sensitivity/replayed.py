@@ -194,4 +194,4 @@ def _tops(step: Step, rate: Callable[[Point], float]) -> list[Step]:
         for low, high in pairwise(rates)
         if low[1] > 0.0 >= high[1] or low[1] >= 0.0 > high[1]
     ]
-    return [one for one in steps if one is not None]
+    return [s for s in steps if s is not None]

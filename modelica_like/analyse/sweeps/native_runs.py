@@ -42,7 +42,7 @@ class NativeRuns:
                 raise ValueOutOfRange(f"{output.name} is not within the run, {span[0]:g} s to {end:g} s.")
         self._model, self._names, self._outputs, self._begin = model, names, outputs, span[0]
         # The last reading is the time at the end, where a component may end a run earlier.
-        parts = [*(one.parts(model) for one in outputs), [Part("end", "time")]]
+        parts = [*(x.parts(model) for x in outputs), [Part("end", "time")]]
         extended = _with_expressions(model, [part for some in parts for part in some])
         readings = [[reading for part in some for reading in _readings(model, extended, part)] for some in parts]
         self._lasts = np.cumsum([len(some) for some in readings])
@@ -82,7 +82,7 @@ class NativeRuns:
             if place < len(model.flat_parameters):
                 parameter = model.flat_parameters[place]
                 fine &= _within(points[:, column], parameter.min, parameter.max) & parameter.tunable
-        if any(one.min is not None or one.max is not None for one in model.flat_derived):
+        if any(f.min is not None or f.max is not None for f in model.flat_derived):
             for parameter, values in zip(model.flat_derived, model.derived(p.T).full(), strict=True):
                 fine &= np.isfinite(values) & _within(values, parameter.min, parameter.max)
         refusals: dict[int, str] = {}

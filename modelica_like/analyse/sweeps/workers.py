@@ -204,7 +204,7 @@ def in_threads(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Done]
                 if not waiting:
                     return
                 done = wait(waiting, return_when=FIRST_COMPLETED).done
-                for future in [one for one in waiting if one in done]:
+                for future in [f for f in waiting if f in done]:
                     first, points = waiting.pop(future)
                     yield reference.review(points, first, *future.result())
         finally:

@@ -127,7 +127,7 @@ def _joined(wires: Iterable[Wire]) -> list[Wire]:
 
 def _find(assembly: Assembly, wires: Sequence[Wire], name: str) -> tuple[Wire, Cut]:
     near = _near_end(assembly, wires, name)
-    wire = next((one for one in wires if near in one.ends), None)
+    wire = next((w for w in wires if near in w.ends), None)
     if wire is None:
         raise NetlistError(f"{near} is connected to nothing, so there is nothing to cut.")
     if wire.signal:  # a value goes from an output to inputs
@@ -229,7 +229,7 @@ def _check_apart(assembly: Assembly, netlist: CutNetlist, cut: Cut) -> None:
     ways = {near: [near]}
     for part in (queue := [near]):
         for wire in netlist.wires:
-            parts = [part_of(one) for one in wire.ends]
+            parts = [part_of(e) for e in wire.ends]
             for other in parts if part in parts else ():
                 if other not in ways:
                     ways[other] = [*ways[part], other]

@@ -81,7 +81,7 @@ def _unit(key: str, entry: Any) -> Unit:
     parameters = table.get("parameters", {})
     if not isinstance(parameters, dict) or not all(isinstance(v, int | float) for v in parameters.values()):
         raise NetlistError(f"{key}.parameters must be a table of numbers, in the FMU's units.")
-    values = {one: to_si(value + 0, ONE, f"{key}.{one}") for one, value in parameters.items()}
+    values = {p: to_si(value + 0, ONE, f"{key}.{p}") for p, value in parameters.items()}
     return Unit(name, Path(table["file"]), values)
 
 

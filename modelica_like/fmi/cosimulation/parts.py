@@ -192,7 +192,7 @@ def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
     names = [model.flat_variables[k].path for k in model.inputs]
     for name in outputs:
         follows = {names[k] for k in depends.inputs_of(model.position[f"{end.adaptor}.{name}"])}
-        causes = follows & {f"{end.adaptor}.{one}" for one in wrong}
+        causes = follows & {f"{end.adaptor}.{w}" for w in wrong}
         if causes and end.takes == "potential":
             return f"{end.path} is rigid: its {outputs[0]} would depend on the acceleration"
         if causes:
@@ -204,7 +204,7 @@ def _impossible(maker: Maker, cuts: Sequence[Cut]) -> ModelicaLikeError:
     """Return the error for the first cut that is impossible in both directions."""
     for cut in cuts:
         sides = [maker.found.group_of(cut.near), maker.found.group_of(cut.far[0])]
-        others = [one for one in cuts if one is not cut]
+        others = [c for c in cuts if c is not cut]
         reasons: dict[str, None] = {}
         for chosen in _choices((cut, *others)):
             objections = [maker.objection(side, chosen) for side in sides]

@@ -102,7 +102,7 @@ class _Builder:
         try:
             action(*arguments)
         except ModelicaLikeError as error:
-            if not any(one.file.endswith(".mo") for one in error.where):
+            if not any(p.file.endswith(".mo") for p in error.where):
                 error.where = (place,) if place.file else error.where
             self.errors.append(error)
             if self.instance.classes.spent:
@@ -308,7 +308,7 @@ class _Builder:
 
     def _check_ends(self, ends: tuple[str, ...]) -> None:
         connectors = [self.component._resolve(end) for end in ends]
-        kinds = {tuple(one.fields) for one in connectors if isinstance(one, WrittenConnector)}
+        kinds = {tuple(c.fields) for c in connectors if isinstance(c, WrittenConnector)}
         if len(kinds) > 1:
             raise ModelicaTextError(f"The connectors {', '.join(ends)} differ.")
         for end, connector in zip(ends, connectors, strict=True):

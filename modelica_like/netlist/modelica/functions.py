@@ -108,8 +108,8 @@ class _Call:
         self.local: dict[str, Expr] = {}
 
     def result(self, given: tuple[Expr, ...], named: Mapping[str, Expr], line: int) -> Expr:
-        inputs = [name for name, one in self.declared.items() if "input" in one.prefixes]
-        outputs = [name for name, one in self.declared.items() if "output" in one.prefixes]
+        inputs = [name for name, d in self.declared.items() if "input" in d.prefixes]
+        outputs = [name for name, d in self.declared.items() if "output" in d.prefixes]
         if len(outputs) != 1:
             raise refused(f"{self.text.name}, a function with {len(outputs)} results,", self.text, self.text.line)
         self.local.update(zip(inputs, given, strict=False))

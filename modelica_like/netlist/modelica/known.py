@@ -74,9 +74,7 @@ class _Part:
         self.initial: list[tuple[Expr, Expr, Source]] = []
 
     def make(self, driven: set[str]) -> Component:
-        self.used = used = {
-            one.path for text in self.known.set.values() for one in names_in(parse_expression(str(text)))
-        }
+        self.used = used = {n.path for text in self.known.set.values() for n in names_in(parse_expression(str(text)))}
         starts: list[tuple[str, Given]] = []
         for name, start in self.entries.items():
             here = self.known.here(name)

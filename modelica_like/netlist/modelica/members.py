@@ -150,7 +150,7 @@ def _instance(owner: Instance, member: Member, text: ClassText, name: str, given
     if text.kind == "record" and value is not None and given.scope is not None and given.scope[0] is not None:
         scope, inside = given.scope
         if value.kind == "call":
-            arguments = {key: Given(one, given.scope, line=value.line) for key, one in value.args[2]}
+            arguments = {key: Given(x, given.scope, line=value.line) for key, x in value.args[2]}
             given = Given(inner=given.inner).over(Given(inner=arguments))
         elif value.kind == "name":
             instance = record_of(scope, value)

@@ -108,7 +108,7 @@ class _Form:
     def _along(self, sets: list[list[tuple[Component, str]]]) -> bool:
         changed = False
         for ends in sets:
-            units = [unit for one in ends if (unit := self._unit(*one)) is not None]
+            units = [unit for e in ends if (unit := self._unit(*e)) is not None]
             for end in ends:
                 if units and self._unit(*end) is None:
                     self._set(*end, units[0])

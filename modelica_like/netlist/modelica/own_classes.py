@@ -77,21 +77,21 @@ def class_of_equations(
 
 def _events(component: Component) -> list[str]:
     """Return the equations of the modes: a mode changes where a transition from its value before has its condition."""
-    events = [one for one, _ in located(component.events())]
-    ends = [one for one in events if isinstance(one, When) and _only_ends(one)]
-    if any(not isinstance(one, Transition | StartMode) and one not in ends for one in events):
+    events = [e for e, _ in located(component.events())]
+    ends = [e for e in events if isinstance(e, When) and _only_ends(e)]
+    if any(not isinstance(e, Transition | StartMode) and e not in ends for e in events):
         raise ModelicaTextError(f"{component.label} has a 'when' or an assertion of Python, which is not written.")
     lines: list[str] = []
     for name, mode in component.modes.items():
-        goes = [one for one in events if isinstance(one, Transition) and one.mode.mode is mode and not one.fails]
-        begins = [one for one in events if isinstance(one, StartMode) and one.mode.mode is mode]
+        goes = [e for e in events if isinstance(e, Transition) and e.mode.mode is mode and not e.fails]
+        begins = [e for e in events if isinstance(e, StartMode) and e.mode.mode is mode]
         chosen = " else".join(f"if {_text(b.when, component, True)} then {mode.number(b.target)}" for b in begins)
         first = str(mode.number(component.start_mode(name)))
         first = f"{chosen} else {first}" if chosen else first
         rest = "".join(f" elseif {_due(t, component)} then {mode.number(t.target)}" for t in goes)
         name = identifier(name)
         lines.append(f"  {name} = if initial() then ({first}){rest} else pre({name});")
-    resets = [one for one in events if isinstance(one, Transition) and one.reset]
+    resets = [e for e in events if isinstance(e, Transition) and e.reset]
     for k, event in enumerate(resets):
         lines.append(f"  {'elsewhen' if k else 'when'} {_due(event, component)} then")
         for target, value in event.reset.items():
@@ -138,7 +138,7 @@ def _check_reset(component: Component, target: Symbol, value: Any) -> None:
         return
     equations = (as_statement(item, source, "") for item, source in located(component.equations()))
     sides = [side for e in equations if isinstance(e, Equation) for side in (e.left, e.right)]
-    states = {one.name for side in sides for one in symbols_in(side) if one.order}
+    states = {s.name for side in sides for s in symbols_in(side) if s.order}
     for symbol in symbols_in(ca.SX(value)):
         if (
             symbol is not TIME

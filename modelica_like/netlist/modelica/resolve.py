@@ -326,7 +326,7 @@ class Resolver:
             return self._told(lambda: functions.OF_ARRAYS[short](values, line), line)
         if short in ELEMENTARY:
             return self._told(lambda: fold.function(short, values, line), line)
-        others = {key: self(one) for key, one in named}
+        others = {key: self(argument) for key, argument in named}
         return self._told(lambda: functions.called(self, expression, values, others), line)
 
     def _homotopy(self, given: list[Expr], line: int) -> Expr:

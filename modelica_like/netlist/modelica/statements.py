@@ -55,7 +55,7 @@ class Statements:
         start = Statements(self.instance)
         for happening, text in self.instance.initial_equations:
             start._statement(happening, text, {})
-        if start.connections or any(not one.text for one in start.happenings):
+        if start.connections or any(not h.text for h in start.happenings):
             happening, text = self.instance.initial_equations[0]
             raise refused("a connection or a 'when' among initial equations", text, happening.line)
         for left, right, source in start.equations:
@@ -260,7 +260,7 @@ class Statements:
             if any(each.kind in ("boolean", "number") for each in conditions):
                 raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
             values = self._changes(body, text, local)
-            calls = (one.parts[0] for one in body if one.kind == "call" and one.parts[0].args[0] == "reinit")
+            calls = (s.parts[0] for s in body if s.kind == "call" and s.parts[0].args[0] == "reinit")
             states = {resolver(call.args[1][0]).args[0][0] for call in calls}
             assigned |= {name for name in values if name not in states and not _is_ending(name)}
             branches.append((conditions, values))

@@ -33,12 +33,12 @@ def groups(connections: list[tuple[Expr, Expr, Source]], instance: Instance) -> 
     wires: list[Wire] = []
     for left, right, source in connections:
         for pair in _pairs(left, right, instance, source):
-            touched = [one for one in wires if set(pair) & set(one.ends)]
+            touched = [w for w in wires if set(pair) & set(w.ends)]
             wire = Wire([], touched[0].source if touched else source)
-            for end in (*(end for one in touched for end in one.ends), *pair):
+            for end in (*(end for t in touched for end in t.ends), *pair):
                 if end not in wire.ends:
                     wire.ends.append(end)
-            wires = [one for one in wires if one not in touched]
+            wires = [w for w in wires if w not in touched]
             wires.append(wire)
     return wires
 
@@ -52,7 +52,7 @@ def _pairs(left: Expr, right: Expr, instance: Instance, source: Source) -> list[
             name, subscripts = end.args[-1]
             elements = (Expr("number", (float(position),)) for position in range(1, count + 1))
             each = (Expr("name", (*end.args[:-1], (name, (*subscripts, element))), end.line) for element in elements)
-            ends[k] = [path for one in each for path in _ends(one, instance)]
+            ends[k] = [path for e in each for path in _ends(e, instance)]
     if len(ends[0]) != len(ends[1]):
         raise ModelicaTextError("The sizes of both ends differ.", where=source)
     return list(zip(*ends, strict=True))
@@ -71,7 +71,7 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
     heads = [f"{name}{index}" for index in indices or [""]]
     if basic_type(instance, member) is not None or not rest:
         return heads
-    inner = ".".join(one + "".join(f"[{int(k.args[0])}]" for k in subs) for one, subs in rest)
+    inner = ".".join(n + "".join(f"[{int(k.args[0])}]" for k in subs) for n, subs in rest)
     part = part_of(instance, member, int(indices[0][1:-1]) if indices else 0)
     if isinstance(part, Known):
         return [f"{head}.{part.here(inner)}" for head in heads]

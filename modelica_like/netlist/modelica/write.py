@@ -91,8 +91,8 @@ class _Writer:
             )  # fmt: skip
         values = {
             key: (f"each {key}", arguments[0][1][key])
-            if all(one[key] == arguments[0][1][key] for _, one in arguments)
-            else (key, "{" + ", ".join(one[key] for _, one in arguments) + "}")
+            if all(a[key] == arguments[0][1][key] for _, a in arguments)
+            else (key, "{" + ", ".join(a[key] for _, a in arguments) + "}")
             for key in keys.pop()
         }
         return f"{kinds.pop()} {identifier(name)}[{len(part)}]{_arguments(dict(values.values()))}"

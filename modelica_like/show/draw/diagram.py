@@ -259,7 +259,7 @@ def _orient(picture: Diagram) -> None:
         pending = deque([first])
         while pending:
             node = pending.popleft()
-            for port in sorted(_ends(node), key=lambda one: one.side != "E"):
+            for port in sorted(_ends(node), key=lambda x: x.side != "E"):
                 for other in (other for net in nets_of[node] if port in net.ports for other in net.ports):
                     if other.node in reached or other.node.component is None or other.signal:
                         continue

@@ -97,7 +97,7 @@ def _columns(diagram: Diagram) -> dict[Node, int]:
     steps: list[ca.SX] = []
     cost = ca.SX(0)
     spans: list[tuple[ca.SX, int]] = []
-    for net in sorted(diagram.nets, key=lambda one: -one.stroke.weight):
+    for net in sorted(diagram.nets, key=lambda w: -w.stroke.weight):
         west, east = ([port.node for port in net.ports if port.way == way] for way in ("E", "W"))
         for a in west:
             for b in east:
@@ -112,7 +112,7 @@ def _columns(diagram: Diagram) -> dict[Node, int]:
         bounds += [inside - low[k], high[k] - inside]
     for node in nodes:
         if node.border:
-            others = [place[one] for one in nodes if one.border != node.border]
+            others = [place[n] for n in nodes if n.border != node.border]
             steps += [(x[k] - x[place[node]]) * (1 if node.border == "W" else -1) for k in others]
     solution = solve_lp(
         ca.vertcat(x, low, high), cost + 1e-3 * ca.sum1(x), [(ca.vertcat(*steps), 1.0), (ca.vertcat(*bounds), 0.0)]
@@ -181,7 +181,7 @@ def _sort(layers: Layers, n: int, east: bool) -> None:
     for net, (before, after) in channel.nets.items():
         ends, others = (after, before) if east else (before, after)
         for end in ends:
-            near = others or [one for one in ends if one is not end]
+            near = others or [e for e in ends if e is not end]
             for other in near:
                 # A port above the middle of its node wants its node lower.
                 offset = (end.port.along if end.port else 0.0) * 0.01

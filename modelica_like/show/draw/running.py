@@ -84,7 +84,7 @@ class Running:
 
 def spelled(value: float, unit: str = "W") -> str:
     """Return a power, or an energy, with a suitable unit."""
-    size, prefix = next((one for one in _PREFIXES if abs(value) >= one[0]), _PREFIXES[-1])
+    size, prefix = next((p for p in _PREFIXES if abs(value) >= p[0]), _PREFIXES[-1])
     return f"{value / size:.3g} {prefix}{unit}"
 
 
@@ -174,7 +174,7 @@ def _moved(box: Box, by: Point) -> Box:
 
 def _looks(part: Component, run: Trajectories) -> Iterator[tuple[float, str, str]]:
     """When the look of a part changes, to what look, and the mode's name."""
-    name = next((one for one, mode in part.modes.items() if mode.holds), None)
+    name = next((m for m, mode in part.modes.items() if mode.holds), None)
     if name is None:
         return
     path, mode = path_of(part), part.modes[name]

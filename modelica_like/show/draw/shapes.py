@@ -119,9 +119,9 @@ def _stretches(drawn: Sheet, modes: Modes, moves: dict[str, float]) -> Iterator[
         if isinstance(item, Placed) and item.sheet is None:
             ports = [(port, name) for port in item.node.ports.values() if (name := _motion(port, modes)) in moves]
             side = {
-                one: [(tips.get(port, x + item.at[0] + way * item.half[0]), moves[name], port.stroke)
-                      for port, name in ports if name and (port.way == one)]
-                for one, way in (("W", -1.0), ("E", 1.0))
+                v: [(tips.get(port, x + item.at[0] + way * item.half[0]), moves[name], port.stroke)
+                      for port, name in ports if name and (port.way == v)]
+                for v, way in (("W", -1.0), ("E", 1.0))
             }  # fmt: skip
             for (x1, first, stroke), (x2, second, _) in product(side["W"], side["E"]):
                 yield Stretch((x1, first), (x2, second), stroke, rigid=False)

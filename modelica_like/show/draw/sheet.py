@@ -134,7 +134,7 @@ def sheet(diagram: Diagram) -> Sheet:
             _route(layers.channels[k], heights, placed, tracks, (x, x + width), lines)
             x += width
         there = [placed[slot.node] for slot in column if slot.node]
-        west, east = (max((side * one.room[k] for one in there), default=0.0) for k, side in ((0, -1.0), (2, 1.0)))
+        west, east = (max((side * t.room[k] for t in there), default=0.0) for k, side in ((0, -1.0), (2, 1.0)))
         for slot in column:
             if slot.node:
                 item = placed[slot.node]
@@ -267,9 +267,9 @@ def _straighten(layers: Layers, heights: dict[Slot, float], placed: dict[Node, P
                 port = end.port
                 if port is None or port.side not in ("N", "S"):
                     continue
-                column = next(one for one in layers.columns if end.slot in one)
+                column = next(c for c in layers.columns if end.slot in c)
                 outermost = column[0 if port.side == "N" else -1] is end.slot
-                alone = sum(one.side == port.side for one in port.node.ports.values()) == 1
+                alone = sum(p.side == port.side for p in port.node.ports.values()) == 1
                 wanted = heights[other.slot] + _offset(other, placed) - heights[end.slot]
                 away = wanted < _offset(end, placed) if port.side == "N" else wanted > _offset(end, placed)
                 clear = port.side == "N" or placed[port.node].above

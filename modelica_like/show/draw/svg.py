@@ -190,7 +190,7 @@ def _looks(
     for look, name in dict.fromkeys((look, name) for _, look, name in looks):
         if run.moving:
             times = [0.0, *(min(time / run.end, 1.0) for time, *_ in looks[1:])]
-            shown = ["visible" if one[1:] == (look, name) else "hidden" for one in looks]
+            shown = ["visible" if x[1:] == (look, name) else "hidden" for x in looks]
             yield (
                 f'<g visibility="{shown[0]}"><animate attributeName="visibility" calcMode="discrete" '
                 f'values="{";".join(shown)}" keyTimes="{";".join(_n(time) for time in times)}" {_CYCLE}/>'

@@ -84,7 +84,7 @@ def _visible(run: Trajectories, behind: Sequence[Change], *, timed: bool) -> lis
     first, last = np.searchsorted(run.time, at), max(np.searchsorted(run.time, at, "right") - 1, 0)
     result: list[Change] = []
     numbers: list[Change] = []
-    for discrete in (one for one in run.model.flat_discretes if not one.hidden and not one.names):
+    for discrete in (d for d in run.model.flat_discretes if not d.hidden and not d.names):
         before, after = (float(run[discrete.path][side]) for side in (first, last))
         if before != after:
             owner = discrete.path.rpartition(".")[0]

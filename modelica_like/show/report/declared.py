@@ -72,7 +72,7 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
     )
     listings.append(filled("structure", ("name", "default", "description"), structure))
     modes = (
-        (code(name), ", ".join(f"{one} ({k})" for k, one in enumerate(mode.names)), mode.start, text(mode.description))
+        (code(name), ", ".join(f"{n} ({k})" for k, n in enumerate(mode.names)), mode.start, text(mode.description))
         for name, mode in kind._class_modes.items()
     )
     listings.append(filled("modes", ("name", "one of (number)", "start", "description"), modes))

@@ -73,7 +73,7 @@ def notes(drive: Component, run: Trajectories, *, energy: bool = True) -> list[s
 
 
 def _neighbours(drawn: Diagram) -> Iterator[str]:
-    joined = {node: {port.node for net in drawn.nets if any(one.node is node for one in net.ports) for port in net.ports
+    joined = {node: {port.node for net in drawn.nets if any(p.node is node for p in net.ports) for port in net.ports
                      if not port.signal} for node in drawn.nodes}  # fmt: skip
     for unit, (what, slip) in _COMPARED.items():
         sized = {node: amount for node in joined if (part := node.component) and (amount := _size(part, unit))}
@@ -154,9 +154,9 @@ def _beyond(run: Solution) -> Iterator[str]:
         if bound is not None
     ]
     try:
-        worst = [(float(number), number.time) for number in run.read(*(f"{k}({one.path})" for one, _, k in bounds))]
+        worst = [(float(number), number.time) for number in run.read(*(f"{k}({b.path})" for b, _, k in bounds))]
     except MissingValue:  # what lies beyond a bound among the results is told at least
-        places = [(run[one.path], int(getattr(np, f"arg{kind}")(run[one.path]))) for one, _, kind in bounds]
+        places = [(run[b.path], int(getattr(np, f"arg{kind}")(run[b.path]))) for b, _, kind in bounds]
         worst = [(float(values[k]), float(run.time[k])) for values, k in places]
     for (variable, bound, kind), (value, time) in zip(bounds, worst, strict=True):
         beyond, verb = (value - bound, "exceeds") if kind == "max" else (bound - value, "falls below")

@@ -114,7 +114,7 @@ def notices(solution: Trajectories) -> list[str]:
     least that it can be.
     """
     notes: dict[tuple[str, str], str] = {}
-    for event in (one for one in solution.events if one.transition >= 0):
+    for event in (e for e in solution.events if e.transition >= 0):
         notice, (component, dot, _) = solution.model.transitions[event.transition].notice, event.mode.rpartition(".")
         ends = solution.model.transitions[event.transition].ends
         if notice and not ends and (component, notice) not in notes:

@@ -26,7 +26,7 @@ def structure_report(component: Component) -> RenderableType:
     terms = (("stored", "stored_energy"), ("dissipated", "loss_power"), ("from outside", "source_power"))
     rows: list[tuple[str, str]] = []
     for what, term in terms:
-        names = [one.label for one in flat.components.values() if _is_there(getattr(one, term)())]
+        names = [c.label for c in flat.components.values() if _is_there(getattr(c, term)())]
         rows.append((what, listed(names) or "none"))
     parts: list[RenderableType] = [_sizes(flat, reduced), "", table("energy", "what", "components", rows=rows)]
     parts += ["", *(f"[dim]{escape(notice)}[/]" for notice in reduced.notices)] if reduced.notices else []

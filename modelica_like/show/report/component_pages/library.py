@@ -79,7 +79,7 @@ def _once(examples: Sequence[Example]) -> list[Example]:
     files: dict[Path, list[Example]] = {}
     for example in examples:
         files.setdefault(example.path, []).append(example)
-    return [min(of, key=lambda one: simplicity(one.line)) for of in files.values()]
+    return [min(of, key=lambda s: simplicity(s.line)) for of in files.values()]
 
 
 def _parts(name: str, table: Any) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -141,7 +141,7 @@ def domain(kind: type[Component]) -> str:
     """
     connectors = kind._class_connectors.values()
     always = [connector for connector in connectors if not connector.optional] or connectors
-    names = sorted({one.stroke.name if one.stroke else type(one).__name__ for one in always})
+    names = sorted({a.stroke.name if a.stroke else type(a).__name__ for a in always})
     return " and ".join(names) or _SIGNALS
 
 

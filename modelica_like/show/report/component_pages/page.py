@@ -114,7 +114,7 @@ def _optional(source: Source) -> dict[str, str]:
     for name, uses in source.uses.items():
         instead = [field for field in source.asked if all(use.get(field) is False for use in uses)]
         if instead and name not in notes:
-            notes[name] = "required without " + ", ".join(f"`{one}`" for one in instead)
+            notes[name] = "required without " + ", ".join(f"`{x}`" for x in instead)
     return notes
 
 

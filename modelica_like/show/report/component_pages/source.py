@@ -309,7 +309,7 @@ class _Reader(Writer):
                     yield from self._assigned(one, other)
             case ast.Tuple(elts=targets), ast.Call(func=ast.Name(id="zip"), args=[ast.Starred(value=table)]):
                 path = self.path(table)
-                if path is None or not all(isinstance(one, ast.Name) for one in targets):
+                if path is None or not all(isinstance(t, ast.Name) for t in targets):
                     raise Unwritable
                 for k, one in enumerate(targets):
                     assert isinstance(one, ast.Name)
@@ -324,7 +324,7 @@ class _Reader(Writer):
                 yield from [] if right.latex == left else [Term(left, right.latex)]
             case ast.Tuple(elts=targets), _:
                 right = self.latex(value)
-                self.local.update({one.id: Path(one.id, own=False) for one in targets if isinstance(one, ast.Name)})
+                self.local.update({t.id: Path(t.id, own=False) for t in targets if isinstance(t, ast.Name)})
                 yield Term(self.latex(target), right)
             case _:
                 raise Unwritable

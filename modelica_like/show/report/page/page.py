@@ -144,7 +144,7 @@ def _told(run: Trajectories, some: Sequence[Change]) -> str:
     why = ", ".join(dict.fromkeys(filter(None, (*(change.because for change in some), _slid(run, last)))))
     if not last.after:
         return f"{last.path}: {why}"
-    discrete = next((one for one in run.model.flat_discretes if one.path == last.path), None)
+    discrete = next((d for d in run.model.flat_discretes if d.path == last.path), None)
     name = (last.owner if discrete is None or discrete.names else last.path) or run.model.name
     return f"{name} becomes {last.after.replace('_', ' ')}{f' ({why})' if why else ''}"
 
