@@ -208,10 +208,8 @@ class DiscreteEquations:
         """Write what determines a marker; return further expressions."""
         argument: Any = marker.of
         if marker.kind == "relation":
-            mode, opposite = (
-                self._mode(marker.name, str(marker.of), marker, ("false", "true")),
-                cast(Expr, ca.logic_not(marker.of)),
-            )
+            mode = self._mode(marker.name, str(marker.of), marker, ("false", "true"))
+            opposite = cast(Expr, ca.logic_not(marker.of))
             self.events += [
                 replace(mode.go("false", "true", when=marker.of), source=source),
                 replace(mode.go("true", "false", when=opposite), source=source),

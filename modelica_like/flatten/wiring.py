@@ -155,8 +155,8 @@ def _is_within(end: Connector | Symbol, scope: Component) -> bool:
 def _givers(scope: Component, ends: Iterable[Connector | Symbol]) -> list[Symbol]:
     """Return what gives a connection its signal: an own input, a part's output, or an own output without these."""
     kinds = [(end, end.owner is scope, end.owner.fields[end.name]) for end in ends if isinstance(end, Symbol)]
-    first = [end for end, kind_of, kind in kinds if isinstance(kind, Input if kind_of else Output)]
-    return first or [end for end, _, kind in kinds if isinstance(kind, Output)]
+    first = [end for end, outer, field in kinds if isinstance(field, Input if outer else Output)]
+    return first or [end for end, _, field in kinds if isinstance(field, Output)]
 
 
 def taken(scope: Component, connection: Connection) -> list[str]:

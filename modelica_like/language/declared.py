@@ -192,9 +192,9 @@ def refuse_collection(label: str, value: object, where: Callable[[], Source] | N
         return
     elements = list(cast("Iterable[Any]", value.values() if isinstance(value, dict) else value))
     inner = [part for e in elements for part in cast("Iterable[Any]", e if isinstance(e, tuple) else (e,))]
-    if any(isinstance(connector, Connector) for connector in inner):
+    if any(isinstance(element, Connector) for element in inner):
         advice = "Give each a name of its own: flange_1 and flange_2; where their number varies, by setattr in `build`."
-    elif any(isinstance(connector, Declared) for connector in inner):
+    elif any(isinstance(element, Declared) for element in inner):
         advice = "An array is a list of parts only: [Inertia(J=1), Inertia(J=2)]; other parts have names of their own."
     else:
         return
