@@ -103,14 +103,8 @@ def _rows(drive: Assembly, path: str, times: Any, values: Any, unit: str) -> lis
         raise ValueOutOfRange(
             f"The times of the input '{path}' do not rise.", advice="For a jump, write two times close to each other."
         )
-    numbers = [
-        to_si(
-            f"{float(value)!r} {unit}" if unit else value.item() if isinstance(value, np.generic) else value,
-            si_unit,
-            path,
-        )
-        for value in values
-    ]
+    plain = [value.item() if isinstance(value, np.generic) else value for value in values]
+    numbers = [to_si(f"{float(value)!r} {unit}" if unit else value, si_unit, path) for value in plain]
     return [list(row) for row in zip(moments, numbers, strict=True)]
 
 

@@ -250,7 +250,7 @@ def energy_balance(
     throughput = max([powers.stored, powers.cancelled, *(float(np.sum(np.abs(part))) for part in exchanged)])
     resets = {number for number, transition in enumerate(model.transitions) if transition.resets}
     reset = [event.time for event in events if event.transition in resets]
-    unexplained = [(z.time, z.energy - float(np.sum(work))) for z, work in zip(impacts, given, strict=True)]
+    unexplained = [(hit.time, hit.energy - float(np.sum(work))) for hit, work in zip(impacts, given, strict=True)]
     at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, unexplained)
     return EnergyBalance(rows, throughput, at_events, options.rtol)
 

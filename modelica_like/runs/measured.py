@@ -40,18 +40,8 @@ def read_columns(path: Path) -> dict[str, tuple[Vector, str]]:
     """
     text = _text(path)
     said = _SEPARATOR.match(text)
-    separator = (
-        said[1]
-        if said
-        else next(
-            (
-                s
-                for s in ";\t"
-                if s in next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
-            ),
-            ",",
-        )
-    )
+    head = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+    separator = said[1] if said else next((mark for mark in ";\t" if mark in head), ",")
     before = 1 if said else 0
     reader = csv.reader(io.StringIO(text[said.end() if said else 0 :], newline=""), delimiter=separator)
     try:
