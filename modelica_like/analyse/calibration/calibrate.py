@@ -132,10 +132,10 @@ def calibrate(
     measured = [data] if isinstance(data, Measurement | str | Path) else list(data)
     if not measured or not parameters:
         raise ValueOutOfRange("A calibration needs data and at least one parameter.")
-    for fit in measured:
-        if not isinstance(fit, Measurement):
+    for item in measured:
+        if not isinstance(item, Measurement):
             raise ValueOutOfRange(
-                f"{fit!r} is no measurement.",
+                f"{item!r} is no measurement.",
                 advice='Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the '
                 "uncertainties.",
             )
