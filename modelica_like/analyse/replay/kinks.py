@@ -76,10 +76,10 @@ def _switches(model: CompiledDae) -> ca.Function:
         moving = ca.vertcat(*(model.arguments[name] for name in "txz"))
         for one in arguments_of_kinks(equations, given):
             if ca.depends_on(one, moving):
-                found.setdefault(str(one), one)
+                places.setdefault(str(one), one)
     edges = model.edges
     smooth = edges.function(*given)[edges.kinks : edges.slopes] if edges.kinks < edges.slopes else ca.SX(0, 1)
-    return ca.Function("kinks", given, [ca.densify(ca.vertcat(ca.SX(0, 1), *found.values(), smooth))])
+    return ca.Function("kinks", given, [ca.densify(ca.vertcat(ca.SX(0, 1), *places.values(), smooth))])
 
 
 def arguments_of_kinks(function: ca.Function, given: list[Any]) -> list[Any]:
