@@ -6,11 +6,13 @@ One description of a drive is simulated, differentiated and exported.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 from modelica_like.former import moved
 
+TYPE_CHECKING = False  # as type checkers know it; the module typing takes half the time of this import
 if TYPE_CHECKING:
+    from typing import Any
+
     from modelica_like.analyse.after.orders import order_map as order_map
     from modelica_like.analyse.after.orders import order_response as order_response
     from modelica_like.analyse.after.spectra import WoehlerLine as WoehlerLine

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from importlib import import_module
-from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
@@ -20,7 +19,8 @@ def moved(homes: Mapping[str, str]) -> None:
     sys.meta_path.insert(0, _Former(homes))
 
 
-class _Former(MetaPathFinder, Loader):
+class _Former:
+    # Not derived from the classes of importlib.abc: that module loads tempfile, random and what reads resources.
     def __init__(self, homes: Mapping[str, str]) -> None:
         self.homes = homes
         self.tops = {name.partition(".")[0] for name in homes}
@@ -28,7 +28,10 @@ class _Former(MetaPathFinder, Loader):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        return ModuleSpec(fullname, self) if self._home(fullname) else None
+        return ModuleSpec(fullname, self) if self._home(fullname) else None  # pyright: ignore[reportArgumentType]
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """Let Python create the module."""
 
     def exec_module(self, module: ModuleType) -> None:
         sys.modules[module.__name__] = import_module(self._home(module.__name__))

@@ -101,9 +101,9 @@ class TransferFunction(Component):
     def equations(self) -> Equations:
         ahead = self.first
         states: list[Expr] = [ahead]
-        for one in self.chain:
-            yield connect(ahead, one.u)
-            ahead = one.y
+        for block in self.chain:
+            yield connect(ahead, block.u)
+            ahead = block.y
             states.append(ahead)
         yield self.u == sum((a * x for a, x in zip(self.den, states, strict=True)), 0)
         used = states[len(states) - len(self.num) :]
@@ -130,7 +130,7 @@ class StateSpace(Component):
 
     def build(self) -> None:
         states, inputs, outputs = len(self.A), len(self.B[0]), len(self.C)
-        shapes = [(len(one), len(one[0])) for one in (self.A, self.B, self.C, self.direct)]
+        shapes = [(len(matrix), len(matrix[0])) for matrix in (self.A, self.B, self.C, self.direct)]
         wanted = [(states, states), (states, inputs), (outputs, states), (outputs, inputs)]
         for name, shape, right in zip("ABCD", shapes, wanted, strict=True):
             if shape != right:
@@ -144,10 +144,10 @@ class StateSpace(Component):
 
     def equations(self) -> Equations:
         x, u = self.array("x"), self.array("u")
-        for one, by_state, by_signal in zip(x, self.A, self.B, strict=True):
-            yield self.time_scale * der(one) == _product(by_state, x) + _product(by_signal, u)
-        for one, by_state, by_signal in zip(self.array("y"), self.C, self.direct, strict=True):
-            yield one == _product(by_state, x) + _product(by_signal, u)
+        for output, by_state, by_signal in zip(x, self.A, self.B, strict=True):
+            yield self.time_scale * der(output) == _product(by_state, x) + _product(by_signal, u)
+        for output, by_state, by_signal in zip(self.array("y"), self.C, self.direct, strict=True):
+            yield output == _product(by_state, x) + _product(by_signal, u)
 
 
 def _product(row: Flat, values: Sequence[Expr]) -> Expr | float:

@@ -68,4 +68,4 @@ class Table2D(Tabulated):
         for name, u, grid in (
             ("first", self.u1 / self.u1_scale, self.first), ("second", self.u2 / self.u2_scale, self.second),
         ):  # fmt: skip
-            yield from self.leaving(name, u, [(one,) for one in grid], least=-inf)
+            yield from self.leaving(name, u, [(value,) for value in grid], least=-inf)

@@ -61,14 +61,14 @@ class ShiftSchedule(Component):
     stage = Mode("holding", "shifting", description="a shift is going on")
 
     def build(self) -> None:
-        known = dict(self.pattern)
+        pattern = dict(self.pattern)
         for _, gear, _ in self.shifts:
-            if gear not in known:
+            if gear not in pattern:
                 raise LanguageError(
-                    f"The shift schedule asks for the gear '{gear}'; its pattern has {', '.join(known)}.",
+                    f"The shift schedule asks for the gear '{gear}'; its pattern has {', '.join(pattern)}.",
                     advice="Name one of these, or give the pattern another row.",
                 )
-        for gear in known:
+        for gear in pattern:
             if gear not in _NUMBERS and not (gear and set(gear) <= set(_DIGITS)):
                 raise LanguageError(
                     f"The pattern of a shift schedule has a gear '{gear}'.",

@@ -110,11 +110,11 @@ def _gauss_newton(
     motor: DcMotor, lines: MotorLines, torques: Sequence[Torque], free: Sequence[str], scales: tuple[Speed, Current]
 ) -> DcMotor:
     """Return the motor after one step; the free parameters are relative to their values."""
-    own = motor_lines(motor, lines.voltage)
+    lines_of_motor = motor_lines(motor, lines.voltage)
     matrix: list[list[Number]] = [[0.0] * len(free) for _ in free]
     right: list[Number] = [0.0] * len(free)
     for torque in torques:
-        aim, now = motor_on_lines(lines, torque), motor_on_lines(own, torque)
+        aim, now = motor_on_lines(lines, torque), motor_on_lines(lines_of_motor, torque)
         rates = _rates(motor, lines.voltage, now.speed, now.current, torque)
         for k, (missing, scale) in enumerate(
             zip((aim.speed - now.speed, aim.current - now.current), scales, strict=True)
@@ -143,8 +143,8 @@ def _rates(
 
 def _compared(motor: DcMotor, lines: MotorLines, largest_torque: Torque) -> MotorFit:
     """Compare at the ends: all curves are straight, so the deviations are largest there."""
-    own = motor_lines(motor, lines.voltage)
-    ends = [(motor_on_lines(lines, torque), motor_on_lines(own, torque)) for torque in (0.0, largest_torque)]
+    lines_of_motor = motor_lines(motor, lines.voltage)
+    ends = [(motor_on_lines(lines, torque), motor_on_lines(lines_of_motor, torque)) for torque in (0.0, largest_torque)]
     speed, current = (
         maximum(*(absolute(settled(getattr(aim, name) - getattr(now, name), getattr(aim, name))) for aim, now in ends))
         for name in ("speed", "current")

@@ -146,10 +146,10 @@ def lepelletier_gear(
 
 
 def _speeds(pattern: ShiftPattern, driving: Speed, front: Speed, small: Ratio, large: Ratio) -> ShaftSpeeds:
-    known = [(member, front) for member in pattern.front]
-    known += [(pattern.direct, driving)] if pattern.direct else []
-    known += [(pattern.brake, 0.0 * driving)] if pattern.brake else []
-    return shaft_speeds(small, large, known[0], known[1])
+    speeds = [(member, front) for member in pattern.front]
+    speeds += [(pattern.direct, driving)] if pattern.direct else []
+    speeds += [(pattern.brake, 0.0 * driving)] if pattern.brake else []
+    return shaft_speeds(small, large, speeds[0], speeds[1])
 
 
 def _torques(

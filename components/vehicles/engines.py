@@ -70,7 +70,7 @@ class MappedEngine(Tabulated, Rotor, partial=True):
         yield from super().events()
         speed = self.w / self.w_scale
         yield from self.leaving("drag", speed, self.drag)
-        yield from self.leaving("speeds", speed, [(one,) for one in self.speeds])
+        yield from self.leaving("speeds", speed, [(s,) for s in self.speeds])
 
     def stored_energy(self) -> Expr:
         return 0.5 * self.J * self.w_rotor**2

@@ -22,7 +22,7 @@ TASKS = {
     },
     "Give it to other tools": {
         "export": "export", "runtimes": "export", "validate": "validation", "split": "cosimulation",
-        "cosim": "cosimulation", "from-modelica": "modelica", "to-modelica": "modelica",
+        "cosim": "cosimulation", "from-modelica": "export", "to-modelica": "export",
     },
 }  # fmt: skip
 HOMES = {name: home for commands in TASKS.values() for name, home in commands.items()}

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from modelica_like.cli.declare import Option
 from modelica_like.cli.models import Start
+from modelica_like.cli.reader import Option
 from modelica_like.cli.shared import TABLE, Assignments, Debug, Json, Netlist, Plot, Until, load_netlist, told
 
 
@@ -43,23 +43,23 @@ def modes(
         start = when(at) if at else None
         loop = open_loop(assembly, opened, start) if opened else None
         linear = loop or linearize(assembly, start, inputs=inputs, outputs=outputs)
-        found = linear.modes()
-        page.print(modes_report(found))
+        mode_shapes = linear.modes()
+        page.print(modes_report(mode_shapes))
         if loop:
             page.print("", escape(str(loop.margins())))
         if shapes:
-            speeds = [one.path for one in linear.model.flat_variables if _is_speed(one.path, str(one.unit))]
-            save_plot(found.plot(show or speeds), shapes)
+            speeds = [
+                variable.path
+                for variable in linear.model.flat_variables
+                if (str(variable.unit), variable.path.rpartition(".")[2]) in (("rad/s", "w"), ("m/s", "v"))
+            ]
+            save_plot(mode_shapes.plot(show or speeds), shapes)
         if draw:
-            save_schematic(assembly, draw, modes=found)
+            save_schematic(assembly, draw, modes=mode_shapes)
         if bode:
             save_plot(linear.bode(), bode)
         if nyquist:
             save_plot(linear.nyquist(), nyquist)
-
-
-def _is_speed(path: str, unit: str) -> bool:
-    return (unit, path.rpartition(".")[2]) in (("rad/s", "w"), ("m/s", "v"))
 
 
 def steady(
@@ -121,18 +121,18 @@ def sweep(
         from modelica_like.show.report.progress import Bar
 
         with Bar(title="runs") as bar:
-            found = run(
+            dataset = run(
                 assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
                 processes=processes, scheduler=scheduler, progress=bar, solver=solver,
             )  # fmt: skip
-        page.print(sweep_report(found))
+        page.print(sweep_report(dataset))
         if output:
-            write_dataset(found, output)
+            write_dataset(dataset, output)
         if plot:
             from modelica_like.analyse.sweeps.pictures import plot_sweep
             from modelica_like.show.plot import save_plot
 
-            save_plot(plot_sweep(found), plot)
+            save_plot(plot_sweep(dataset), plot)
 
 
 def sensitivity(

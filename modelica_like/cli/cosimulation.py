@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from modelica_like.cli.declare import Argument, Option
 from modelica_like.cli.export import Fmi
+from modelica_like.cli.reader import Argument, Option
 from modelica_like.cli.shared import (
     Assignments,
     Csv,
@@ -94,17 +94,17 @@ def cosim(
         from modelica_like.simulation import seconds
 
         values = _numbers(assignments or ())
-        with opened(system) as known, Bar(until or known.settings.until) as bar:
+        with opened(system) as loaded, Bar(until or loaded.settings.until) as bar:
             if show:
-                read_signals(described_model(known), show)
-            made = Outcome(
+                read_signals(described_model(loaded), show)
+            outcome = Outcome(
                 lambda: run(
-                    known, until, step=step, master=master, inputs=inputs, tolerance=rtol,
+                    loaded, until, step=step, master=master, inputs=inputs, tolerance=rtol,
                     parameters=values, timeout=seconds(timeout, "timeout"), progress=bar,
                 ), debug=debug,
             )  # fmt: skip
-        made.tell(cosimulation_report, page)
-        made.write(csv, units=units, show=show or (), pictures=[(plot, lambda one: draw(one, show or ()))])
+        outcome.tell(cosimulation_report, page)
+        outcome.write(csv, units=units, show=show or (), pictures=[(plot, lambda run: draw(run, show or ()))])
 
 
 def _numbers(assignments: list[str] | tuple[str, ...]) -> dict[str, float]:

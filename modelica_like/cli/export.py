@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from modelica_like.cli.declare import Option
-from modelica_like.cli.shared import Assignments, Debug, Json, Netlist, load_netlist, say, told
+from modelica_like.cli.reader import Argument, Option
+from modelica_like.cli.shared import Assignments, Debug, Json, Netlist, load_netlist, note, say, told
+from modelica_like.writing import write_text
 
 Fmi = Annotated[Literal["2.0", "3.0"], Option(help="Version of FMI.")]
 Takes = Literal["flow", "potential"]
 """Quantity that open ends take from outside."""
 Modes = Literal["output", "local", "integer"]
 """Variables of modes in an FMU."""
+Platforms = Annotated[
+    list[str] | None,
+    Option("--platform", metavar="NAME", help="E.g. x86_64-windows, all, or none; by default native: this one."),
+]
+FixedStep = Annotated[
+    str | None, Option(metavar="TIME", help="Co-Simulation with fixed steps and bounded work, e.g. 1ms.")
+]
 
 
 def export(
@@ -24,10 +31,7 @@ def export(
     ] = None,
     fmi: Fmi = "2.0",
     kind: Annotated[Literal["both", "me", "cs"], Option(help="Model Exchange, Co-Simulation, or both.")] = "both",
-    platforms: Annotated[
-        list[str] | None,
-        Option("--platform", metavar="NAME", help="E.g. x86_64-windows, all, or none; by default native: this one."),
-    ] = None,
+    platforms: Platforms = None,
     outputs: Annotated[
         list[str] | None, Option("--show", metavar="PATTERN", help="Additional outputs, e.g. '*.w'; in a page: curves.")
     ] = None,
@@ -39,9 +43,7 @@ def export(
         bool, Option("--embed", help="Compile the model into the binary, for importers that do not locate resources.")
     ] = False,
     modes: Annotated[Modes, Option(help="Modes as outputs, local variables, or integer outputs.")] = "output",
-    fixed_step: Annotated[
-        str | None, Option(metavar="TIME", help="Co-Simulation with fixed steps and bounded work, e.g. 1ms.")
-    ] = None,
+    fixed_step: FixedStep = None,
     tables: Annotated[
         list[str] | None, Option("--table", metavar="PATTERN", help="Tables with tunable numbers, e.g. '*.mu_pos'.")
     ] = None,
@@ -58,9 +60,11 @@ def export(
 
         with Console(stderr=True).status("loading") as status:
             if html is not None:
-                _page(assembly, html, outputs or (), status.update)
-            if html is not None and output is None:
-                return
+                from modelica_like.show.browser.page import export_html
+
+                say(str(export_html(assembly, html, show=outputs or (), report=status.update)))
+                if output is None:
+                    return
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, ("me", "cs") if kind == "both" else (kind,),
                 () if platforms == ["none"] else platforms or ("native",),
@@ -68,12 +72,6 @@ def export(
                 fixed_step=fixed_step, tables=tables or (), check=check, strict=strict, report=status.update,
             )  # fmt: skip
         say(str(done))
-
-
-def _page(assembly: Any, file: Path, show: Sequence[str], report: Callable[[str], None]) -> None:
-    from modelica_like.show.browser.page import export_html
-
-    say(str(export_html(assembly, file, show=show, report=report)))
 
 
 def runtimes(
@@ -93,5 +91,44 @@ def runtimes(
         with Console(stderr=True).status("loading") as status:
             for name in chosen_platforms(platforms or (), RUNTIMES):
                 runtime_library(name, status.update)
-        found = ((name, str(found_runtime(name) or "not compiled")) for name in RUNTIMES)
-        page.print(table("run-times", "platform", "library", rows=found))
+        libraries = ((name, str(found_runtime(name) or "not compiled")) for name in RUNTIMES)
+        page.print(table("run-times", "platform", "library", rows=libraries))
+
+
+def from_modelica(
+    text: Annotated[Path, Argument(metavar="FILE", help="Modelica text (.mo).")],
+    output: Annotated[
+        Path | None, Option("--output", "-o", metavar="FILE", help="Netlist; by default FILE.toml.")
+    ] = None,
+    *,
+    name: Annotated[
+        str, Option("--class", metavar="NAME", help="Model to read; by default the last one of the file.")
+    ] = "",
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Write a model of Modelica text as a netlist."""
+    target = output or text.parent / f"{text.stem or 'model'}.toml"
+    with told(debug, files=[target]):
+        from modelica_like.netlist.modelica.netlist_form import netlist_text
+        from modelica_like.netlist.modelica.read import read_modelica
+
+        model, notes = read_modelica(text, name)
+        write_text(target, netlist_text(model, target.parent, notes))
+        note(*notes)
+        say(f"{target}: {len(model.parts)} parts; next, modelica-like simulate {target}")
+
+
+def to_modelica(
+    netlist: Netlist, assignments: Assignments = None, *,
+    output: Annotated[
+        Path | None, Option("--output", "-o", metavar="FILE", help="Modelica text; by default NETLIST.mo.")
+    ] = None,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Write a netlist as Modelica text on classes of the Modelica Standard Library."""
+    target = output or netlist.parent / f"{netlist.stem or 'model'}.mo"
+    with told(debug, files=[target]):
+        from modelica_like.netlist.modelica.write import modelica_text
+
+        write_text(target, modelica_text(load_netlist(netlist, assignments)))
+        say(str(target))

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from modelica_like.cli.declare import Option
+from modelica_like.cli.reader import Option
 from modelica_like.cli.shared import (
     Assignments,
     Csv,
@@ -48,6 +48,15 @@ OnChattering = Annotated[
 ]
 
 
+Compare = Annotated[
+    list[str] | None, Option(metavar="WHAT", help="In the picture, too: a file, or runs, e.g. 'gear.ratio=2,3'.")
+]
+Shown = Annotated[list[str] | None, Option(metavar="WHAT=UNIT", help="Unit of results, e.g. speed=rpm or '*.phi=deg'.")]
+Inputs = Annotated[
+    Path | None, Option(metavar="FILE", help="Open inputs over time: CSV with columns time and e.g. 'motor.tau'.")
+]
+
+
 def check(
     netlist: Netlist, assignments: Assignments = None, *,
     start_values: Annotated[bool, Option("--start-values", help="Print the start values and their origin.")] = False,
@@ -77,15 +86,7 @@ def simulate(
     netlist: Netlist, assignments: Assignments = None, *,
     until: Until = None, start: Start = None, solver: Solver = None, rtol: Tolerance = None, points: Points = None,
     on_chattering: OnChattering = None, csv: Csv = None, units: Units = False, plot: Plot = None, show: Curves = None,
-    compare: Annotated[
-        list[str] | None, Option(metavar="WHAT", help="In the picture, too: a file, or runs, e.g. 'gear.ratio=2,3'.")
-    ] = None,
-    display: Annotated[
-        list[str] | None, Option(metavar="WHAT=UNIT", help="Unit of results, e.g. speed=rpm or '*.phi=deg'.")
-    ] = None,
-    inputs: Annotated[
-        Path | None, Option(metavar="FILE", help="Open inputs over time: CSV with columns time and e.g. 'motor.tau'.")
-    ] = None,
+    compare: Compare = None, display: Shown = None, inputs: Inputs = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw the energies as a flow diagram.")] = None,
     energy: Annotated[bool, Option(help="Print the energy balance.")] = True,
     json: Json = False, debug: Debug = False,
@@ -117,17 +118,16 @@ def simulate(
         Display(model, shown)
         how: dict[str, Any] = {"start": start, "rtol": rtol, "points": points, "on_chattering": on_chattering}
         with Bar(until or model.settings.get("until")) as bar:
-            made = Outcome(
-                lambda: run(model, until, progress=bar, solver=solver, **how),
-                debug=debug,
-            )
-        energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
-        made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown, show=show or ()), page)
-        made.attempt("The notes", lambda: note(*notes(assembly, made.solution, energy=energy)))
+            outcome = Outcome(lambda: run(model, until, progress=bar, solver=solver, **how), debug=debug)
+        energy = energy and outcome.stopped is None and outcome.attempt("The energy balance", outcome.solution.energy)
+        outcome.tell(
+            lambda result: run_report(result, energy=energy, debug=debug, display=shown, show=show or ()), page
+        )
+        outcome.attempt("The notes", lambda: note(*notes(assembly, outcome.solution, energy=energy)))
         again = partial(run, model, until, **how)
-        curves = (plot, lambda one: _drawn(one, variants, files, again, show or (), shown))
-        pictures = curves, (sankey, lambda one: one.energy().sankey(model.name))
-        made.write(csv, units=units or bool(display), display=shown, pictures=pictures, show=show or ())
+        curves = (plot, lambda result: _drawn(result, variants, files, again, show or (), shown))
+        pictures = curves, (sankey, lambda result: result.energy().sankey(model.name))
+        outcome.write(csv, units=units or bool(display), display=shown, pictures=pictures, show=show or ())
 
 
 def _beside(texts: Sequence[str], plot: Path | None) -> tuple[list[tuple[str, Sequence[Any]]], list[Path]]:

@@ -72,13 +72,13 @@ def overview(words: Sequence[str]) -> None:
 
 
 def _reader() -> Reader:
-    made = Reader("", "[OPTIONS] COMMAND …", _ABOUT)
-    options = made.add_argument_group("Options")
+    parser = Reader("", "[OPTIONS] COMMAND …", _ABOUT)
+    options = parser.add_argument_group("Options")
     options.add_argument("--version", action="version", version=f"modelica-like {__version__}", help="Show it.")
     options.add_argument("--install-completion", action="store_true", help="Complete words in the shell, $SHELL.")
     options.add_argument("--show-completion", action="store_true", help="Show what that adds to the shell's files.")
     options.add_argument("--help", action="help", help="Show this page.")
-    return made
+    return parser
 
 
 def _completion(overall: Reader, *, install: bool) -> None:
@@ -106,8 +106,8 @@ def complete(words: Sequence[str]) -> None:
     """
     *before, now = words or [""]
     now = "" if now == "=" else now  # Bash splits words there
-    found = _candidates([one for one in before if one != "="], now)
-    sys.stdout.writelines(f"{word}\t{meaning}".strip() + "\n" for word, meaning in found if word.startswith(now))
+    candidates = _candidates([word for word in before if word != "="], now)
+    sys.stdout.writelines(f"{word}\t{meaning}".strip() + "\n" for word, meaning in candidates if word.startswith(now))
 
 
 def _candidates(before: list[str], now: str) -> Iterable[tuple[str, str]]:
@@ -115,17 +115,17 @@ def _candidates(before: list[str], now: str) -> Iterable[tuple[str, str]]:
     if of is None:
         return ()
     name, equals, _ = now.partition("=")
-    asked = of._option_string_actions.get(name if equals else (before or [""])[-1])
-    known = parameters(command(before[0])) if before else []
-    if asked and asked.nargs != 0:
+    action = of._option_string_actions.get(name if equals else (before or [""])[-1])
+    parameters_of_command = parameters(command(before[0])) if before else []
+    if action and action.nargs != 0:
         begin = f"{name}=" if equals else ""
-        return ((begin + value, "") for one in known if one.name == asked.dest for value in _values(one))
+        return ((begin + value, "") for p in parameters_of_command if p.name == action.dest for value in _values(p))
     if now.startswith("-"):
         return [(word, action.help or "") for word, action in of._option_string_actions.items()]
     if not before:
         return [(name, paragraphs(command(name))[0]) for name in HOMES]
-    return ((value, "") for one in known if not one.option for value in _values(one))
+    return ((value, "") for parameter in parameters_of_command if not parameter.option for value in _values(parameter))
 
 
-def _values(one: Parameter) -> Iterable[str]:
-    return one.declared.choices() if one.declared.choices else one.choices
+def _values(parameter: Parameter) -> Iterable[str]:
+    return parameter.declared.choices() if parameter.declared.choices else parameter.choices

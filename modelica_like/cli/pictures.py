@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.reader import Argument, Option
 from modelica_like.cli.shared import Assignments, Curves, Debug, Netlist, Until, load_netlist, say, told
 from modelica_like.errors import NetlistError
 

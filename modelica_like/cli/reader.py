@@ -5,12 +5,35 @@ from __future__ import annotations
 import argparse
 import inspect
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, NoReturn, get_args, get_origin, get_type_hints
 
-from modelica_like.cli.declare import Option
 from modelica_like.errors import did_you_mean
+
+
+class Argument:
+    """A value by its position.
+
+    Args:
+        names: of an option, with their dashes; by default that of the parameter.
+        metavar: name of the value in the help.
+        help: description.
+        choices: returns the values that a shell completes.
+    """
+
+    def __init__(
+        self, *names: str, metavar: str | None = None, help: str, choices: Callable[[], Iterable[str]] | None = None
+    ) -> None:
+        self.names = names
+        self.metavar = metavar
+        self.help = help
+        self.choices = choices
+
+
+class Option(Argument):
+    """A value by its name."""
+
 
 _NONE = inspect.Parameter.empty
 _NUMBERS = {int: "a whole number", float: "a number"}
@@ -34,7 +57,7 @@ class Parameter:
     def __init__(self, name: str, hint: Any, default: Any) -> None:
         kind, self.declared = get_args(hint)
         # A default of None is no value: `X | None` takes an X.
-        kinds = [one for one in get_args(kind) if one is not type(None)] if type(None) in get_args(kind) else [kind]
+        kinds = [word for word in get_args(kind) if word is not type(None)] if type(None) in get_args(kind) else [kind]
         self.many = get_origin(kinds[0]) is list
         self.kind: Any = get_args(kinds[0])[0] if self.many else kinds[0]
         self.choices: tuple[str, ...] = get_args(self.kind) if get_origin(self.kind) is Literal else ()
@@ -58,8 +81,8 @@ class Parameter:
     def read(self, text: str) -> Any:
         """Read one value."""
         if self.choices and text not in self.choices:
-            known = ", ".join(f"'{one}'" for one in self.choices)
-            raise argparse.ArgumentTypeError(f"'{text}' is not one of {known}.")
+            choices = ", ".join(f"'{choice}'" for choice in self.choices)
+            raise argparse.ArgumentTypeError(f"'{text}' is not one of {choices}.")
         try:
             return text if self.choices else self.kind(text)
         except ValueError:
@@ -67,16 +90,16 @@ class Parameter:
 
     def add(self, group: Any) -> None:
         """Declare it to argparse."""
-        told: dict[str, Any] = {"default": None if self.required else self.default}
+        keywords: dict[str, Any] = {"default": None if self.required else self.default}
         if self.kind is bool:
             kind = "store_true" if self.declared.names else argparse.BooleanOptionalAction  # with --no-…
-            action = group.add_argument(self.words()[0], dest=self.name, action=kind, **told)
+            action = group.add_argument(self.words()[0], dest=self.name, action=kind, **keywords)
         elif self.option:
-            told |= {"required": self.required, "action": "append" if self.many else None}
-            action = group.add_argument(*self.words(), dest=self.name, metavar=self.value, type=self.read, **told)
+            keywords |= {"required": self.required, "action": "append" if self.many else None}
+            action = group.add_argument(*self.words(), dest=self.name, metavar=self.value, type=self.read, **keywords)
         else:
             nargs = "*" if self.many else None if self.required else "?"
-            action = group.add_argument(self.name, metavar=self.value, nargs=nargs, type=self.read, **told)
+            action = group.add_argument(self.name, metavar=self.value, nargs=nargs, type=self.read, **keywords)
         required = " Required." if self.option and self.required else ""
         default = f" Default: {self.shown}." if self.shown else ""
         action.help = f"{self.declared.help}{required}{default}".replace("%", "%%")
@@ -85,8 +108,8 @@ class Parameter:
 def parameters(command: Callable[..., None]) -> list[Parameter]:
     """Return the parameters of a command."""
     hints = get_type_hints(command, include_extras=True)
-    known = inspect.signature(command).parameters.values()
-    return [Parameter(one.name, hints[one.name], one.default) for one in known]
+    arguments = inspect.signature(command).parameters.values()
+    return [Parameter(argument.name, hints[argument.name], argument.default) for argument in arguments]
 
 
 def paragraphs(command: Callable[..., None]) -> list[str]:
@@ -96,15 +119,15 @@ def paragraphs(command: Callable[..., None]) -> list[str]:
 
 def reader(name: str, command: Callable[..., None]) -> Reader:
     """Return the reader of a command."""
-    known = parameters(command)
-    places, options = [one for one in known if not one.option], [one for one in known if one.option]
-    made = Reader(name, " ".join(["[OPTIONS]", *(one.place() for one in places)]), paragraphs(command))
+    declared = parameters(command)
+    places, options = [d for d in declared if not d.option], [d for d in declared if d.option]
+    result = Reader(name, " ".join(["[OPTIONS]", *(place.place() for place in places)]), paragraphs(command))
     for title, those in ("Arguments", places), ("Options", options):
-        group = made.add_argument_group(title)
-        for one in those:
-            one.add(group)
+        group = result.add_argument_group(title)
+        for parameter in those:
+            parameter.add(group)
     group.add_argument("--help", action="help", help="Show this page.")
-    return made
+    return result
 
 
 class Reader(argparse.ArgumentParser):
@@ -135,24 +158,24 @@ class Reader(argparse.ArgumentParser):
 
     def _ordered(self, words: Sequence[str]) -> Iterator[str]:
         """Yield options as single words, because values may begin with a dash, and then the places."""
-        known, places, rest = self._option_string_actions, [], iter(words)
+        actions, places, rest = self._option_string_actions, [], iter(words)
         for word in rest:
             name, equals, value = word.partition("=") if word.startswith("--") else (word[:2], word[2:], word[2:])
             if word == "--":
                 places += rest
             elif word in ("", "-") or word[0] != "-":
                 places.append(word)
-            elif name not in known:
-                self.error(f"No such option '{name}'{did_you_mean(name, known) or '.'}")
-            elif known[name].nargs == 0 and equals:
+            elif name not in actions:
+                self.error(f"No such option '{name}'{did_you_mean(name, actions) or '.'}")
+            elif actions[name].nargs == 0 and equals:
                 self.error(f"Option '{name}' does not take a value.")
-            elif known[name].nargs == 0:
+            elif actions[name].nargs == 0:
                 yield word
             elif (value := value if equals else next(rest, None)) is None:
                 self.error(f"Option '{name}' requires a value.")
             else:
-                yield f"{known[name].option_strings[0]}={value}"
-        yield from [*(["--"] if any(one.startswith("-") for one in places) else ()), *places]
+                yield f"{actions[name].option_strings[0]}={value}"
+        yield from [*(["--"] if any(place.startswith("-") for place in places) else ()), *places]
 
     def error(self, message: str) -> NoReturn:
         """Tell what is wrong with the words, and how they should be."""
@@ -173,7 +196,7 @@ class _Page(argparse.HelpFormatter):
         super().add_usage(usage, actions, groups, "Usage: ")
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        return "\n\n".join(super(_Page, self)._fill_text(one, width, indent) for one in text.split("\n\n"))
+        return "\n\n".join(super(_Page, self)._fill_text(word, width, indent) for word in text.split("\n\n"))
 
     def _format_action_invocation(self, action: argparse.Action) -> str:
         value = "" if action.nargs == 0 else str(action.metavar or action.dest)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.reader import Argument, Option
 from modelica_like.errors import InitializationError, ModelicaLikeError, NetlistError, SolveError, Source
 from modelica_like.writing import check_writable
 
@@ -85,7 +85,7 @@ def told(
         pictures: to be written.
         files: of any kind, to be written.
     """
-    tables = [one for one in tables if one is not None]
+    tables = [table for table in tables if table is not None]
     try:
         _check(tables, filter(None, pictures), filter(None, files))
         page = Page(json=json, stderr=Path("-") in tables)
@@ -170,7 +170,7 @@ def note(*sentences: str) -> None:
 
 def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
     """Split assignments at the equals sign."""
-    pairs = [one.partition("=") for one in assignments or ()]
+    pairs = [assignment.partition("=") for assignment in assignments or ()]
     for before, equals, _ in pairs:
         if not equals:
             form = "PATH=VALUE" if option == "--set" else "WHAT=UNIT"
@@ -202,9 +202,9 @@ def values(assignments: list[str] | None) -> dict[str, Any]:
 
 def _value(text: str) -> Any:
     """Read a value of the command line: true, false, a number, or a text with a unit."""
-    known: dict[str, Any] = {"true": True, "false": False}
-    if text in known:
-        return known[text]
+    words: dict[str, Any] = {"true": True, "false": False}
+    if text in words:
+        return words[text]
     readers: tuple[Callable[[str], Any], ...] = (int, float)
     for reader in readers:
         try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.reader import Argument, Option
 from modelica_like.cli.shared import Debug, say, told
 from modelica_like.cli.validation import DEMO
 from modelica_like.errors import NetlistError
@@ -29,8 +29,8 @@ def new(
             raise NetlistError(f"The folder of examples is missing: there is no {source}.", advice="Install again.")
         text = source.read_text(encoding="utf-8")
         try:
-            with file.open("x", encoding="utf-8") as made:
-                made.write(text)
+            with file.open("x", encoding="utf-8") as stream:
+                stream.write(text)
         except FileExistsError:
             raise NetlistError(f"{file} exists, and is left as it is.", advice="Choose another name with -o.") from None
         say(f"{file}: next, modelica-like simulate {file}")

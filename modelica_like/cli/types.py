@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Literal
 
-from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.reader import Argument, Option
 from modelica_like.cli.shared import Debug, Json, say, told
 
 

@@ -21,7 +21,7 @@ from modelica_like.language.units import ANY, ONE, Unit, parse_unit
 _SECOND = parse_unit("s")
 _PAIR = 2
 """Fewer values cannot disagree."""
-_WATT, _JOULE = parse_unit("W"), parse_unit("J")
+_ENERGY_UNITS = {"stored_energy": parse_unit("J"), "loss_power": parse_unit("W"), "source_power": parse_unit("W")}
 
 
 def unit_of_field(owner: Declared, name: str) -> Unit:
@@ -44,10 +44,10 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
     Raises:
         ComponentUnbalanced: it does not.
     """
-    own = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
-    unknowns = [n for n in own if n not in joined]
-    used = {name: one for name, one in component.connectors.items() if one.used and name not in joined}
-    unknowns += [f"{name}.{n}" for name, one in used.items() for n, f in one.quantities.items() if f.is_flow]
+    variables = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
+    unknowns = [n for n in variables if n not in joined]
+    used = {name: c for name, c in component.connectors.items() if c.used and name not in joined}
+    unknowns += [f"{name}.{n}" for name, c in used.items() for n, f in c.quantities.items() if f.is_flow]
     if len(equations) == len(unknowns):
         return
     kind = type(component).__name__
@@ -74,10 +74,10 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
 def _driven_input(component: Component, equations: list[Equation]) -> str:
     """Return an input of a part that occurs in an equation, relative to the component, or an empty text."""
     leaves = (symbol for e in equations for side in (e.left, e.right) for symbol in symbols_in(side))
-    foreign = (one for one in leaves if isinstance(one.owner, Component) and one.owner is not component)
-    own = component.path
-    paths = (f"{one.owner.path}.{one.name}" for one in foreign if isinstance(one.owner.fields.get(one.name), Input))
-    return next((path.removeprefix(f"{own}.") for path in paths), "")
+    foreign = (symbol for symbol in leaves if isinstance(symbol.owner, Component) and symbol.owner is not component)
+    prefix = component.path
+    paths = (f"{s.owner.path}.{s.name}" for s in foreign if isinstance(s.owner.fields.get(s.name), Input))
+    return next((path.removeprefix(f"{prefix}.") for path in paths), "")
 
 
 def check_units(
@@ -96,11 +96,9 @@ def check_units(
     Raises:
         UnitMismatch, LanguageError: all errors, reported together.
     """
-    inferred: dict[str, Unit] = {}
-
+    inferred, errors, wrong = dict[str, Unit](), list[ModelicaLikeError](), set[Source]()
     dimensions = Dimensions(lambda leaf: _unit_of_leaf(component, inferred, leaf, dimensions))
     kind = type(component).__name__
-    errors: list[ModelicaLikeError] = []
 
     def attempt(check: Any, *arguments: Any) -> None:
         try:
@@ -109,7 +107,6 @@ def check_units(
             if str(error) not in map(str, errors):  # both directions of a relation have the same one
                 errors.append(error)
 
-    wrong: set[Source] = set()
     for equation in equations:
         before = len(errors)
         attempt(_infer, component, equation, dimensions, inferred)
@@ -123,17 +120,13 @@ def check_units(
             attempt(check_expression, event.at, _SECOND, dimensions, f"{kind}, time of an event", event.source)
         for target, value in getattr(event, "reset", {}).items():
             attempt(check_equation, target, ca.SX(value), dimensions, kind, event.source)
-    for one in updates:
-        attempt(check_expression, one.active, ONE, dimensions, f"{kind}, condition", one.source)
-        attempt(check_equation, ca.SX(one.target), ca.SX(one.value), dimensions, kind, one.source)
-    for one, source in delays:
-        attempt(check_expression, one.offset, _SECOND, dimensions, f"{kind}, delay", source)
-    for label, term, unit in (
-        ("stored_energy", component.stored_energy(), _JOULE),
-        ("loss_power", component.loss_power(), _WATT),
-        ("source_power", component.source_power(), _WATT),
-    ):
-        attempt(check_expression, term, unit, dimensions, f"{kind}.{label}")
+    for update in updates:
+        attempt(check_expression, update.active, ONE, dimensions, f"{kind}, condition", update.source)
+        attempt(check_equation, ca.SX(update.target), ca.SX(update.value), dimensions, kind, update.source)
+    for delay, source in delays:
+        attempt(check_expression, delay.offset, _SECOND, dimensions, f"{kind}, delay", source)
+    for label, unit in _ENERGY_UNITS.items():
+        attempt(check_expression, getattr(component, label)(), unit, dimensions, f"{kind}.{label}")
     if errors:
         raise _by_any_units(component, errors) or raise_together_or_one(errors)
     return inferred
@@ -143,10 +136,10 @@ def _by_any_units(component: Component, errors: Sequence[ModelicaLikeError]) -> 
     """Say which units of `*` parameters do not fit together; the equations of a library do not tell that."""
     given = [(name, unit_of_field(component, name)) for name, field in component.fields.items()
              if isinstance(field, Parameter) and field.unit_text == "*" and name in component._values]  # fmt: skip
-    if len(given) < _PAIR or not all(isinstance(one, UnitMismatch) for one in errors):
+    if len(given) < _PAIR or not all(isinstance(error, UnitMismatch) for error in errors):
         return None
-    told = ", ".join(f"{name} in {unit}" for name, unit in given)
-    return UnitMismatch(f"{component.label} ({type(component).__name__}): its units do not fit together: {told}.",
+    units = ", ".join(f"{name} in {unit}" for name, unit in given)
+    return UnitMismatch(f"{component.label} ({type(component).__name__}): its units do not fit together: {units}.",
                         where=component.place_of(), why=errors[0].what)  # fmt: skip
 
 

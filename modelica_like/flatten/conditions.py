@@ -30,7 +30,7 @@ def guard_of(condition: Any, source: Source, *, negated: bool = False) -> Any:
         return guard_of(*operands(condition), source=source, negated=not negated)
     if operation in (ca.OP_AND, ca.OP_OR):
         join = ca.fmin if (operation == ca.OP_AND) != negated else ca.fmax
-        return join(*(guard_of(one, source, negated=negated) for one in operands(condition)))
+        return join(*(guard_of(operand, source, negated=negated) for operand in operands(condition)))
     if operation in (ca.OP_LT, ca.OP_LE):
         first, second = operands(condition)
         difference = first - second if negated else second - first

@@ -60,11 +60,11 @@ class Dimensions:
         while pending:
             node = pending.pop()
             parts = operands(node)
-            unknown = [one for one in parts if one.element_hash() not in self._known]
+            unknown = [part for part in parts if part.element_hash() not in self._known]
             if unknown:
                 pending += [node, *unknown]
             elif node.element_hash() not in self._known:
-                units = [self._known[one.element_hash()][1] for one in parts]
+                units = [self._known[part.element_hash()][1] for part in parts]
                 # The node itself is kept too, so that no other node can get its identity.
                 self._known[node.element_hash()] = (node, self._of_node(node, parts, units))
         return self._known[root.element_hash()][1]
@@ -181,8 +181,8 @@ def check_expression(
     with _told(label, where, label, source):
         unit = dimensions.unit(expression)
     if not same_dimension(unit, expected):
-        found = "has no unit" if unit == ONE else f"is {unit}"
-        raise UnitMismatch(f"{label} expects {expected}; the expression {found}.", where=where)
+        actual = "has no unit" if unit == ONE else f"is {unit}"
+        raise UnitMismatch(f"{label} expects {expected}; the expression {actual}.", where=where)
 
 
 @contextmanager

@@ -83,24 +83,34 @@ class DiscreteEquations:
         self, component: Component, equations: list[Equation], events: list[Any], others: Iterable[Located]
     ) -> None:
         self._component, self._kind = component, type(component).__name__
-        self.updates = [self._of_equation(one) for one in equations]
-        self.events: list[Transition | StartMode] = [one for one in events if isinstance(one, Transition | StartMode)]
+        self.updates = [self._of_equation(equation) for equation in equations]
+        self.events: list[Transition | StartMode] = [e for e in events if isinstance(e, Transition | StartMode)]
         self.hidden: list[Hidden] = []
         self.delays: list[tuple[Marker, Source]] = []
         self._kept: list[Symbol] = []
-        for number, one in enumerate(events, 1):
-            if isinstance(one, When):
-                self.updates += self._of_when(one)
-            elif isinstance(one, Assertion):
-                self._write_assertion(one, f"assertion[{number}]")
-        told = [(expression, one.source) for one in self.events for expression in _expressions(one)]
-        for expression, source in told:
-            self._check_pre(expression, source)
-        self._write_markers([*others, *told, *((e, u.source) for u in self.updates for e in (u.active, u.value))])
+        for number, event in enumerate(events, 1):
+            if isinstance(event, When):
+                self.updates += self._of_when(event)
+            elif isinstance(event, Assertion):
+                self._write_assertion(event, f"assertion[{number}]")
+        expressions = [(expression, e.source) for e in self.events for expression in _expressions(e)]
+        for expression, source in expressions:
+            for symbol in symbols_in(expression) if is_expression(expression) else ():
+                if isinstance(symbol, Pre):
+                    raise LanguageError(
+                        f"{self._kind}: {symbol.name} is in a transition, where it never differs from "
+                        f"{symbol.of.name}.",
+                        where=source,
+                        advice=f"Write {symbol.of.name}: in a reset it is the value before. For an edge, write "
+                        "once=True.",
+                    )
+        self._write_markers(
+            [*others, *expressions, *((e, u.source) for u in self.updates for e in (u.active, u.value))]
+        )
 
     def forms(self, path: Any) -> tuple[UpdateForm, ...]:
         """Return the updates without their expressions; `path` names a symbol from the component."""
-        return tuple(UpdateForm(path(one.target), one.source, one.at_start) for one in self.updates)
+        return tuple(UpdateForm(path(update.target), update.source, update.at_start) for update in self.updates)
 
     def _of_equation(self, equation: Equation) -> Update:
         target = symbols_in(equation.left)[0]
@@ -109,28 +119,28 @@ class DiscreteEquations:
         if moves(value):
             raise LanguageError(
                 f"{self._kind}: {target.name} changes at events only, but its equation follows "
-                f"{next(one.name for one in symbols_in(value) if one is TIME or moves(ca.SX(one)))} all the time.",
+                f"{next(leaf.name for leaf in symbols_in(value) if leaf is TIME or moves(ca.SX(leaf)))} all the time.",
                 where=equation.source,
                 advice="Take the value in a `when`, or choose with if_(…): its relations make events.",
             )
         return Update(target, _ONE, value, equation.source, at_start=True)
 
-    def _of_when(self, one: When) -> list[Update]:
-        found: dict[int, tuple[Symbol, Any, Any]] = {}
-        for active, values in reversed(one.branches):
+    def _of_when(self, event: When) -> list[Update]:
+        targets: dict[int, tuple[Symbol, Any, Any]] = {}
+        for active, values in reversed(event.branches):
             for key, value in values.items():
                 target = key if isinstance(key, Ending) else _target(key)
                 if target is None:
                     what = f"{self._kind}: a `when` gives {key} a value, which is neither a variable nor discrete."
-                    raise LanguageError(what, where=one.source, advice="Name variables, as in {self.n: pre(self.n)}.")
-                _, before, later = found.get(id(target), (target, 0, 0))
+                    raise LanguageError(what, where=event.source, advice="Name variables, as in {self.n: pre(self.n)}.")
+                _, before, later = targets.get(id(target), (target, 0, 0))
                 flag: Any = active
-                chosen = ca.SX(value) if id(target) not in found else ca.if_else(flag, ca.SX(value), later)
-                found[id(target)] = target, ca.logic_or(flag, before), chosen
-        for target, *_ in reversed(found.values()):
+                chosen = ca.SX(value) if id(target) not in targets else ca.if_else(flag, ca.SX(value), later)
+                targets[id(target)] = target, ca.logic_or(flag, before), chosen
+        for target, *_ in reversed(targets.values()):
             if isinstance(target, Ending):
-                self._write_ending(target, one.source)
-        return [Update(*parts, one.source, at_start=False) for parts in found.values()]
+                self._write_ending(target, event.source)
+        return [Update(*parts, event.source, at_start=False) for parts in targets.values()]
 
     def check_determined(self, used: Iterable[str]) -> None:
         """Check that every discrete variable of the component is determined once; a number by its start value at least.
@@ -142,33 +152,24 @@ class DiscreteEquations:
             LanguageError: it is not, or twice.
         """
         places: dict[int, Source] = {}
-        for one in self.updates:
-            if id(one.target) in places:
-                what = f"{self._kind}: {one.target.name} is determined twice."
+        for update in self.updates:
+            if id(update.target) in places:
+                what = f"{self._kind}: {update.target.name} is determined twice."
                 advice = "Join them: when(…).elsewhen(…), or one equation."
-                raise LanguageError(what, where=[places[id(one.target)], one.source], advice=advice)
-            places[id(one.target)] = one.source
+                raise LanguageError(what, where=[places[id(update.target)], update.source], advice=advice)
+            places[id(update.target)] = update.source
         resets = [(symbols_in(key)[0], t) for t in self.events if isinstance(t, Transition) for key in t.reset]
         for target, transition in resets:
             if id(target) in places and not isinstance(target, Marker) and is_a(target, Discrete):
                 what = f"{self._kind}: {target.name} is set by a transition and determined by an equation or a `when`."
                 raise LanguageError(what, where=[places[id(target)], transition.source], advice="Keep one of the two.")
-        known = {id(target) for target, _ in resets} | {*places}
+        determined = {id(target) for target, _ in resets} | {*places}
         for name, field in self._component.fields.items():
-            if not isinstance(field, Discrete) or id(getattr(self._component, name)) in known:
+            if not isinstance(field, Discrete) or id(getattr(self._component, name)) in determined:
                 continue
             if field.kind != "number" or (name in used and field.default == 0.0):
                 what = f"{self._kind}: nothing determines the discrete variable {name}."
                 raise LanguageError(what, advice=f"Yield self.{name} == …, or set it in a `when` or a reset.")
-
-    def _check_pre(self, expression: Any, source: Source) -> None:
-        for one in symbols_in(expression) if is_expression(expression) else ():
-            if isinstance(one, Pre):
-                raise LanguageError(
-                    f"{self._kind}: {one.name} is in a transition, where it never differs from {one.of.name}.",
-                    where=source,
-                    advice=f"Write {one.of.name}: in a reset it is the value before. For an edge, write once=True.",
-                )
 
     def _write_markers(self, pending: list[Located]) -> None:
         """Name the markers in expressions, and write what determines them."""
@@ -177,65 +178,62 @@ class DiscreteEquations:
         while pending:
             expression, source = pending.pop(0)
             for symbol in symbols_in(expression) if is_expression(expression) else ():
-                one = symbol.of if isinstance(symbol, Pre) else symbol
-                if not isinstance(one, Marker) or isinstance(one, Ending) or id(one) in seen:
+                marker = symbol.of if isinstance(symbol, Pre) else symbol
+                if not isinstance(marker, Marker) or isinstance(marker, Ending) or id(marker) in seen:
                     continue
-                if isinstance(one, Part):
-                    seen.update(map(id, parts(one.whole)))
-                    pending += self._write_delay(one.whole, source)
+                if isinstance(marker, Part):
+                    seen.update(map(id, parts(marker.whole)))
+                    # Before the start, a delay is its value at the start.
+                    marker.whole.of = with_events(marker.whole.of)
+                    self.delays.append((marker.whole, source))
+                    for k, part in enumerate(parts(marker.whole)):
+                        part.name = f"delay[{len(self.delays)}][{k}]"
+                        self.hidden.append(Hidden(part.name, f"delay {marker.whole.of}"))
+                    self.updates.append(Update(parts(marker.whole)[0], INITIAL, marker.whole.of, source, at_start=True))
+                    pending += [(marker.whole.of, source), (marker.whole.offset, source), (INITIAL, source)]
                     continue
-                if one.kind in ("sample", "previous"):
-                    what = f"{self._kind}: {one.kind}({one.of}) is outside of the new values of a when(clock(…), …)."
-                    advice = f"Elsewhere write {_PLAIN[one.kind].format(one.of)}."
+                if marker.kind in ("sample", "previous"):
+                    what = (
+                        f"{self._kind}: {marker.kind}({marker.of}) is outside of the new values of a when(clock(…), …)."
+                    )
+                    advice = f"Elsewhere write {_PLAIN[marker.kind].format(marker.of)}."
                     raise LanguageError(what, where=source, advice=advice)
-                seen.add(id(one))
-                counts[one.kind] = counts.get(one.kind, 0) + 1
-                counts_up = one.kind in ("floor", "clock")
-                one.name = f"{'count of ' * counts_up}{one.kind}[{counts[one.kind]}]"
-                pending += [(one.of, source), *((e, source) for e in self._write_marker(one, source))]
+                seen.add(id(marker))
+                counts[marker.kind] = counts.get(marker.kind, 0) + 1
+                counts_up = marker.kind in ("floor", "clock")
+                marker.name = f"{'count of ' * counts_up}{marker.kind}[{counts[marker.kind]}]"
+                pending += [(marker.of, source), *((e, source) for e in self._write_marker(marker, source))]
 
-    def _write_marker(self, one: Marker, source: Source) -> Iterable[Any]:
+    def _write_marker(self, marker: Marker, source: Source) -> Iterable[Any]:
         """Write what determines a marker; return further expressions."""
-        own: Any = one.of
-        if one.kind == "relation":
-            self._write_relation(one, source)
+        argument: Any = marker.of
+        if marker.kind == "relation":
+            mode = self._mode(marker.name, str(marker.of), marker, ("false", "true"))
+            opposite = cast(Expr, ca.logic_not(marker.of))
+            self.events += [
+                replace(mode.go("false", "true", when=marker.of), source=source),
+                replace(mode.go("true", "false", when=opposite), source=source),
+                replace(mode.initially("true", when=marker.of), source=source),
+            ]
             return ()
-        self.hidden.append(Hidden(one.name, f"{one.kind} {own}"))
-        if one.kind in ("floor", "clock"):
-            (self._write_floor if one.kind == "floor" else self._write_clock)(one, source)
+        self.hidden.append(Hidden(marker.name, f"{marker.kind} {argument}"))
+        if marker.kind in ("floor", "clock"):
+            (self._write_floor if marker.kind == "floor" else self._write_clock)(marker, source)
             return ()
-        value = own if one.kind == "was" else edge(own)
-        self.updates.append(Update(one, _ONE, value, source, at_start=one.kind == "was"))
+        value = argument if marker.kind == "was" else edge(argument)
+        self.updates.append(Update(marker, _ONE, value, source, at_start=marker.kind == "was"))
         return (value,)
 
-    def _write_delay(self, one: Marker, source: Source) -> list[Located]:
-        """Name the numbers of a delay; return further expressions. Before the start, it is the value at the start."""
-        one.of = with_events(one.of)
-        self.delays.append((one, source))
-        for k, part in enumerate(parts(one)):
-            part.name = f"delay[{len(self.delays)}][{k}]"
-            self.hidden.append(Hidden(part.name, f"delay {one.of}"))
-        self.updates.append(Update(parts(one)[0], INITIAL, one.of, source, at_start=True))
-        return [(one.of, source), (one.offset, source), (INITIAL, source)]
-
-    def _write_relation(self, one: Marker, source: Source) -> None:
-        mode, opposite = self._mode(one.name, str(one.of), one, ("false", "true")), cast(Expr, ca.logic_not(one.of))
-        self.events += [
-            replace(mode.go("false", "true", when=one.of), source=source),
-            replace(mode.go("true", "false", when=opposite), source=source),
-            replace(mode.initially("true", when=one.of), source=source),
-        ]
-
-    def _write_floor(self, one: Marker, source: Source) -> None:
+    def _write_floor(self, marker: Marker, source: Source) -> None:
         """Count up and down by what is passed; the value itself may still be on the other side by rounding."""
-        value, number = cast(Any, one.of), cast(Any, one)
-        mode = self._counting(one, f"floor({value})")
+        value, number = cast(Any, marker.of), cast(Any, marker)
+        mode = self._counting(marker, f"floor({value})")
         up, down = ca.fmax(number + 1, ca.floor(value)), ca.fmin(number - 1, ca.floor(value))
         self.events += [
-            replace(mode.go("counting", "counting", when=value >= number + 1, reset={one: up}), source=source),
-            replace(mode.go("counting", "counting", when=value < number, reset={one: down}), source=source),
+            replace(mode.go("counting", "counting", when=value >= number + 1, reset={marker: up}), source=source),
+            replace(mode.go("counting", "counting", when=value < number, reset={marker: down}), source=source),
         ]
-        self.updates.append(Update(one, INITIAL, ca.floor(value), source, at_start=True))
+        self.updates.append(Update(marker, INITIAL, ca.floor(value), source, at_start=True))
 
     def _check_text(self, text: str, what: str, source: Source) -> None:
         for name in NAME_IN_NOTICE.findall(text):
@@ -243,42 +241,42 @@ class DiscreteEquations:
                 what = f"{self._kind}: the text of {what} names {name}, which is not declared"
                 raise LanguageError(f"{what}{did_you_mean(name, self._component.fields) or '.'}", where=source)
 
-    def _write_ending(self, one: Ending, source: Source) -> None:
+    def _write_ending(self, ending: Ending, source: Source) -> None:
         """Declare the mode that ends the run where a `when` has set the ending: the instant is completed before."""
-        self._check_text(one.text, "an assertion" if one.fails else "terminate(…)", source)
-        path = f"terminate[{sum(one.path.startswith('terminate[') for one in self.hidden) + 1}]"
-        one.name = f"reached {path}"
-        self.hidden.append(Hidden(one.name, "whether the run ends"))
-        symbol = Marker("ending", one.of)
+        self._check_text(ending.text, "an assertion" if ending.fails else "terminate(…)", source)
+        path = f"terminate[{sum(hidden.path.startswith('terminate[') for hidden in self.hidden) + 1}]"
+        ending.name = f"reached {path}"
+        self.hidden.append(Hidden(ending.name, "whether the run ends"))
+        symbol = Marker("ending", ending.of)
         symbol.name = path
-        self._kept += [one, symbol]
-        mode = self._mode(path, one.text, symbol, ("runs", "ended"))
-        go = mode.go("runs", "ended", when=cast(Expr, cast(Any, one) > 0), notice=one.text, fails=one.fails)
-        self.events.append(replace(go, source=source, ends=not one.fails))
+        self._kept += [ending, symbol]
+        mode = self._mode(path, ending.text, symbol, ("runs", "ended"))
+        go = mode.go("runs", "ended", when=cast(Expr, cast(Any, ending) > 0), notice=ending.text, fails=ending.fails)
+        self.events.append(replace(go, source=source, ends=not ending.fails))
 
-    def _write_assertion(self, one: Assertion, path: str) -> None:
-        self._check_text(one.text, "an assertion", one.source)
-        symbol = Marker("relation", one.condition)
+    def _write_assertion(self, assertion: Assertion, path: str) -> None:
+        self._check_text(assertion.text, "an assertion", assertion.source)
+        symbol = Marker("relation", assertion.condition)
         symbol.name = path
         self._kept.append(symbol)
-        mode = self._mode(path, str(one.condition), symbol, ("holds", "broken"))
-        broken = cast(Expr, ca.logic_not(cast(Any, one.condition)))
+        mode = self._mode(path, str(assertion.condition), symbol, ("holds", "broken"))
+        broken = cast(Expr, ca.logic_not(cast(Any, assertion.condition)))
         self.events.append(
-            replace(mode.go("holds", "broken", when=broken, notice=one.text, fails=True), source=one.source)
+            replace(mode.go("holds", "broken", when=broken, notice=assertion.text, fails=True), source=assertion.source)
         )
 
-    def _write_clock(self, one: Marker, source: Source) -> None:
+    def _write_clock(self, marker: Marker, source: Source) -> None:
         """Count ticks; where a run starts late, all earlier ones at once."""
-        number, period, offset = cast(Any, one), cast(Any, one.of), cast(Any, one.offset)
-        mode = self._counting(one, f"clock({period}, {offset})")
+        number, period, offset = cast(Any, marker), cast(Any, marker.of), cast(Any, marker.offset)
+        mode = self._counting(marker, f"clock({period}, {offset})")
         ticks = ca.fmax(number + 1, ca.floor((cast(Any, TIME) - offset) / period) + 1)
-        tick = mode.go("counting", "counting", at=offset + number * period, reset={one: ticks})
+        tick = mode.go("counting", "counting", at=offset + number * period, reset={marker: ticks})
         self.events.append(replace(tick, source=source))
 
-    def _counting(self, one: Marker, description: str) -> BoundMode:
+    def _counting(self, marker: Marker, description: str) -> BoundMode:
         """Declare the mode whose transitions count."""
-        self._kept.append(symbol := Marker(one.kind, one.of))
-        symbol.name = one.name.removeprefix("count of ")
+        self._kept.append(symbol := Marker(marker.kind, marker.of))
+        symbol.name = marker.name.removeprefix("count of ")
         return self._mode(symbol.name, description, symbol, ("counting",))
 
     def _mode(self, path: str, description: str, symbol: Symbol, names: tuple[str, ...]) -> BoundMode:
@@ -290,10 +288,10 @@ class DiscreteEquations:
 
 def between_events(expression: Any) -> Any:
     """Return an expression as it is between events, where the `pre` of a discrete variable is the variable."""
-    pres = [one for one in symbols_in(expression) if isinstance(one, Pre)]
+    pres = [symbol for symbol in symbols_in(expression) if isinstance(symbol, Pre)]
     if not pres:
         return expression
-    return ca.substitute(ca.SX(expression), ca.vertcat(*pres), ca.vertcat(*(one.of for one in pres)))
+    return ca.substitute(ca.SX(expression), ca.vertcat(*pres), ca.vertcat(*(pre.of for pre in pres)))
 
 
 def is_discrete(equation: Equation) -> bool:
@@ -312,4 +310,4 @@ def _target(key: Any) -> Symbol | None:
 
 def _expressions(event: Transition | StartMode) -> Iterable[Any]:
     resets = event.reset.values() if isinstance(event, Transition) else ()
-    return (one for one in (event.when, getattr(event, "at", None), *resets) if one is not None)
+    return (expression for expression in (event.when, getattr(event, "at", None), *resets) if expression is not None)

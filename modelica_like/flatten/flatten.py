@@ -89,13 +89,20 @@ class _Flattener:
 
     def run(self) -> FlatModel:
         templates = self._elaborate()
-        used = {self._owner(one, _plain(name)) for one, template in templates for name in template.discretes}
+        used = {self._owner(c, _plain(name)) for c, template in templates for name in template.discretes}
         for component, template in templates:
             self._declare(component, used)
             for path, text in template.initial:
-                self._declare_initial(component, path, text)
-            for one in template.hidden:
-                self._hide(id(component), one.path, f"{component.path}.{one.path}".lstrip("."), one)
+                # What is left of an initial equation is zero at the start.
+                full_path, node = f"{component.path}.{path}".lstrip("."), len(self.variables)
+                self.variable_of[id(component), path] = node
+                description = f"{INITIAL_EQUATION} `{text}`"
+                self.variables.append(
+                    FlatVariable(full_path, ONE, description, "local", "avoid", 0.0, 1.0, None, None, hidden=True)
+                )
+                self.starts.append(StartValue(node, 0.0, "fixed"))
+            for hidden in template.hidden:
+                self._hide(id(component), hidden.path, f"{component.path}.{hidden.path}".lstrip("."), hidden)
         added = self._disturb() if self.disturbed else None
         self.nodes = [(k, 0) for k in range(len(self.variables))]
         instances = [self._instance(component, template) for component, template in templates]
@@ -111,7 +118,7 @@ class _Flattener:
             raise raise_together_or_one(errors)
         self.parameters.check_derived()
         general = self._split_linear(instances)
-        d = ca.vertcat(*(ca.SX.sym(one.path) for one in self.discretes))
+        d = ca.vertcat(*(ca.SX.sym(discrete.path) for discrete in self.discretes))
         return FlatModel(
             name=self.root.label, variables=self.variables, nodes=self.nodes, derivative=self.derivative,
             parameters=self.parameters.flat, p=self.parameters.symbols(), q=self.parameters.expressions(),
@@ -124,18 +131,18 @@ class _Flattener:
 
     def _elaborate(self) -> list[tuple[Component, Template]]:
         """Find all templates, owners first: an owner's connections decide which optional connectors its parts have."""
-        found: list[tuple[Component, Template]] = []
+        elaborated: list[tuple[Component, Template]] = []
         for component in self.root.walk():
             for part in component.parts.values():
                 for connector in part.connectors.values():
                     connector.__dict__["_used"] = not connector.optional
             template = template_of(component)
-            found.append((component, template))
+            elaborated.append((component, template))
             for statement in template.connections:
                 self.wiring.add(component, statement)
             for name, unit in template.inferred.items():
                 self.wiring.inferred[id(component), name] = unit
-        return found
+        return elaborated
 
     # -- declarations ------------------------------------------------------------------------------------------------
 
@@ -154,8 +161,8 @@ class _Flattener:
         for name, mode in ((n, m) for n, m in component.modes.items() if (id(component), n) in used):
             self.discrete_of[id(component), name] = len(self.discretes)
             start = mode.number(component.start_mode(name))
-            one = FlatDiscrete(prefix + name, ONE, mode.description, start, mode.names, hysteresis=mode.hysteresis)
-            self.discretes.append(one)
+            discrete = FlatDiscrete(prefix + name, ONE, mode.description, start, mode.names, hysteresis=mode.hysteresis)
+            self.discretes.append(discrete)
         for end, connector in component.connectors.items():
             if connector.used:
                 for name, field in connector.quantities.items():
@@ -164,7 +171,7 @@ class _Flattener:
 
     def _disturb(self) -> int:
         """Declare the input that is added to a signal."""
-        signals = {self.variable_of[id(one.owner), one.name] for pair in self.wiring.signals for one in pair[:2]}
+        signals = {self.variable_of[id(end.owner), end.name] for pair in self.wiring.signals for end in pair[:2]}
         paths = {self.variables[k].path: self.variables[k] for k in sorted(signals)}
         if self.disturbed not in paths:
             near = did_you_mean(self.disturbed, paths)
@@ -181,14 +188,6 @@ class _Flattener:
         limits = field.nominal, *field.bounds, field.driving, field.difference
         self.variables.append(FlatVariable(path, unit, field.description, kind, field.state, field.guess, *limits))
 
-    def _declare_initial(self, component: Component, name: str, text: str) -> None:
-        """Declare what is left of an initial equation, which is zero at the start."""
-        path, node = f"{component.path}.{name}".lstrip("."), len(self.variables)
-        self.variable_of[id(component), name] = node
-        told = f"{INITIAL_EQUATION} `{text}`"
-        self.variables.append(FlatVariable(path, ONE, told, "local", "avoid", 0.0, 1.0, None, None, hidden=True))
-        self.starts.append(StartValue(node, 0.0, "fixed"))
-
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
         self.discrete_of[id(component), name] = len(self.discretes)
         start = self._start(component, name, path)
@@ -201,10 +200,10 @@ class _Flattener:
         with component.at_its_place(name):
             return self.parameters.evaluate(value, scope or component, path)
 
-    def _hide(self, owner: int, name: str, path: str, one: Hidden, start: Any = 0.0) -> int:
+    def _hide(self, owner: int, name: str, path: str, hidden: Hidden, start: Any = 0.0) -> int:
         """Declare a discrete value that no user has declared."""
         self.discrete_of[owner, name] = len(self.discretes)
-        self.discretes.append(FlatDiscrete(path, ONE, one.description, start, one.names, hidden=True))
+        self.discretes.append(FlatDiscrete(path, ONE, hidden.description, start, hidden.names, hidden=True))
         return self.discrete_of[owner, name]
 
     def _discrete(self, component: Component, path: str) -> int:
@@ -225,7 +224,7 @@ class _Flattener:
     # -- instances ---------------------------------------------------------------------------------------------------
 
     def _instance(self, component: Component, template: Template) -> Instance:
-        nodes = [self._node(self._variable(component, slot.path), slot.order) for slot in template.slots]
+        nodes = [self._node(self.variable_of[self._owner(component, slot.path)], slot.order) for slot in template.slots]
         parameters = [self._parameter(component, name) for name in template.parameters]
         discretes = [self._discrete(component, name) for name in template.discretes]
         return Instance(component.path, template, tuple(nodes), tuple(parameters), tuple(discretes))
@@ -237,9 +236,6 @@ class _Flattener:
         for step in names:
             owner = owner.connectors[step] if step in owner.connectors else owner.parts[step]
         return id(owner), name
-
-    def _variable(self, component: Component, path: str) -> int:
-        return self.variable_of[self._owner(component, path)]
 
     def _parameter(self, component: Component, path: str) -> int:
         *names, name = path.split(".")
@@ -304,7 +300,9 @@ class _Flattener:
                     what, advice = f"{path} has a value and a connection: only one can count.", "Remove one of the two."
                     self.errors.append(WrongConnection(what, where=component.place_of(name), advice=advice))
                 continue
-            if component is self.root or self._is_open(component, name):
+            if component is self.root or (
+                self.open_inputs and (component.terminal is not None or component.value(name) is None)
+            ):
                 self.inputs.append(node)
             elif component.value(name) is not None:
                 value = self.parameters.q(self.parameters.position(component, name))
@@ -318,13 +316,10 @@ class _Flattener:
         if component.terminal is None:
             return
         for name, rate in component.terminal.rates:
-            nodes = [self.variable_of[id(component), one] for one in (name, rate)]
+            nodes = [self.variable_of[id(component), key] for key in (name, rate)]
             if all(node in self.inputs for node in nodes):
                 terms = ((self._node(nodes[0], 1), 1.0), (nodes[1], -1.0))
                 self.linear.append(LinearEquation(terms, 0.0, Origin(component.path, type(component).__name__, _WIRE)))
-
-    def _is_open(self, component: Component, name: str) -> bool:
-        return self.open_inputs and (component.terminal is not None or component.value(name) is None)
 
     def _read_starts(self, component: Component) -> None:
         for name, field in component.fields.items():

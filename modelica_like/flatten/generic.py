@@ -66,7 +66,7 @@ def meets(
     crossed = np.isfinite(first) & np.isfinite(last) & (below != above)
     if not crossed.any():
         return False
-    low, high, below, first, last = (one[..., crossed] for one in (low, high, below, first, last))
+    low, high, below, first, last = (point[..., crossed] for point in (low, high, below, first, last))
     ends = low, high
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
@@ -74,7 +74,7 @@ def meets(
         low, high = np.where(stays, middle, low), np.where(stays, high, middle)
     (_, before), (above, after) = step(low), step(high)
     # Where a branch is undefined beyond its border, the other end tells its size.
-    sizes = np.fmax(*(gap(one, below, above)[0] for one in ends))
+    sizes = np.fmax(*(gap(end, below, above)[0] for end in ends))
     gaps, amounts = (np.fmin(*both) for both in zip(gap(low, below, above), gap(high, below, above), strict=True))
     # Where what it is taken of jumps itself, the other step decides.
     reached = abs(after - before) <= _MEETS * np.fmax(abs(first), abs(last))

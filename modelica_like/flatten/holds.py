@@ -66,8 +66,10 @@ def ideal_forms(component: Component, residuals: list[Any]) -> tuple[IdealForm, 
         symbol = symbol_of(component, mode.name)
         zeros = [_variable(component, mode, mode.ideal[name], "variable") for name in mode.names]
         for row, residual in enumerate(residuals):
-            own = [ca.substitute(residual, symbol, ca.SX(k)) for k in range(2)]
-            if all(_only(one, zero) and _depends(one, zero) for one, zero in zip(own, zeros, strict=True)):
+            cases = [ca.substitute(residual, symbol, ca.SX(k)) for k in range(2)]
+            if all(
+                _only(c, zero) and _number(ca.jacobian(c, zero)) != 0.0 for c, zero in zip(cases, zeros, strict=True)
+            ):
                 forms.append(IdealForm(mode.name, (zeros[0].name, zeros[1].name), row))
                 break
         else:
@@ -77,10 +79,6 @@ def ideal_forms(component: Component, residuals: list[Any]) -> tuple[IdealForm, 
                 advice=f"Write {mode.name}.choose({written}) == 0.",
             )
     return tuple(forms)
-
-
-def _depends(residual: Any, symbol: Symbol) -> bool:
-    return _number(ca.jacobian(residual, symbol)) != 0.0
 
 
 def hold_forms(component: Component, residuals: list[Any]) -> tuple[tuple[HoldForm, ...], list[Any]]:
@@ -110,12 +108,12 @@ def hold_forms(component: Component, residuals: list[Any]) -> tuple[tuple[HoldFo
 
 def starts_at_rest(component: Component, declared: Iterable[StartMode]) -> Iterator[StartMode]:
     """Yield the start modes, which hold a motion only if it is at rest: what moves is met in an impact."""
-    for one in declared:
-        mode = one.mode.mode
-        if hold := mode.holds.get(one.target):
+    for transition in declared:
+        mode = transition.mode.mode
+        if hold := mode.holds.get(transition.target):
             motion = cast(Any, _variable(component, mode, hold.motion, "motion"))
-            one = replace(one, when=all_of(one.when, motion <= 0, motion >= 0))
-        yield one
+            transition = replace(transition, when=all_of(transition.when, motion <= 0, motion >= 0))
+        yield transition
     for mode in component.modes.values():
         loose = _loose(mode)
         if loose >= 0 and (hold := mode.holds.get(mode.start)):
@@ -134,9 +132,9 @@ def _value(component: Component, name: str) -> Any:
 
 
 def _variable(component: Component, mode: Mode, name: str, role: str) -> Symbol:
-    found = _value(component, name) if hasattr(component, name) else None
-    if isinstance(found, Symbol) and _is_variable(found) and found.owner is component and not found.order:
-        return found
+    symbol = _value(component, name) if hasattr(component, name) else None
+    if isinstance(symbol, Symbol) and _is_variable(symbol) and symbol.owner is component and not symbol.order:
+        return symbol
     raise LanguageError(
         f"{mode.label} holds the {role} '{name}', which is not a variable of {type(component).__name__}.",
         advice="Name a variable, or a property that returns one.",
@@ -146,7 +144,7 @@ def _variable(component: Component, mode: Mode, name: str, role: str) -> Symbol:
 def _capacities(component: Component, hold: Hold) -> tuple[Any, Any]:
     given = _value(component, hold.capacity) if hold.capacity else None
     pair = given if isinstance(given, tuple) else (given, given)
-    forward, backward = (UNLIMITED if one is None else one for one in cast("tuple[Any, Any]", pair))
+    forward, backward = (UNLIMITED if side is None else side for side in cast("tuple[Any, Any]", pair))
     return forward, backward
 
 

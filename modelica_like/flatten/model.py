@@ -200,13 +200,13 @@ class FlatModel:
         """Return a coefficient as a number or an expression of parameters."""
         if not isinstance(value, Coefficient):
             return value
-        one = self.instances[value.instance]
-        return one.template.coefficients(self.q[list(one.parameters)])[value.position]
+        instance = self.instances[value.instance]
+        return instance.template.coefficients(self.q[list(instance.parameters)])[value.position]
 
     def origin(self, instance: int, row: int) -> Origin:
         """Return where an equation of an instance comes from."""
-        one = self.instances[instance]
-        return Origin(one.path, one.template.component, one.template.sources[row])
+        owner = self.instances[instance]
+        return Origin(owner.path, owner.template.component, owner.template.sources[row])
 
     def __repr__(self) -> str:
         return f"<{self}>"

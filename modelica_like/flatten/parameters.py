@@ -54,7 +54,15 @@ class Parameters:
         if value is None:
             return None
         if value.formula is None:
-            expression = self._independent(component, name, path, value)
+            field = component.fields[name]
+            expression = ca.SX.sym(path)
+            self._by_leaf[leaf_id(expression)] = len(self.flat)
+            unit = coherent(unit_of_field(component, name))
+            read = read_quantity(value.given) if field.unit_text == "*" and isinstance(value.given, str) else None
+            tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
+            number, bounds, written = cast(float, value.number), field.bounds, read[1] if read else None
+            self.flat.append(FlatParameter(path, unit, field.description, number, *bounds, tunable, above, written))
+            self._symbols.append(expression)
         else:
             with component.at_its_place(name):
                 expression = self._dependent(component, name, path, value)
@@ -65,18 +73,6 @@ class Parameters:
         """Append an expression to q; return its position."""
         self._q.append(expression)
         return len(self._q) - 1
-
-    def _independent(self, component: Component, name: str, path: str, value: Value) -> Any:
-        field = component.fields[name]
-        symbol = ca.SX.sym(path)
-        self._by_leaf[leaf_id(symbol)] = len(self.flat)
-        unit = coherent(unit_of_field(component, name))
-        read = read_quantity(value.given) if field.unit_text == "*" and isinstance(value.given, str) else None
-        tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
-        number, bounds, written = cast(float, value.number), field.bounds, read[1] if read else None
-        self.flat.append(FlatParameter(path, unit, field.description, number, *bounds, tunable, above, written))
-        self._symbols.append(symbol)
-        return symbol
 
     def _dependent(self, component: Component, name: str, path: str, value: Value) -> Any:
         if path in self._open:
@@ -112,7 +108,10 @@ class Parameters:
         if value.formula is None:
             return value.number
         expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scope, path, label), self._quantity))
-        result = self._with_numbers(expression)
+        quantities = [symbol for symbol in ca.symvar(expression) if leaf_id(symbol) in self._quantities]
+        result = ca.substitute(
+            expression, column(quantities), column(self._quantities[leaf_id(quantity)][1] for quantity in quantities)
+        )
         if result.is_constant() and not math.isfinite(float(result)):
             raise ValueOutOfRange(f"{label} must be a finite number, not {float(result):g}.")
         if getattr(scope, "units_checked", True):
@@ -129,10 +128,6 @@ class Parameters:
         self._quantities[leaf_id(symbol)] = symbol, number, unit
         return symbol
 
-    def _with_numbers(self, expression: Any) -> Any:
-        found = [one for one in ca.symvar(expression) if leaf_id(one) in self._quantities]
-        return ca.substitute(expression, column(found), column(self._quantities[leaf_id(one)][1] for one in found))
-
     def _unit_of_leaf(self, leaf: Any) -> Unit:
         key = leaf_id(leaf)
         return self._quantities[key][2] if key in self._quantities else self.flat[self._by_leaf[key]].unit
@@ -142,11 +137,11 @@ class Parameters:
         owner = scope.find(owner_path)
         field = owner.fields.get(name)
         if not isinstance(field, Parameter | Input):
-            known = [key for key, one in owner.fields.items() if isinstance(one, Parameter)]
-            raise unknown("parameter", f"{label}: {owner.label}", path, known, {path: owner.renamed.get(name, "")})
-        found = self._q[self.position(owner, name)]
+            names = [key for key, f in owner.fields.items() if isinstance(f, Parameter)]
+            raise unknown("parameter", f"{label}: {owner.label}", path, names, {path: owner.renamed.get(name, "")})
+        value = self._q[self.position(owner, name)]
         # A constant has a unit, too.
-        return self._constant(path, float(found), unit_of_field(owner, name)) if found.is_constant() else found
+        return self._constant(path, float(value), unit_of_field(owner, name)) if value.is_constant() else value
 
     def position(self, component: Component, name: str) -> int:
         """Return the position of a parameter in q.
@@ -177,9 +172,11 @@ class Parameters:
         Raises:
             ValueOutOfRange: one is not finite, or outside its min and max.
         """
-        numbers = ca.Function("derived", [self.symbols()], [self.formulas()])([one.value for one in self.flat])
+        numbers = ca.Function("derived", [self.symbols()], [self.formulas()])(
+            [parameter.value for parameter in self.flat]
+        )
         pairs = zip(self.derived, numbers.full().ravel(), strict=True)
-        self.derived = [replace(one, value=one.checked(float(number), f"{number:g}")) for one, number in pairs]
+        self.derived = [replace(p, value=p.checked(float(number), f"{number:g}")) for p, number in pairs]
 
     def formulas(self) -> Any:
         """Return the expressions of the parameters that follow from others."""

@@ -30,10 +30,10 @@ def reason(transition: Transition, path: Callable[[Symbol], str]) -> str:
     """
     if transition.because or transition.when is None:
         return transition.because or "its time is reached"
-    told = _condition(transition.when, path)
-    if len(told) <= _LONGEST and "…" not in told:
-        return told
-    named = dict.fromkeys(path(one) for one in symbols_in(transition.when) if not isinstance(_field(one), Parameter))
+    text = _condition(transition.when, path)
+    if len(text) <= _LONGEST and "…" not in text:
+        return text
+    named = dict.fromkeys(path(s) for s in symbols_in(transition.when) if not isinstance(_field(s), Parameter))
     return f"its condition on {', '.join(named)} holds"
 
 
@@ -44,13 +44,13 @@ def _condition(condition: Any, path: Callable[[Symbol], str], *, turned: bool = 
         return _condition(sides[0], path, turned=not turned)
     if operation in (ca.OP_AND, ca.OP_OR):
         both = (operation == ca.OP_AND) != turned
-        parts = [_condition(one, path, turned=turned) for one in sides]
+        parts = [_condition(side, path, turned=turned) for side in sides]
         return (" and " if both else " or ").join(dict.fromkeys(parts))
     if operation in (ca.OP_LT, ca.OP_LE):
         low, high = reversed(sides) if turned else sides
         if {low.op(), high.op()} <= {ca.OP_NEG, ca.OP_CONST}:
             low, high = -high, -low
-        fixed = all(isinstance(_field(one), Parameter) for one in symbols_in(low))
+        fixed = all(isinstance(_field(symbol), Parameter) for symbol in symbols_in(low))
         first, passes, second = (high, "rose above", low) if fixed else (low, "fell below", high)
         return f"{_side(first, path)} {passes} {_side(second, path)}"
     if operation in (ca.OP_EQ, ca.OP_NE):
@@ -67,18 +67,18 @@ def _side(expression: Any, path: Callable[[Symbol], str]) -> str:
     if expression.is_constant():
         return f"{float(expression):g}" if float(expression) else "zero"
     symbols = symbols_in(expression)
-    named = [ca.SX.sym(path(one) if not one.order else f"der({path(one)})") for one in symbols]
+    named = [ca.SX.sym(path(symbol) if not symbol.order else f"der({path(symbol)})") for symbol in symbols]
     (plain,) = ca.substitute([expression], [ca.vertcat(*symbols)], [ca.vertcat(*named)])
-    told = re.sub(r"(?<![\w.])\d[\d.]*(e[+-]?\d+)?", lambda number: f"{float(number[0]):g}", str(plain))
-    told = re.sub(r"\(([\w.]+[*/][\w.]+)\)", r"\1", re.sub(r"fabs\(([^()]*)\)", r"|\1|", told))
-    told = re.sub(r"^\((.*)\)$", r"\1", told)
+    text = re.sub(r"(?<![\w.])\d[\d.]*(e[+-]?\d+)?", lambda number: f"{float(number[0]):g}", str(plain))
+    text = re.sub(r"\(([\w.]+[*/][\w.]+)\)", r"\1", re.sub(r"fabs\(([^()]*)\)", r"|\1|", text))
+    text = re.sub(r"^\((.*)\)$", r"\1", text)
     field = _field(symbols[0])
     if plain.is_symbolic() and isinstance(field, Parameter):
-        return f"{{{told}}}"
-    lone = len(symbols) == 1 and not symbols[0].order and told.strip("|") == path(symbols[0])
+        return f"{{{text}}}"
+    lone = len(symbols) == 1 and not symbols[0].order and text.strip("|") == path(symbols[0])
     words = re.split(r"[,;:(]", getattr(field, "description", ""))[0].split() if lone else []
-    told = " ".join([*words, told]) if len(words) <= _WORDS else told
-    return told if len(told) <= _TERM and not set(told) & set("@?") else "…"
+    text = " ".join([*words, text]) if len(words) <= _WORDS else text
+    return text if len(text) <= _TERM and not set(text) & set("@?") else "…"
 
 
 def _field(symbol: Symbol) -> Any:

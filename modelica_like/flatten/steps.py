@@ -90,8 +90,8 @@ class _Written:
     def honest(self, root: Any) -> Any:
         """Return the expression with zeros that have a slope by every variable that decides a step without event."""
         result = self.write(root)
-        for one in self._hidden.values():
-            result = result + ca.fmin(ca.tanh(one) + 2.0, 0.0)
+        for step in self._hidden.values():
+            result = result + ca.fmin(ca.tanh(step) + 2.0, 0.0)
         return result
 
     def write(self, root: Any) -> Any:
@@ -109,20 +109,20 @@ class _Written:
                 self._known[key] = node, condition
                 continue
             parts = operands(node)
-            if missing := [one for one in parts if one.element_hash() not in self._known]:
+            if missing := [part for part in parts if part.element_hash() not in self._known]:
                 pending += [node, *missing]
             else:
                 self._known[key] = node, self._of_node(node, parts)
         return self._known[root.element_hash()][1]
 
     def _of_node(self, node: Any, parts: list[Any]) -> Any:
-        olds = [one.element_hash() for one in parts]
-        news = [self._known[one][1] for one in olds]
+        olds = [part.element_hash() for part in parts]
+        news = [self._known[x][1] for x in olds]
         operation = node.op()
         if operation == ca.OP_SIGN and moves(node):
             key, (old,), (new,) = node.element_hash(), parts, news
             return self._step((key, 0), old > 0, new > 0) - self._step((key, 1), old < 0, new < 0)
-        if olds != [one.element_hash() for one in news]:
+        if olds != [n.element_hash() for n in news]:
             whole = ca.SX.unary(operation, *news) if len(news) == 1 else ca.SX.binary(operation, *news)
         else:
             whole = node
@@ -140,9 +140,9 @@ class _Written:
         return chosen
 
     def _hide(self, step: Any) -> None:
-        for one in symbols_in(step):
-            if one.owner is not None and is_a(one, Variable):
-                self._hidden[id(one)] = one
+        for symbol in symbols_in(step):
+            if symbol.owner is not None and is_a(symbol, Variable):
+                self._hidden[id(symbol)] = symbol
 
 
 class _Points:
@@ -150,12 +150,12 @@ class _Points:
 
     def __init__(self, whole: Any) -> None:
         symbols = symbols_in(whole)
-        moving = [one for one in symbols if one is TIME or (one.owner is not None and is_a(one, Variable))]
-        others = [one for one in symbols if not any(one is other for other in moving)]
-        fixed = [one for one in others if one.owner is not None and is_fixed(one)]
-        whole_numbers = [one for one in others if not any(one is other for other in fixed)]
+        moving = [s for s in symbols if s is TIME or (s.owner is not None and is_a(s, Variable))]
+        others = [symbol for symbol in symbols if not any(symbol is other for other in moving)]
+        fixed = [symbol for symbol in others if symbol.owner is not None and is_fixed(symbol)]
+        whole_numbers = [symbol for symbol in others if not any(symbol is other for other in fixed)]
         self._whole, self._symbols = whole, ca.vertcat(*moving, *fixed, *whole_numbers)
-        self._between = pairs(len(moving), len(fixed), [_numbers(one) for one in whole_numbers])
+        self._between = pairs(len(moving), len(fixed), [_numbers(number) for number in whole_numbers])
 
     def jumps(self, key: _Key, step: Any) -> bool:
         """Return whether the expression jumps with a step, while other steps follow."""
@@ -170,9 +170,9 @@ class _Points:
             return value.full()[0], of.full()[0]
 
         def gap(points: Matrix, first: Matrix, second: Matrix) -> tuple[Matrix, Matrix]:
-            one, other = (result.map(points.shape[1])(points, value[None]).full()[0] for value in (first, second))
+            low, other = (result.map(points.shape[1])(points, value[None]).full()[0] for value in (first, second))
             with np.errstate(invalid="ignore"):
-                return abs(one - other), abs(one)
+                return abs(low - other), abs(low)
 
         return not meets(at, gap, self._between)
 

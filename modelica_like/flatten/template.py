@@ -196,7 +196,7 @@ def path_of(symbol: Symbol, root: Component) -> str:
     """Return the path of a symbol, seen from a component: `n`, `clutch.n`, `pre(n)`, `relation[1]`, `time`."""
     if isinstance(symbol, Pre):
         return f"pre({path_of(symbol.of, root)})"
-    global_one = isinstance(symbol, Marker) or any(symbol is one for one in (TIME, INITIAL, TERMINAL, HOMOTOPY))
+    global_one = isinstance(symbol, Marker) or any(symbol is x for x in (TIME, INITIAL, TERMINAL, HOMOTOPY))
     return symbol.name if global_one else relative_path(symbol.owner, root, symbol.name)
 
 
@@ -209,25 +209,18 @@ def template_of(component: Component) -> Template:
     if component.parts or component.fields is not component._class_fields:
         with symbols_in_tables(component):
             return _build(component)
-    cache: dict[Any, Template] = _class_cache(type(component))
-    key = _structural_key(component)
-    if key not in cache:
-        cache[key] = _build(component)
-    return cache[key]
-
-
-def _class_cache(kind: type[Component]) -> dict[Any, Template]:
+    kind = type(component)
     if "_templates" not in vars(kind):
         kind._templates = {}  # type: ignore[attr-defined]
-    return vars(kind)["_templates"]
-
-
-def _structural_key(component: Component) -> tuple[Any, ...]:
+    cache: dict[Any, Template] = vars(kind)["_templates"]
     structural = tuple(component.__dict__[name] for name in component._structural)
     used = tuple(name for name, connector in component.connectors.items() if connector.used)
     given = tuple(name for name, field in component.fields.items() if field.default is None and component.given(name))
     units = tuple(str(unit_of_field(component, name)) for name, f in component.fields.items() if f.unit == ANY)
-    return structural, used, given, units
+    key = structural, used, given, units
+    if key not in cache:
+        cache[key] = _build(component)
+    return cache[key]
 
 
 def _build(component: Component) -> Template:
@@ -237,7 +230,7 @@ def _build(component: Component) -> Template:
     starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
     residuals = [with_events(between_events(e.left - e.right)) for e in equations]
     sources = tuple(e.source for e in (*equations, *initial))
-    residuals += [honest(one - (e.left - e.right)) for one, e in zip(starts, initial, strict=True)]
+    residuals += [honest(start - (e.left - e.right)) for start, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
     others = [*zip(residuals, sources, strict=True), *((term, NOWHERE) for term in energy_terms)]
@@ -247,7 +240,7 @@ def _build(component: Component) -> Template:
     changes = _Changes(component, discrete)
     names = Names(component)
     names.add([*residuals, *hold_terms, *changes.expressions()])
-    names.add(ca.SX(symbol_of(component, name)) for one in holds for name in (one.motion, one.reaction) if name)
+    names.add(ca.SX(symbol_of(component, name)) for hold in holds for name in (hold.motion, hold.reaction) if name)
     discrete.check_determined(names.discretes)
     energy.parameters, energy.discretes = names.parameters, names.discretes
     energy.add(energy_terms)
@@ -260,7 +253,7 @@ def _build(component: Component) -> Template:
         discretes=tuple(names.discretes),
         residual=residual,
         sources=sources,
-        initial=tuple((one.name, e.source.text.removeprefix("yield ")) for one, e in zip(starts, initial, strict=True)),
+        initial=tuple((s.name, e.source.text.removeprefix("yield ")) for s, e in zip(starts, initial, strict=True)),
         incidence=_rows(residual.jac_sparsity(0, 0)),
         linear=linear,
         coefficients=coefficients,
@@ -269,7 +262,7 @@ def _build(component: Component) -> Template:
         start_modes=changes.start_modes(),
         hidden=tuple(discrete.hidden),
         update_forms=discrete.forms(lambda symbol: path_of(symbol, component)),
-        delay_parts=tuple(tuple(part.name for part in parts(one)) for one, _ in discrete.delays),
+        delay_parts=tuple(tuple(part.name for part in parts(delay)) for delay, _ in discrete.delays),
         holds=holds,
         hold_terms=names.function("hold_terms", hold_terms),
         ideals=ideal_forms(component, residuals),
@@ -288,19 +281,17 @@ def _statements(
     written = located(component.equations(), f"{kind}.equations()")
     statements = [as_statement(item, source, kind) for item, source in written]
     every = [s for s in statements if isinstance(s, Equation)]
-    equations = [s for s in every if not is_discrete(s)] + _constants(component)
+    # Parameters that initial equations determine do not change.
+    kept = (name for name, field in component.fields.items() if isinstance(field, Variable) and field.constant)
+    equations = [s for s in every if not is_discrete(s)] + [
+        Equation(der(symbol_of(component, name)), ca.SX(0)) for name in kept
+    ]
     at_start = located(component.initial_equations(), f"{kind}.initial_equations()")
     initial = [as_equation(item, source, kind) for item, source in at_start]
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
-    joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
+    joined = {name for joint in wiring if isinstance(joint, Connection) for name in taken(component, joint)}
     check_balance(component, equations, joined)
     return equations, [s for s in every if is_discrete(s)], initial, wiring
-
-
-def _constants(component: Component) -> list[Equation]:
-    """Equations of parameters that initial equations determine: they do not change."""
-    kept = (name for name, field in component.fields.items() if isinstance(field, Variable) and field.constant)
-    return [Equation(der(symbol_of(component, name)), ca.SX(0)) for name in kept]
 
 
 class _Changes:
@@ -311,16 +302,22 @@ class _Changes:
         self.transitions = [e for e in discrete.events if isinstance(e, Transition)]
         declared = (e for e in discrete.events if isinstance(e, StartMode))
         self.starts = list(starts_at_rest(component, declared))
-        self.updates = [part for one in discrete.updates for part in (one.active, one.value)]
-        self.targets = [one.target for one in discrete.updates]
+        self.updates = [part for update in discrete.updates for part in (update.active, update.value)]
+        self.targets = [update.target for update in discrete.updates]
         self.guards = [ca.SX(0) if t.when is None else guard_of(t.when, t.source) for t in self.transitions]
         self.moments = [ca.SX(0) if t.at is None else t.at for t in self.transitions]
-        self.delays = [part for one, _ in discrete.delays for part in (one.of, one.offset)]
+        self.delays = [part for delay, _ in discrete.delays for part in (delay.of, delay.offset)]
         self.resets = [pair for t in self.transitions for pair in t.reset.items()]
 
     def expressions(self) -> Iterator[Any]:
         """Yield all expressions, and the symbols of the modes."""
-        yield from (*self.guards, *self.moments, *self.updates, *self.delays, *(ca.SX(one) for one in self.targets))
+        yield from (
+            *self.guards,
+            *self.moments,
+            *self.updates,
+            *self.delays,
+            *(ca.SX(target) for target in self.targets),
+        )
         for pair in self.resets:
             yield from pair
         yield from (s.when for s in self.starts)
@@ -364,10 +361,9 @@ class _Changes:
 
 def _energy_terms(component: Component, wiring: Iterable[Connection | FreeEnd]) -> list[Any]:
     """Stored energy, loss, source power, then the power into each connector, without those of parts."""
-    passed_on = {id(end) for one in wiring if isinstance(one, Connection) for end in one.ends}
+    passed_on = {id(end) for joint in wiring if isinstance(joint, Connection) for end in joint.ends}
     terms: list[Any] = [component.stored_energy(), component.loss_power(), component.source_power()]
-    own = [c for c in component.connectors.values() if c.used and id(c) not in passed_on]
-    terms += [connector.power() for connector in own]
+    terms += [c.power() for c in component.connectors.values() if c.used and id(c) not in passed_on]
     return [ca.SX(cast(Any, term)) for term in terms]
 
 

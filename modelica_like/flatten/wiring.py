@@ -53,7 +53,7 @@ class Wiring:
             if type(end) is not type(ends[0]):
                 self.errors.append(_different_kinds(ends[0], end, source))
                 # Their missing connection is a consequence, not another error.
-                self.freed.update(id(one) for one in ends)
+                self.freed.update(id(e) for e in ends)
                 return
         first, *others = (self._key(scope, end, source) for end in ends)
         for key in others:
@@ -121,15 +121,12 @@ class Wiring:
     def check_signal_units(self) -> None:
         """Compare the units along signal connections, after all templates are known."""
         for driver, sink, source in self.signals:
-            if not all((one.owner._owner or one.owner).units_checked for one in (driver, sink)):
+            if not all((symbol.owner._owner or symbol.owner).units_checked for symbol in (driver, sink)):
                 continue
-            units = [self._unit(symbol) for symbol in (driver, sink)]
+            units = [self.inferred.get((id(s.owner), s.name)) or unit_of_field(s.owner, s.name) for s in (driver, sink)]
             if not same_dimension(*units):
                 what = f"{_name(driver)} is in {units[0]}, {_name(sink)} expects {units[1]}."
                 self._refuse(what, source, "Give the source's parameters in that unit.")
-
-    def _unit(self, symbol: Symbol) -> Unit:
-        return self.inferred.get((id(symbol.owner), symbol.name)) or unit_of_field(symbol.owner, symbol.name)
 
     def check_free(self, component: Component) -> None:
         """Collect an error for every connector that must be connected and is not."""
@@ -157,17 +154,17 @@ def _is_within(end: Connector | Symbol, scope: Component) -> bool:
 
 def _givers(scope: Component, ends: Iterable[Connector | Symbol]) -> list[Symbol]:
     """Return what gives a connection its signal: an own input, a part's output, or an own output without these."""
-    kinds = [(one, one.owner is scope, one.owner.fields[one.name]) for one in ends if isinstance(one, Symbol)]
-    first = [one for one, own, kind in kinds if isinstance(kind, Input if own else Output)]
-    return first or [one for one, _, kind in kinds if isinstance(kind, Output)]
+    kinds = [(end, end.owner is scope, end.owner.fields[end.name]) for end in ends if isinstance(end, Symbol)]
+    first = [end for end, outer, field in kinds if isinstance(field, Input if outer else Output)]
+    return first or [end for end, _, field in kinds if isinstance(field, Output)]
 
 
 def taken(scope: Component, connection: Connection) -> list[str]:
     """Return the own signals that a connection determines, and the own connectors in it."""
-    connectors = [one._name for one in connection.ends if isinstance(one, Connector) and one._owner is scope]
-    givers = [id(one) for one in _givers(scope, connection.ends)]
-    own = [one for one in connection.ends if isinstance(one, Symbol) and one.owner is scope]
-    return connectors + [one.name for one in own if id(one) not in givers]
+    connectors = [end._name for end in connection.ends if isinstance(end, Connector) and end._owner is scope]
+    givers = [id(giver) for giver in _givers(scope, connection.ends)]
+    signals = [end for end in connection.ends if isinstance(end, Symbol) and end.owner is scope]
+    return connectors + [signal.name for signal in signals if id(signal) not in givers]
 
 
 def _name(end: Connector | Symbol) -> str:
@@ -190,8 +187,8 @@ def _fitting(first: Connector, second: Connector) -> str:
     """Return the connection that is meant where a part has one other end of the kind."""
     for end, other in ((first, second), (second, first)):
         owner = other._owner
-        own = owner.connectors.values() if isinstance(owner, Component) else ()
-        ends = [one for one in own if type(one) is type(end) and not one.optional]
+        connectors = owner.connectors.values() if isinstance(owner, Component) else ()
+        ends = [connector for connector in connectors if type(connector) is type(end) and not connector.optional]
         if len(ends) == 1:
             meant = [end.label, ends[0].label] if end is first else [ends[0].label, end.label]
             return f'To join them, write in [connect]: joint = ["{meant[0]}", "{meant[1]}"]'

@@ -36,8 +36,8 @@ class Platform:
 
 
 PLATFORMS = {
-    one.name: one
-    for one in (
+    platform.name: platform
+    for platform in (
         Platform("x86_64-linux", "linux64", "x86_64-linux-gnu.2.17", ".so"),
         Platform("aarch64-linux", "aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
         Platform("x86_64-windows", "win64", "x86_64-windows-gnu", ".dll"),
@@ -94,17 +94,17 @@ def chosen_platforms(platforms: Sequence[str] | str, there: Iterable[str] = PLAT
         UnknownName: there is no such platform.
         ExportError: FMUs have no binaries for this machine.
     """
-    found: list[str] = []
-    for one in (platforms,) if isinstance(platforms, str) else platforms:
-        _check_known(one, ["native", "all", *there])
-        found += there if one == "all" else [native_platform() if one == "native" else one]
-    return tuple(dict.fromkeys(found))
+    result: list[str] = []
+    for platform in (platforms,) if isinstance(platforms, str) else platforms:
+        _check_known(platform, ["native", "all", *there])
+        result += there if platform == "all" else [native_platform() if platform == "native" else platform]
+    return tuple(dict.fromkeys(result))
 
 
-def _check_known(platform: str, known: Collection[str]) -> None:
-    if platform not in known:
-        hint = did_you_mean(platform, known) or "."
-        raise UnknownName(f"There is no platform '{platform}'{hint}", advice=f"There are {', '.join(known)}.")
+def _check_known(platform: str, names: Collection[str]) -> None:
+    if platform not in names:
+        hint = did_you_mean(platform, names) or "."
+        raise UnknownName(f"There is no platform '{platform}'{hint}", advice=f"There are {', '.join(names)}.")
 
 
 def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifier: str = "model") -> Path:
@@ -162,9 +162,9 @@ def compiler_command(platform: str) -> list[str]:
         given = shlex.split(os.environ.get("CC", ""))
         if given and shutil.which(given[0]) is None:
             raise ExportError(f"The compiler '{given[0]}' was not found.", why="The environment variable CC names it.")
-        found = next((path for name in _COMPILERS if (path := shutil.which(name))), None)
-        if given or found:
-            return given or [str(found)]
+        compiler = next((path for name in _COMPILERS if (path := shutil.which(name))), None)
+        if given or compiler:
+            return given or [str(compiler)]
     if find_spec("ziglang") is not None:
         return [sys.executable, "-m", "ziglang", "cc", "-target", RUNTIMES[platform].target]
     if native:

@@ -43,12 +43,12 @@ def problems(path: str | Path) -> list[str]:
     Returns:
         The messages of the validators; empty without errors.
     """
-    found = description_problems(path)
+    result = description_problems(path)
     with zipfile.ZipFile(path) as archive:
         names = set(archive.namelist())
         if TERMINALS in names:
-            found += _terminal_problems(archive.read(TERMINALS), archive.read("modelDescription.xml"), names)
-    return found
+            result += _terminal_problems(archive.read(TERMINALS), archive.read("modelDescription.xml"), names)
+    return result
 
 
 def description_problems(path: str | Path) -> list[str]:
@@ -63,7 +63,7 @@ def description_problems(path: str | Path) -> list[str]:
         description = fmpy.read_model_description(str(path), validate=True, validate_model_structure=True)
     except ValidationError as error:
         return list(error.problems)
-    names = (one.name for one in description.modelVariables)
+    names = (variable.name for variable in description.modelVariables)
     return [f"The variable name '{name}' is not legal." for name in names if not _NAME.fullmatch(name)]
 
 
@@ -71,17 +71,17 @@ def _terminal_problems(content: bytes, description: bytes, names: set[str]) -> l
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
     top: Any = etree.fromstring(content, parser)
     schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema/fmi3/fmi3TerminalsAndIcons.xsd"))
-    found = [] if schema.validate(top) else [f"{TERMINALS}: {error.message}" for error in schema.error_log]
+    result = [] if schema.validate(top) else [f"{TERMINALS}: {error.message}" for error in schema.error_log]
     variables: Any = etree.fromstring(description, parser).find("ModelVariables")
-    known = {one.get("name") for one in variables}
+    listed = {variable.get("name") for variable in variables}
     for member in top.iter("TerminalMemberVariable"):
-        if member.get("variableName") not in known:
-            found.append(f"{TERMINALS}: there is no variable {member.get('variableName')}.")
+        if member.get("variableName") not in listed:
+            result.append(f"{TERMINALS}: there is no variable {member.get('variableName')}.")
     for one in top.iter("TerminalGraphicalRepresentation"):
         icon = f"terminalsAndIcons/{one.get('iconBaseName')}.png"
         if icon not in names:
-            found.append(f"{TERMINALS}: {icon} is missing.")
-    return found
+            result.append(f"{TERMINALS}: {icon} is missing.")
+    return result
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
     if fixed_step:
         fails, unknown = (f"{text} of {fixed_step:g} s {rest}" for text, rest in _FIXED)
     # Modes, whose changes match the curves; an FMU has only those that are declared.
-    modes = (one.path for one in model.flat_discretes if one.names and not one.hidden)
+    modes = (discrete.path for discrete in model.flat_discretes if discrete.names and not discrete.hidden)
     try:
         run = run_fmu(path, stop=end, kind=kind, step=step, outputs=[*nominals, *modes])
         truth = _idas(model, end, points, _TRUTH, rtol)
@@ -137,8 +137,10 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
     if fixed_step:
         shares = ", ".join(f"{d.signal} {d.relative:.2g}" for d in curves.deviations[:_LISTED])
         rest = f"; {len(nominals) - _LISTED} others less" if len(nominals) > _LISTED else ""
-        told = f"Error of fixed steps of {fixed_step:g} s until t = {end:g} s, against IDAS, over the range: {shares}"
-        return Check(f"{told}{rest}.", curves)
+        message = (
+            f"Error of fixed steps of {fixed_step:g} s until t = {end:g} s, against IDAS, over the range: {shares}"
+        )
+        return Check(f"{message}{rest}.", curves)
     off = [d for d in curves.deviations if d.relative > _AGREEMENT and d.largest > _ROUNDING * nominals[d.signal]]
     if not off:
         return Check(curves=curves)
@@ -146,8 +148,8 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
     beyond = [d for d in off if d.relative > _ALLOWANCE * usual[d.signal].relative]
     reason = "by more than its tolerance explains" if beyond else f"as its tolerance {rtol:g} lets it"
     shares = ", ".join(f"{d.signal} by {d.relative:.2g}" for d in (beyond or off)[:_TOLD])
-    told = f"Until t = {end:g} s the FMU differs from IDAS {reason}: {shares} of the range."
-    return Check(told, curves, bool(beyond))
+    message = f"Until t = {end:g} s the FMU differs from IDAS {reason}: {shares} of the range."
+    return Check(message, curves, bool(beyond))
 
 
 def communication_step(end: float, step: float, points: int) -> float:

@@ -57,16 +57,13 @@ class EventLocator:
     def _modes(self, row: tuple[Any, ...]) -> list[Any]:
         return [row[k] for k in self._columns]
 
-    def _sample(self, time: float) -> tuple[Any, ...]:
-        self._recorder.sample(time, force=True)
-        return self._recorder.rows.pop()
-
     def _probe(self, step: float) -> tuple[Any, ...]:
         """Step from the saved state."""
         self._load(self._state)
         if step > 0.0:
             self._fmu.doStep(currentCommunicationPoint=self._from, communicationStepSize=step)
-        return self._sample(self._from + step)
+        self._recorder.sample(self._from + step, force=True)
+        return self._recorder.rows.pop()
 
     def _step_through(self, end: float) -> None:
         """Repeat the step to its end, with both sides of every mode change."""
@@ -119,17 +116,6 @@ class Ending:
         return watched
 
 
-def choose_kind(description: Any, kind: str | None) -> str:
-    """Return me or cs."""
-    has = {"cs": description.coSimulation is not None, "me": description.modelExchange is not None}
-    chosen = kind or ("cs" if has["cs"] else "me")
-    if not any(has.values()):
-        raise Refused(kind="scheduled")
-    if not has[chosen]:
-        raise Refused(kind="no kind", wanted=KINDS[chosen])
-    return chosen
-
-
 def take_arrays(parameters: dict[str, Any], arrays: dict[str, tuple[int, ...]]) -> None:
     """Write arrays number behind number, row by row, as FMPy wants them.
 
@@ -162,18 +148,18 @@ def check_names(job: dict[str, Any], causality: dict[str, str], arrays: Collecti
             raise Refused(kind="unknown", name=name, known=list(causality))
     for name in job["inputs"]:
         if causality[name] != "input":
-            known = [n for n, c in causality.items() if c == "input"]
-            raise Refused(kind="no input", name=name, causality=causality[name], known=known)
+            inputs = [n for n, c in causality.items() if c == "input"]
+            raise Refused(kind="no input", name=name, causality=causality[name], known=inputs)
 
 
 def interpolate(series: Any, times: Any, side: Side) -> Any:
     """Interpolate a series of (time, value) linearly; at jumps take its `left` or `right` value."""
-    known, values = np.transpose(series)
-    if len(known) == 1:
+    instants, values = np.transpose(series)
+    if len(instants) == 1:
         return np.full(np.shape(times), values[0])
-    after = np.clip(np.searchsorted(known, times, side), 1, len(known) - 1)
-    span = known[after] - known[after - 1]
-    part = np.clip((times - known[after - 1]) / np.where(span > 0, span, 1), 0, 1)
+    after = np.clip(np.searchsorted(instants, times, side), 1, len(instants) - 1)
+    span = instants[after] - instants[after - 1]
+    part = np.clip((times - instants[after - 1]) / np.where(span > 0, span, 1), 0, 1)
     return values[after - 1] + part * (values[after] - values[after - 1])
 
 
@@ -200,8 +186,8 @@ class Ramps:
     """
 
     def __init__(self, fmu: Any, description: Any, inputs: dict[str, Any], kind: str, start: float) -> None:
-        found = [v for v in description.modelVariables if v.name in inputs and v.type in ("Real", "Float64")]
-        moving = [v for v in found if v.variability in (None, "continuous") and np.ptp(inputs[v.name][:, 1])]
+        variables = [v for v in description.modelVariables if v.name in inputs and v.type in ("Real", "Float64")]
+        moving = [v for v in variables if v.variability in (None, "continuous") and np.ptp(inputs[v.name][:, 1])]
         self._fmu, self._series = fmu, [inputs[v.name] for v in moving]
         self._references = [v.valueReference for v in moving]
         self._kinks = np.unique(np.concatenate([[], *(s[:, 0] for s in self._series)]))
@@ -305,24 +291,29 @@ def watcher(job: Job, description: Any, kind: str, ending: Ending) -> Callable[[
 
 def run(job: Job) -> None:
     """Run the job of a folder."""
-    asked, fmu = job.asked, str(job.folder / "0")
+    request, fmu = job.asked, str(job.folder / "0")
     description: Any = fmpy.read_model_description(fmu, validate=False)
-    kind = choose_kind(description, asked["kind"])
+    has = {"cs": description.coSimulation is not None, "me": description.modelExchange is not None}
+    kind = request["kind"] or ("cs" if has["cs"] else "me")
+    if not any(has.values()):
+        raise Refused(kind="scheduled")
+    if not has[kind]:
+        raise Refused(kind="no kind", wanted=KINDS[kind])
     numbers = [v for v in description.modelVariables if v.type in (*REAL, *DISCRETE)]
-    known = {v.name: v for v in numbers if v.name != "time" and not v.shape}
+    scalars = {v.name: v for v in numbers if v.name != "time" and not v.shape}
     arrays = {v.name: tuple(v.shape) for v in numbers if v.shape}
-    check_names(asked, {name: v.causality or "local" for name, v in known.items()}, arrays)
-    take_arrays(asked["parameters"], arrays)
-    outputs = asked["outputs"] or [name for name, v in known.items() if v.causality != "parameter"]
+    check_names(request, {name: v.causality or "local" for name, v in scalars.items()}, arrays)
+    take_arrays(request["parameters"], arrays)
+    outputs = request["outputs"] or [name for name, v in scalars.items() if v.causality != "parameter"]
     instance = _instance(job, description, kind)
     ending = Ending(instance, kind)
     table = np.asarray(simulate(job, description, kind, outputs, instance, ending))
     if ending.time is not None:
         table["time"][-1] = ending.time
     np.save(job.folder / "result.npy", table)
-    parameters = {name: v.start for name, v in known.items() if v.causality == "parameter"}
+    parameters = {name: v.start for name, v in scalars.items() if v.causality == "parameter"}
     constants = {name: start for name, start in parameters.items() if start not in (None, "true", "false")}
-    variables = [*map(about, known.values())]
+    variables = [*map(about, scalars.values())]
     job.leave({"name": description.modelName, "variables": variables, "constants": constants, "ended": ending.seen})
     instance.freeInstance()  # after all else: it may crash there
 
@@ -343,21 +334,21 @@ def simulate(
     job: Job, description: Any, kind: str, outputs: list[str], instance: Any, ending: Ending
 ) -> Any:  # fmt: skip
     """Run the FMU by FMPy; return its table."""
-    asked, fmu = job.asked, str(job.folder / "0")
+    request, fmu = job.asked, str(job.folder / "0")
     experiment = description.defaultExperiment
-    stop = asked["stop"] if asked["stop"] is not None else getattr(experiment, "stopTime", None)
-    stop = float(stop) if stop is not None else asked["start"] + 1.0
-    step = output_step(asked, stop, getattr(experiment, "stepSize", None))
-    inputs = {n: np.array(v if isinstance(v, list) else [[0.0, v]]) for n, v in asked["inputs"].items()}
+    stop = request["stop"] if request["stop"] is not None else getattr(experiment, "stopTime", None)
+    stop = float(stop) if stop is not None else request["start"] + 1.0
+    step = output_step(request, stop, getattr(experiment, "stepSize", None))
+    inputs = {n: np.array(v if isinstance(v, list) else [[0.0, v]]) for n, v in request["inputs"].items()}
     event_mode = _has_event_mode(description)
     if any(np.ptp(series[:, 1]) for series in inputs.values()):
-        Ramps(instance, description, inputs, kind, asked["start"])
+        Ramps(instance, description, inputs, kind, request["start"])
     go: Any = fmpy.simulate_fmu
     return go(
-        fmu, validate=False, model_description=description, fmi_type=KINDS[kind], start_time=asked["start"],
-        stop_time=stop, solver=asked["solver"], relative_tolerance=asked["tolerance"],
-        step_size=step if asked["solver"] == "Euler" else None, output_interval=step,
-        start_values=asked["parameters"], input=input_table(inputs), output=outputs,
+        fmu, validate=False, model_description=description, fmi_type=KINDS[kind], start_time=request["start"],
+        stop_time=stop, solver=request["solver"], relative_tolerance=request["tolerance"],
+        step_size=step if request["solver"] == "Euler" else None, output_interval=step,
+        start_values=request["parameters"], input=input_table(inputs), output=outputs,
         use_event_mode=event_mode, early_return_allowed=event_mode, fmu_instance=instance,
         step_finished=watcher(job, description, kind, ending),
     )  # fmt: skip

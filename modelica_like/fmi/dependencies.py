@@ -43,12 +43,12 @@ class Following:
     def _implicit(self) -> Rows:
         """Dependencies of each implicit unknown, by its own block and those before."""
         rows = sparsity_rows(self.model.alg)
-        own = [{k for name, k in row if name == "z"} for row in rows]
-        return solved_rows(own, [{one for one in row if one[0] != "z"} for row in rows], len(rows))
+        implicit = [{k for name, k in row if name == "z"} for row in rows]
+        return solved_rows(implicit, [{quantity for quantity in row if quantity[0] != "z"} for row in rows], len(rows))
 
     def _through_implicit(self, row: set[Known]) -> set[Known]:
-        found = {one for one in row if one[0] != "z"}
-        return found.union(*(self._implicit[k] for name, k in row if name == "z"))
+        result = {quantity for quantity in row if quantity[0] != "z"}
+        return result.union(*(self._implicit[k] for name, k in row if name == "z"))
 
 
 @dataclass(frozen=True)
@@ -59,14 +59,14 @@ class Dependencies(Following):
 
     def continuous(self, unknown: FmuVariable) -> list[int]:
         """Time, states and inputs on which a derivative, output or event indicator depends during a run."""
-        found = self._through_implicit(self._own(unknown))
-        return self._references(found, ("t", "x", "u"))
+        quantities = self._through_implicit(self._own(unknown))
+        return self._references(quantities, ("t", "x", "u"))
 
     def initial(self, unknown: FmuVariable) -> list[int]:
         """Time, parameters, inputs and start values on which an unknown depends in initialization mode."""
         kind, index = unknown.slot
-        found = self._initial_states[index] if kind == "state" else self._at_start(self._own(unknown))
-        return self._references(found, ("t", "p", "u", "start", "discrete"))
+        quantities = self._initial_states[index] if kind == "state" else self._at_start(self._own(unknown))
+        return self._references(quantities, ("t", "p", "u", "start", "discrete"))
 
     @cached_property
     def _reaches(self) -> dict[str, Reach]:
@@ -84,15 +84,15 @@ class Dependencies(Following):
 
     def _at_start(self, row: Iterable[Known]) -> set[Known]:
         """Replace states, implicit unknowns and modes by their dependencies at the start."""
-        found: set[Known] = set()
+        result: set[Known] = set()
         for name, k in self._through_implicit(set(row)):
             if name == "x":
-                found |= self._initial_states[k]
+                result |= self._initial_states[k]
             elif name == "d":
-                found |= self._initial_modes[k]
+                result |= self._initial_modes[k]
             else:
-                found.add((name, k))
-        return found
+                result.add((name, k))
+        return result
 
     @cached_property
     def _initial_modes(self) -> Rows:
@@ -105,8 +105,8 @@ class Dependencies(Following):
             entries = self.model.ideal.entries
             rows[entries] = [self._everything] * (entries.stop - entries.start)
         starts = sparsity_rows(self.model.discrete_starts)
-        for k, one in enumerate(self.model.flat_discretes):
-            rows[k] = {("discrete", k)} if not one.names else {d for d in starts[k] if d[0] in "tpu"}
+        for k, discrete in enumerate(self.model.flat_discretes):
+            rows[k] = {("discrete", k)} if not discrete.names else {d for d in starts[k] if d[0] in "tpu"}
         conditions = sparsity_rows(self.model.start_conditions)
         for row, (mode, _, _) in zip(conditions, self.model.start_modes, strict=True):
             for name, k in self._through_implicit(row):
@@ -116,7 +116,7 @@ class Dependencies(Following):
 
     def _start_value(self, position: int) -> set[Known]:
         """A start value: set by an importer, or its formula."""
-        return {("start", position)} | {one for one in self._row("start_values", position) if one[0] in "tpu"}
+        return {("start", position)} | {q for q in self._row("start_values", position) if q[0] in "tpu"}
 
     @cached_property
     def _initial_states(self) -> Rows:
@@ -143,16 +143,16 @@ class Dependencies(Following):
         # Undetermined reactions keep their guesses.
         guessed = {nx + ny + z: self._start_value(position) for z, position, _ in tables.z_guesses}
         every = sparsity_rows(tables.system, output=2) if tables.columns else []
-        own: list[set[int]] = []
+        causes_of: list[set[int]] = []
         outer: Rows = []
         for row in tables.wanted:
             columns = {offsets[name] + k for name, k in every[row] if name in offsets}
-            own.append({place[column] for column in columns if column in place})
-            known = {one for one in every[row] if one[0] in "tpu"}
+            causes_of.append({place[column] for column in columns if column in place})
+            causes = {quantity for quantity in every[row] if quantity[0] in "tpu"}
             outside = columns.difference(place)
-            known = known.union(*(direct[k] if k < nx else guessed.get(k, set()) for k in outside))
-            outer.append(known | (self._start_value(given[row]) if row in given else set()))
-        return solved_rows(own, outer, len(tables.columns))
+            causes = causes.union(*(direct[k] if k < nx else guessed.get(k, set()) for k in outside))
+            outer.append(causes | (self._start_value(given[row]) if row in given else set()))
+        return solved_rows(causes_of, outer, len(tables.columns))
 
     @cached_property
     def _everything(self) -> set[Known]:
@@ -165,16 +165,18 @@ class Dependencies(Following):
     @cached_property
     def _reference(self) -> dict[Known, int]:
         names = {"time": "t", "state": "x", "parameter": "p", "input": "u"}
-        found = {(names[v.slot[0]], v.slot[1]): v.reference for v in self.interface.variables if v.slot[0] in names}
-        for one in self.interface.variables:
-            if one.start_entry is not None and one.initial == "exact":
-                found["start", one.start_entry] = one.reference
-            if one.slot[0] == "discrete" and one.initial == "exact":
-                found["discrete", one.slot[1]] = one.reference
-        return found
+        references = {
+            (names[v.slot[0]], v.slot[1]): v.reference for v in self.interface.variables if v.slot[0] in names
+        }
+        for variable in self.interface.variables:
+            if variable.start_entry is not None and variable.initial == "exact":
+                references["start", variable.start_entry] = variable.reference
+            if variable.slot[0] == "discrete" and variable.initial == "exact":
+                references["discrete", variable.slot[1]] = variable.reference
+        return references
 
-    def _references(self, found: Iterable[Known], names: Sequence[str]) -> list[int]:
-        return sorted(self._reference[one] for one in found if one[0] in names and one in self._reference)
+    def _references(self, quantities: Iterable[Known], names: Sequence[str]) -> list[int]:
+        return sorted(self._reference[q] for q in quantities if q[0] in names and q in self._reference)
 
 
 def sparsity_rows(function: Any, output: int = 0) -> Rows:
@@ -196,13 +198,13 @@ def solved_rows(own: Sequence[set[int]], outer: Rows, unknowns: int) -> Rows:
     places = [(row, column) for row, columns in enumerate(own) for column in columns]
     pattern = ca.Sparsity.triplet(len(own), unknowns, [row for row, _ in places], [column for _, column in places])
     _, row_order, column_order, row_blocks, column_blocks, *_ = pattern.btf()
-    found: Rows = [set() for _ in range(unknowns)]
+    result: Rows = [set() for _ in range(unknowns)]
     # The form is lower block triangular: a block needs those before it.
     for block in range(len(row_blocks) - 1):
         rows = row_order[row_blocks[block] : row_blocks[block + 1]]
         columns = set(column_order[column_blocks[block] : column_blocks[block + 1]])
         total: set[Known] = set().union(*(outer[row] for row in rows))
-        total = total.union(*(found[column] for row in rows for column in own[row] - columns))
+        total = total.union(*(result[column] for row in rows for column in own[row] - columns))
         for column in columns:
-            found[column] = total
-    return found
+            result[column] = total
+    return result

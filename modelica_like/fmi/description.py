@@ -91,17 +91,17 @@ class _Writer:
         self.second = about.version == "2.0"
         self.dependencies = Dependencies(model, face)
         # FMI 3.0 has arrays in place of their numbers.
-        self.arrays = {} if self.second else {k: one for one in face.arrays for k in one.elements}
-        names = dict.fromkeys(one.modes for one in face.variables if one.modes)
-        self.types = {one: f"Mode_{k}_{'_'.join(one)}"[:120] for k, one in enumerate(names, 1)}
+        self.arrays = {} if self.second else {k: array for array in face.arrays for k in array.elements}
+        names = dict.fromkeys(variable.modes for variable in face.variables if variable.modes)
+        self.types = {name: f"Mode_{k}_{'_'.join(name)}"[:120] for k, name in enumerate(names, 1)}
 
     def write(self) -> Element:
         """Write all parts in the order of the schema."""
         about, face = self.about, self.face
-        own = {"guid": about.token, "numberOfEventIndicators": len(face.indicators)}
+        token = {"guid": about.token, "numberOfEventIndicators": len(face.indicators)}
         top = Element("fmiModelDescription", {
             "fmiVersion": about.version, "modelName": self.model.name,
-            **(own if self.second else {"instantiationToken": about.token}), "description": about.description or None,
+            **(token if self.second else {"instantiationToken": about.token}), "description": about.description or None,
             "generationTool": about.tool, "variableNamingConvention": "structured",
         })  # fmt: skip
         (self._kinds2 if self.second else self._kinds3)(top)
@@ -115,9 +115,9 @@ class _Writer:
             stepSize=about.step_size,
         )  # fmt: skip
         listed, write = element(top, "ModelVariables"), self._variable2 if self.second else self._variable3
-        for one in (*face.variables, *dict.fromkeys(self.arrays.values())):
-            if one.reference not in self.arrays:
-                write(listed, one)
+        for variable in (*face.variables, *dict.fromkeys(self.arrays.values())):
+            if variable.reference not in self.arrays:
+                write(listed, variable)
         self._structure(element(top, "ModelStructure"))
         return top
 
@@ -126,11 +126,11 @@ class _Writer:
             "modelIdentifier": identifier(self.model.name), "canGetAndSetFMUstate": True, "canSerializeFMUstate": True,
             "providesDirectionalDerivative": True,
         }  # fmt: skip
-        own = {
+        attributes = {
             "canHandleVariableCommunicationStepSize": not self.about.fixed_step, "canInterpolateInputs": True,
             "maxOutputDerivativeOrder": 3,
         }  # fmt: skip
-        for kind, tag, more in (("me", "ModelExchange", {}), ("cs", "CoSimulation", own)):
+        for kind, tag, more in (("me", "ModelExchange", {}), ("cs", "CoSimulation", attributes)):
             if kind in self.about.kinds:
                 files = element(element(top, tag, **common, **more), "SourceFiles")
                 for name in self.about.sources:
@@ -154,7 +154,7 @@ class _Writer:
 
     def _units(self, top: Element) -> None:
         """Define every unit, with its base units, and how people read it."""
-        used = {name: one.unit for one in self.face.variables if (name := unit_name(one.unit)) is not None}
+        used = {name: v.unit for v in self.face.variables if (name := unit_name(v.unit)) is not None}
         definitions = element(top, "UnitDefinitions") if used else top
         for name, unit in sorted(used.items()):
             defined = element(definitions, "Unit", name=name)
@@ -176,45 +176,47 @@ class _Writer:
             for value, name in enumerate(names):
                 element(kind, "Item", name=name, value=value)
 
-    def _attributes(self, one: FmuVariable) -> dict[str, Any]:
+    def _attributes(self, variable: FmuVariable) -> dict[str, Any]:
         """Attributes that mean the same in both versions; whole numbers have no unit."""
-        limits = {"min": one.min, "max": one.max}
-        if one.type != "Float64":
+        limits = {"min": variable.min, "max": variable.max}
+        if variable.type != "Float64":
             return {
-                key: None if value is None else int(value) for key, value in (*limits.items(), ("start", one.start))
+                key: None if value is None else int(value)
+                for key, value in (*limits.items(), ("start", variable.start))
             }
-        name = unit_name(one.unit)
-        start = [self.face.variables[k].start for k in one.elements] if one.elements else one.start
+        name = unit_name(variable.unit)
+        start = [self.face.variables[k].start for k in variable.elements] if variable.elements else variable.start
         shown = DISPLAY_UNITS[name][0] if name in _SUGGESTED else None
-        return {"unit": name, "displayUnit": shown, **limits, "nominal": one.nominal, "start": start}
+        return {"unit": name, "displayUnit": shown, **limits, "nominal": variable.nominal, "start": start}
 
-    def _variable2(self, listed: Element, one: FmuVariable) -> None:
+    def _variable2(self, listed: Element, variable: FmuVariable) -> None:
         scalar = element(
-            listed, "ScalarVariable", name=one.name, valueReference=one.reference,
-            description=one.description or None, causality=one.causality, variability=one.variability,
-            initial=one.initial,
+            listed, "ScalarVariable", name=variable.name, valueReference=variable.reference,
+            description=variable.description or None, causality=variable.causality, variability=variable.variability,
+            initial=variable.initial,
         )  # fmt: skip
-        derivative = None if one.derivative_of is None else one.derivative_of + 1
-        kind = "Real" if one.type == "Float64" else "Enumeration" if one.modes else "Integer"
-        first = {"declaredType": self.types.get(one.modes)}
-        element(scalar, kind, **first, **self._attributes(one), derivative=derivative)
+        derivative = None if variable.derivative_of is None else variable.derivative_of + 1
+        kind = "Real" if variable.type == "Float64" else "Enumeration" if variable.modes else "Integer"
+        first = {"declaredType": self.types.get(variable.modes)}
+        element(scalar, kind, **first, **self._attributes(variable), derivative=derivative)
 
-    def _variable3(self, listed: Element, one: FmuVariable) -> None:
+    def _variable3(self, listed: Element, variable: FmuVariable) -> None:
         written = element(
-            listed, one.type, name=one.name, valueReference=one.reference, description=one.description or None,
-            causality=one.causality, variability=one.variability, initial=one.initial,
-            declaredType=self.types.get(one.modes), **self._attributes(one), derivative=one.derivative_of,
+            listed, variable.type, name=variable.name, valueReference=variable.reference,
+            description=variable.description or None, causality=variable.causality, variability=variable.variability,
+            initial=variable.initial, declaredType=self.types.get(variable.modes), **self._attributes(variable),
+            derivative=variable.derivative_of,
         )  # fmt: skip
-        for size in one.dimensions:
+        for size in variable.dimensions:
             element(written, "Dimension", start=size)
 
     def _structure(self, structure: Element) -> None:
         face = self.face
-        own = {*face.states, *face.derivatives, *face.outputs}
+        listed = {*face.states, *face.derivatives, *face.outputs}
         initial = (
-            one.reference
-            for one in face.variables
-            if (one.reference in own and one.initial != "exact") or one.causality == "calculatedParameter"
+            v.reference
+            for v in face.variables
+            if (v.reference in listed and v.initial != "exact") or v.causality == "calculatedParameter"
         )
         groups = (
             ("Output", "Outputs", face.outputs), ("ContinuousStateDerivative", "Derivatives", face.derivatives),
@@ -224,19 +226,25 @@ class _Writer:
             if self.second and not (group and references):
                 continue
             parent = element(structure, group) if self.second else structure
-            for one in (face.variables[k] for k in references):
-                known = self._known(one, tag == "InitialUnknown")
-                place = {"index": one.reference + 1} if self.second else {"valueReference": one.reference}
-                kinds = None if known is None else ["dependent"] * len(known)
-                element(parent, "Unknown" if self.second else tag, **place, dependencies=known, dependenciesKind=kinds)
+            for variable in (face.variables[k] for k in references):
+                dependencies = self._known(variable, tag == "InitialUnknown")
+                place = {"index": variable.reference + 1} if self.second else {"valueReference": variable.reference}
+                kinds = None if dependencies is None else ["dependent"] * len(dependencies)
+                element(
+                    parent,
+                    "Unknown" if self.second else tag,
+                    **place,
+                    dependencies=dependencies,
+                    dependenciesKind=kinds,
+                )
 
-    def _known(self, one: FmuVariable, initial: bool) -> list[int] | None:
+    def _known(self, variable: FmuVariable, initial: bool) -> list[int] | None:
         """On what an unknown depends; None for all, where a list would be longer than useful."""
-        if one.slot[0] == "discrete" and not initial:
+        if variable.slot[0] == "discrete" and not initial:
             return None  # in event mode a mode depends on more than states and inputs
-        found = self.dependencies.initial(one) if initial else self.dependencies.continuous(one)
-        if len(found) > _MOST_DEPENDENCIES:
+        references = self.dependencies.initial(variable) if initial else self.dependencies.continuous(variable)
+        if len(references) > _MOST_DEPENDENCIES:
             return None
         if self.second:
-            return [k + 1 for k in found]
-        return list(dict.fromkeys(self.arrays[k].reference if k in self.arrays else k for k in found))
+            return [k + 1 for k in references]
+        return list(dict.fromkeys(self.arrays[k].reference if k in self.arrays else k for k in references))

@@ -48,11 +48,11 @@ def index_page(interface: Interface, description: str, tool: str, equations: Lis
         f"{escape(tool)} from an acausal model; the C sources are in <code>sources/</code>.</p>",
     ]  # fmt: skip
     for heading, causalities in _GROUPS:
-        found = [one for one in interface.variables if one.causality in causalities and one.slot[0] != "guard"]
-        if found:
-            parts += [f"<h2>{heading}</h2>", _table(found)]
+        variables = [v for v in interface.variables if v.causality in causalities and v.slot[0] != "guard"]
+        if variables:
+            parts += [f"<h2>{heading}</h2>", _table(variables)]
     if equations:
-        parts += ["<h2>Equations</h2>", *(_component(*one) for one in equations)]
+        parts += ["<h2>Equations</h2>", *(_component(*equation) for equation in equations)]
     return "\n".join([*(part for part in parts if part), "</body>", "</html>", ""])
 
 
@@ -61,11 +61,11 @@ def _table(variables: Sequence[FmuVariable]) -> str:
     return "\n".join(["<table>", head, *map(_row, variables), "</table>"])
 
 
-def _row(one: FmuVariable) -> str:
-    unit = unit_name(one.unit) or ""
-    start = "" if one.start is None else f"{one.start:.9g}"
+def _row(variable: FmuVariable) -> str:
+    unit = unit_name(variable.unit) or ""
+    start = "" if variable.start is None else f"{variable.start:.9g}"
     shown = ", ".join(DISPLAY_UNITS.get(unit, ()))
-    cells = (f"<code>{escape(one.name)}</code>", _known(unit), _known(shown), _known(one.description))
+    cells = (f"<code>{escape(variable.name)}</code>", _known(unit), _known(shown), _known(variable.description))
     name, *rest = (f"<td>{cell}</td>" for cell in cells)
     return f'<tr>{name}<td class="number">{start}</td>{"".join(rest)}</tr>'
 

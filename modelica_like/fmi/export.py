@@ -17,7 +17,6 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.sliding import as_asked
 from modelica_like.errors import ExportError, UnknownName
 from modelica_like.flatten import flatten
-from modelica_like.flatten.model import FlatModel
 from modelica_like.fmi.build import PLATFORMS, build, chosen_platforms, native_platform
 from modelica_like.fmi.check import Check, communication_step, compare_with_idas, problems
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
@@ -100,8 +99,7 @@ def export_fmu(
         modes: `output` (enumerations), `local` (enumerations without output), or `integer` (outputs).
         fixed_step: step size of Co-Simulation in s, or such as "1 ms", for hardware in the loop: the work of a step is
             bounded, and a communication step is a whole number of them. By default accuracy chooses the steps.
-        tables: patterns of tables whose numbers become tunable parameters, such as `clutch.mu_pos`: arrays in FMI 3,
-            scalars `clutch.mu_pos[2,1]` in FMI 2.
+        tables: patterns of tables with tunable numbers, such as `*.mu_pos`: arrays in FMI 3, scalars in FMI 2.
         check: run the FMU, if it has a binary for this machine, against IDAS; a picture shows where they differ.
         strict: do not write an FMU that differs from IDAS.
         report: called with the present activity.
@@ -135,32 +133,32 @@ def silent(_: str) -> None:
 # -- what is asked for -------------------------------------------------------------------------------------------------
 
 
-def _modes(asked: str) -> ModesAs:
-    for one in get_args(ModesAs):
-        if asked == one:
-            return one
-    raise UnknownName(f"Modes cannot be exported as '{asked}'.", advice=f"There are {', '.join(get_args(ModesAs))}.")
+def _modes(modes: str) -> ModesAs:
+    for word in get_args(ModesAs):
+        if modes == word:
+            return word
+    raise UnknownName(f"Modes cannot be exported as '{modes}'.", advice=f"There are {', '.join(get_args(ModesAs))}.")
 
 
 def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
-    asked = {kind} if isinstance(kind, str) else set(kind)
-    for one in sorted(asked - set(get_args(Kind))):
+    kinds = {kind} if isinstance(kind, str) else set(kind)
+    for unknown in sorted(kinds - set(get_args(Kind))):
         raise UnknownName(
-            f"There is no kind of FMU '{one}'.", advice="There are me (Model Exchange) and cs (Co-Simulation)."
+            f"There is no kind of FMU '{unknown}'.", advice="There are me (Model Exchange) and cs (Co-Simulation)."
         )
-    if not asked:
+    if not kinds:
         raise ExportError("An FMU needs a kind.", advice="Ask for me (Model Exchange), cs (Co-Simulation) or both.")
-    return tuple(one for one in get_args(Kind) if one in asked)
+    return tuple(word for word in get_args(Kind) if word in kinds)
 
 
-def _fixed_step(asked: float | str | None, kinds: tuple[Kind, ...]) -> float:
-    step = positive_step(asked)
-    if step and "cs" not in kinds:
+def _fixed_step(step: float | str | None, kinds: tuple[Kind, ...]) -> float:
+    size = positive_step(step)
+    if size and "cs" not in kinds:
         raise ExportError(
             "A fixed step is for Co-Simulation, but only Model Exchange is exported.",
             why="In Model Exchange the importer chooses the steps.", advice="Also export cs.",
         )  # fmt: skip
-    return step
+    return size
 
 
 # -- the model ---------------------------------------------------------------------------------------------------------
@@ -179,7 +177,9 @@ def compiled_open(
     if tables:
         drive = with_tunable_tables(drive, tables)
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
-    return as_asked(compile(reduce(flat))), str(getattr(drive, "_description", "") or ""), _equations(flat)
+    lines = ((i, [source.text or str(source) for source in i.template.sources]) for i in flat.instances)
+    equations = [(instance.path, instance.template.component, texts) for instance, texts in lines if texts]
+    return as_asked(compile(reduce(flat))), str(getattr(drive, "_description", "") or ""), equations
 
 
 def _loaded(drive: Model) -> CompiledDae | Component:
@@ -197,11 +197,6 @@ def _pictures(drive: CompiledDae | Component) -> tuple[bytes, bytes]:
         return general[0], general[1]
     svg, png = upper.icon(drive if drive.parts else with_open_ends(drive))
     return svg.encode(), png or general[1]
-
-
-def _equations(flat: FlatModel) -> Listing:
-    told = ((one, [source.text or str(source) for source in one.template.sources]) for one in flat.instances)
-    return [(one.path, one.template.component, lines) for one, lines in told if lines]
 
 
 def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], description: str, fixed_step: float) -> About:
@@ -240,13 +235,20 @@ def _contents(
     if about.version == "3.0":
         texts["sources/buildDescription.xml"] = build_description(model.name, about.sources)
         texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model.terminals, icon[1])
-        kinds = dict.fromkeys(icon_name(one.kind) for one in model.terminals)
+        kinds = dict.fromkeys(icon_name(terminal.kind) for terminal in model.terminals)
         shown = [_PICTURES / f"{kind}.{suffix}" for kind in kinds for suffix in ("png", "svg")]
         pictures = {f"terminalsAndIcons/{picture.name}": picture.read_bytes() for picture in shown}
-        pictures |= {f"terminalsAndIcons/icon.{ending}": one for ending, one in zip(("svg", "png"), icon, strict=True)}
+        pictures |= {
+            f"terminalsAndIcons/icon.{ending}": drawn for ending, drawn in zip(("svg", "png"), icon, strict=True)
+        }
     seen = variables.variables + (variables.arrays if about.version == "3.0" else ())
     data = model_file(make_tables(model, variables.start), seen, _TOKEN, about.tolerance, about.fixed_step)
-    token = _token(texts, data)
+    # A GUID that is a hash of the content.
+    total = hashlib.sha256(data)
+    for key in sorted(texts):
+        total.update(f"{key}\0{texts[key]}\0".encode())
+    digest = total.hexdigest()
+    token = f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
     data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}
     texts["sources/model_data.c"] = as_c(data)
@@ -255,31 +257,22 @@ def _contents(
     return files if embed else files | {MODEL: data}
 
 
-def _token(texts: dict[str, str], data: bytes) -> str:
-    """A GUID that is a hash of the content."""
-    total = hashlib.sha256(data)
-    for name in sorted(texts):
-        total.update(f"{name}\0{texts[name]}\0".encode())
-    digest = total.hexdigest()
-    return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
-
-
 def _binaries(
     files: dict[str, bytes], name: str, version: Version, platforms: tuple[str, ...], embed: bool, tell: Report
 ) -> dict[str, bytes]:
     """Return the run-time for each platform, or one with the model compiled in, by path in the FMU."""
     home = "sources/"
     sources = {place.removeprefix(home): text.decode() for place, text in files.items() if place.startswith(home)}
-    own = {file: text for file, text in sources.items() if file.endswith((".c", ".h"))}
-    found: dict[str, bytes] = {}
+    c_sources = {file: text for file, text in sources.items() if file.endswith((".c", ".h"))}
+    binaries: dict[str, bytes] = {}
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
-        for one in platforms:
+        for platform in platforms:
             if embed:
-                tell(f"compiling for {one}")
-            library = build(own, one, Path(folder)) if embed else runtime_library(one, tell)
-            place = PLATFORMS[one].fmi2 if version == "2.0" else one
-            found[f"binaries/{place}/{name}{library.suffix}"] = library.read_bytes()
-    return found
+                tell(f"compiling for {platform}")
+            library = build(c_sources, platform, Path(folder)) if embed else runtime_library(platform, tell)
+            place = PLATFORMS[platform].fmi2 if version == "2.0" else platform
+            binaries[f"binaries/{place}/{name}{library.suffix}"] = library.read_bytes()
+    return binaries
 
 
 def _written(
@@ -288,10 +281,10 @@ def _written(
     """Write an FMU that passes its checks, after a comparison with IDAS; draw curves that differ next to it."""
     with replacing(target) as draft:
         write_archive(draft, files)
-        found = problems(draft)
-        if found:
+        faults = problems(draft)
+        if faults:
             raise ExportError(
-                f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is an error of the exporter."
+                f"The FMU does not pass its checks: {'; '.join(faults[:3])}.", why="This is an error of the exporter."
             )
         kind = "cs" if "cs" in about.kinds else "me"
         check = compare_with_idas(draft, model, kind, about.fixed_step) if run else Check()

@@ -42,17 +42,17 @@ def tell_error(folder: Path, units: Mapping[str, str], failures: Failures = FAIL
     if not (folder / "error.json").exists():
         return
     error: dict[str, Any] = json.loads((folder / "error.json").read_text())
-    known = error.get("known", [])
+    names = error.get("known", [])
     causality = error.get("causality") or "local"
-    told = error | words | {
+    details = error | words | {
         "unit": units.get(error.get("unit", ""), ""),
-        "hint": did_you_mean(error["name"], known) or "." if known else ".",
-        "has": f"It has {', '.join(known)}." if known else "It has none.",
+        "hint": did_you_mean(error["name"], names) or "." if names else ".",
+        "has": f"It has {', '.join(names)}." if names else "It has none.",
         "causality": f"{'an' if causality[0] in 'aeiou' else 'a'} {causality}",
         "text": printable(error.get("text", "")).strip().rstrip("."),
         "shorter": words.get("shorter", "") if "DoStep" in error.get("text", "") else "",  # advice for steps only
         "said": "\n".join(f"It reported: {printable(text)}" for text in error.get("messages", ())[-3:]),
     }  # fmt: skip
     kind, *sentences = failures[error["kind"]]
-    what, why, advice = (sentence.format(**told) for sentence in sentences)
+    what, why, advice = (sentence.format(**details) for sentence in sentences)
     raise kind(what, why=why, advice=advice)

@@ -47,7 +47,12 @@ class Job:
 
     def __init__(self, folder: Path) -> None:
         threading.Thread(target=_end_with_parent, daemon=True).start()
-        _limit_memory()
+        # What is allocated, not addresses: run-times of other languages reserve hundreds of gigabytes of those.
+        if sys.platform == "linux":
+            import resource
+
+            most = int(os.environ.get(MEMORY) or _MEMORY)
+            resource.setrlimit(resource.RLIMIT_DATA, (most * 10**6, resource.RLIM_INFINITY))
         self.folder = folder
         self.messages: dict[str, list[str]] = {}
         self.unit = ""
@@ -88,19 +93,6 @@ def _end_with_parent() -> None:
     while os.read(0, 1):  # unbuffered: the lock of a buffer would abort the process at its end
         pass
     os._exit(1)
-
-
-def most_memory() -> int | None:
-    """Return the most memory that the process may take, in MB; None where the system cannot limit it."""
-    return int(os.environ.get(MEMORY) or _MEMORY) if sys.platform == "linux" else None
-
-
-def _limit_memory() -> None:
-    """Limit what is allocated, not addresses: run-times of other languages reserve hundreds of gigabytes of those."""
-    if (most := most_memory()) is not None:
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_DATA, (most * 10**6, resource.RLIM_INFINITY))
 
 
 def savings(fmu: Any, version: str) -> tuple[Any, Any, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -13,7 +13,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName, did_you_mean
-from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
+from modelica_like.flatten.model import FlatParameter, FlatVariable
 from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.language.units import ONE, Unit, parse_unit
@@ -91,12 +91,12 @@ class Interface:
     @cached_property
     def by_name(self) -> dict[str, FmuVariable]:
         """Variables by their names."""
-        return {one.name: one for one in self.variables}
+        return {variable.name: variable for variable in self.variables}
 
     def __str__(self) -> str:
         counts: dict[str, int] = {}
-        for one in self.variables:
-            counts[one.causality] = counts.get(one.causality, 0) + 1
+        for variable in self.variables:
+            counts[variable.causality] = counts.get(variable.causality, 0) + 1
         parts = ", ".join(f"{count} {causality}" for causality, count in counts.items())
         return f"Interface {self.name}: {len(self.states)} states; {parts}"
 
@@ -122,19 +122,13 @@ def interface(model: CompiledDae, outputs: Sequence[str] = (), modes: ModesAs = 
     build.discretes(modes)
     build.guards()
     states = range(len(model.states))
-    chosen = tuple(one.reference for one in build.found if one.causality == "output")
+    chosen = tuple(variable.reference for variable in build.found if variable.causality == "output")
     return Interface(
         model.name, tuple(build.found), tuple(build.states[k] for k in states),
         tuple(build.derivatives[k] for k in states), chosen,
         tuple(build.indicators[k] for k in sorted(build.indicators)), build.starts.tables, build.reach,
         tuple(build.arrays()),
     )  # fmt: skip
-
-
-def _times_of_delays(model: CompiledDae) -> set[int]:
-    """Numbers of the parameters on which times of delays depend: these do not change during a run."""
-    pattern = model.delays.jac_sparsity(0, model.delays.name_in().index("p"))
-    return {number for row, number in zip(*pattern.get_triplet(), strict=True) if row % 2}
 
 
 class _Builder:
@@ -144,10 +138,22 @@ class _Builder:
         self.states: dict[int, int] = {}
         self.derivatives: dict[int, int] = {}
         self.indicators: dict[int, int] = {}
-        self.wanted = _matcher(model, outputs)
+        paths, chosen = [variable.path for variable in model.flat_variables], set[str]()
+        for pattern in outputs:
+            matches = [path for path in paths if fnmatchcase(path, pattern.replace("[", "[[]"))]
+            if not matches:
+                hint = did_you_mean(pattern, paths) or "."
+                raise UnknownName(f"{model.name} has no variable '{pattern}' that could be an output{hint}")
+            chosen.update(matches)
+        self.wanted = lambda variable: variable.kind == "output" or variable.path in chosen
         self.starts = _Starts(model)
         self.reach = Reach(model.variables)
-        self.depends = _dependence(self.reach, model.variables)
+        # Variables change with time, at events only, or with parameters only.
+        moving = self.reach.mask(*(name for name in model.variables.name_in() if name not in ("p", "d")))
+        switching = self.reach.mask("d")
+        self.depends = [
+            "continuous" if row & moving else "discrete" if row & switching else "tunable" for row in self.reach.rows
+        ]
         self.add("time", ("time", 0), "independent", initial=None, unit=_SECOND, description="time")
 
     def add(
@@ -161,12 +167,14 @@ class _Builder:
 
     def parameters(self) -> None:
         """Independent parameters, and those that follow from others."""
-        fixed = _times_of_delays(self.model)
-        for k, one in enumerate(self.model.flat_parameters):
-            variability, start = "tunable" if one.tunable and k not in fixed else "fixed", float(self.model.p[k])
-            self.add(one.path, ("parameter", k), "parameter", variability, None, start=start, **_about(one))
-        for k, one in enumerate(self.model.flat_derived):
-            self.add(one.path, ("derived", k), "calculatedParameter", "tunable", **_about(one))
+        # Parameters on which times of delays depend do not change during a run.
+        pattern = self.model.delays.jac_sparsity(0, self.model.delays.name_in().index("p"))
+        fixed = {number for row, number in zip(*pattern.get_triplet(), strict=True) if row % 2}
+        for k, parameter in enumerate(self.model.flat_parameters):
+            variability, start = "tunable" if parameter.tunable and k not in fixed else "fixed", float(self.model.p[k])
+            self.add(parameter.path, ("parameter", k), "parameter", variability, None, start=start, **_about(parameter))
+        for k, parameter in enumerate(self.model.flat_derived):
+            self.add(parameter.path, ("derived", k), "calculatedParameter", "tunable", **_about(parameter))
 
     def continuous(self) -> None:
         """Inputs, states, and all other variables."""
@@ -174,23 +182,23 @@ class _Builder:
         taken = {*model.parameter_position, *model.derived_position}
         inputs = {variable: k for k, variable in enumerate(model.inputs)}
         states = {name: k for k, name in enumerate(model.states)}
-        for k, one in enumerate(model.flat_variables):
-            if one.hidden:
+        for k, variable in enumerate(model.flat_variables):
+            if variable.hidden:
                 continue
-            about, causality = _about(one), "output" if self.wanted(one) else "local"
+            about, causality = _about(variable), "output" if self.wanted(variable) else "local"
             if k in inputs:
                 start = float(model.u[inputs[k]])
-                self.add(one.path, ("input", inputs[k]), "input", initial=None, start=start, **about)
-            elif one.path in states:
-                slot, start = ("state", states[one.path]), self.starts.of_variable(k)
-                self.states[slot[1]] = self.add(one.path, slot, causality, **start, **about)
-            elif one.path not in taken:  # an input with a value from a parameter is that parameter
+                self.add(variable.path, ("input", inputs[k]), "input", initial=None, start=start, **about)
+            elif variable.path in states:
+                slot, start = ("state", states[variable.path]), self.starts.of_variable(k)
+                self.states[slot[1]] = self.add(variable.path, slot, causality, **start, **about)
+            elif variable.path not in taken:  # an input with a value from a parameter is that parameter
                 start, variability = self.starts.of_variable(k), self.depends[k]
                 if start["initial"] != "calculated":
                     variability = "continuous"
                 elif causality == "output" and variability == "tunable":
                     variability = "discrete"  # an output cannot become local
-                self.add(one.path, ("variable", k), causality, variability, **start, **about)
+                self.add(variable.path, ("variable", k), causality, variability, **start, **about)
 
     def rates(self) -> None:
         """Derivatives of all states; states that are no variables, and derivatives without another name, come first."""
@@ -217,47 +225,49 @@ class _Builder:
     def discretes(self, modes: ModesAs) -> None:
         """Modes, and other discrete values, which are local; equations determine some at the start, too."""
         determined = {row.reset.index for row in self.model.update_rows if row.at_start}
-        for k, one in ((k, one) for k, one in enumerate(self.model.flat_discretes) if not one.hidden):
-            slot, about = ("discrete", k), {"unit": one.unit, "description": _mode_text(one)}
-            if one.names:
-                kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", one.names)
+        for k, discrete in ((k, d) for k, d in enumerate(self.model.flat_discretes) if not d.hidden):
+            values = ", ".join(f"{k}: {name}" for k, name in enumerate(discrete.names))
+            description = " – ".join(text for text in (discrete.description, values) if text)
+            slot, about = ("discrete", k), {"unit": discrete.unit, "description": description}
+            if discrete.names:
+                kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", discrete.names)
                 causality = "local" if modes == "local" else "output"
-                about |= {"min": 0, "max": len(one.names) - 1, "modes": names}
-                self.add(one.path, slot, causality, "discrete", kind=kind, **about)
+                about |= {"min": 0, "max": len(discrete.names) - 1, "modes": names}
+                self.add(discrete.path, slot, causality, "discrete", kind=kind, **about)
             elif k in determined:
-                self.add(one.path, slot, "local", "discrete", **about)
+                self.add(discrete.path, slot, "local", "discrete", **about)
             else:
-                self.add(one.path, slot, "local", "discrete", "exact", start=self.starts.discrete[k], **about)
+                self.add(discrete.path, slot, "local", "discrete", "exact", start=self.starts.discrete[k], **about)
 
     def guards(self) -> None:
         """One event indicator per state event, named by its mode."""
-        for one in self.model.transitions:
-            if one.timed or one.index in self.indicators:
+        for transition in self.model.transitions:
+            if transition.timed or transition.index in self.indicators:
                 continue
-            mode = self.model.flat_discretes[one.mode]
-            every = len(one.sources) == len(mode.names)
-            leaving = "any mode" if every else " or ".join(mode.names[k] for k in one.sources)
-            told = f"{mode.path}: {leaving} → {mode.names[one.target]} above zero"
-            name = f"event_indicator[{one.index + 1}]"
-            self.indicators[one.index] = self.add(name, ("guard", one.index), description=told)
+            mode = self.model.flat_discretes[transition.mode]
+            every = len(transition.sources) == len(mode.names)
+            leaving = "any mode" if every else " or ".join(mode.names[k] for k in transition.sources)
+            description = f"{mode.path}: {leaving} → {mode.names[transition.target]} above zero"
+            name = f"event_indicator[{transition.index + 1}]"
+            self.indicators[transition.index] = self.add(name, ("guard", transition.index), description=description)
 
     def arrays(self) -> Iterator[FmuVariable]:
         """Tables: parameters `clutch.mu_pos[2,1]` belong together."""
-        cells = (one for one in self.found if one.causality == "parameter" and one.name.endswith("]"))
-        for number, (name, group) in enumerate(groupby(cells, lambda one: one.name.rpartition("[")[0])):
+        cells = (v for v in self.found if v.causality == "parameter" and v.name.endswith("]"))
+        for number, (name, group) in enumerate(groupby(cells, lambda variable: variable.name.rpartition("[")[0])):
             numbers = tuple(group)
             dimensions = tuple(int(size) for size in numbers[-1].name[len(name) + 1 : -1].split(","))
-            units = {str(one.unit): one.unit for one in numbers}
+            units = {str(variable.unit): variable.unit for variable in numbers}
             yield FmuVariable(
                 name, len(self.found) + number, "Float64", "parameter", "tunable", None, numbers[0].slot,
                 next(iter(units.values())) if len(units) == 1 else ONE, _table_text(numbers, dimensions),
-                elements=tuple(one.reference for one in numbers), dimensions=dimensions,
+                elements=tuple(variable.reference for variable in numbers), dimensions=dimensions,
             )  # fmt: skip
 
 
 def _table_text(numbers: Sequence[FmuVariable], dimensions: tuple[int, ...]) -> str:
     columns = numbers[: dimensions[1]] if len(dimensions) > 1 else numbers[:1]
-    return "rows of " + ", ".join(one.description.partition(" in row 1 of ")[0] for one in columns)
+    return "rows of " + ", ".join(column.description.partition(" in row 1 of ")[0] for column in columns)
 
 
 def fmi_name(name: str) -> str:
@@ -266,34 +276,16 @@ def fmi_name(name: str) -> str:
     return name if depth < 2 else f"der({name[4 * depth : -depth]},{depth})"
 
 
-def _about(one: FlatVariable | FlatParameter) -> dict[str, Any]:
-    about: dict[str, Any] = {"unit": one.unit, "description": one.description, "min": one.min, "max": one.max}
-    if isinstance(one, FlatVariable) and one.nominal != 1.0:
-        about["nominal"] = abs(one.nominal)
+def _about(quantity: FlatVariable | FlatParameter) -> dict[str, Any]:
+    about: dict[str, Any] = {
+        "unit": quantity.unit,
+        "description": quantity.description,
+        "min": quantity.min,
+        "max": quantity.max,
+    }
+    if isinstance(quantity, FlatVariable) and quantity.nominal != 1.0:
+        about["nominal"] = abs(quantity.nominal)
     return about
-
-
-def _mode_text(one: FlatDiscrete) -> str:
-    names = ", ".join(f"{k}: {name}" for k, name in enumerate(one.names))
-    return " – ".join(text for text in (one.description, names) if text)
-
-
-def _matcher(model: CompiledDae, patterns: Sequence[str]) -> Callable[[FlatVariable], bool]:
-    paths, chosen = [one.path for one in model.flat_variables], set[str]()
-    for pattern in patterns:
-        found = [path for path in paths if fnmatchcase(path, pattern.replace("[", "[[]"))]
-        if not found:
-            hint = did_you_mean(pattern, paths) or "."
-            raise UnknownName(f"{model.name} has no variable '{pattern}' that could be an output{hint}")
-        chosen.update(found)
-    return lambda one: one.kind == "output" or one.path in chosen
-
-
-def _dependence(reach: Reach, variables: Any) -> list[Variability]:
-    """How each variable changes: with time, at events only, or with parameters only."""
-    moving = reach.mask(*(name for name in variables.name_in() if name not in ("p", "d")))
-    switching = reach.mask("d")
-    return ["continuous" if row & moving else "discrete" if row & switching else "tunable" for row in reach.rows]
 
 
 class _Starts:

@@ -203,15 +203,15 @@ def _contents(
         ],
         "constants": tables.slots.constants,
         "parameters": model.p,
-        "parameter_min": [-math.inf if one.min is None else one.min for one in model.flat_parameters],
-        "parameter_max": [math.inf if one.max is None else one.max for one in model.flat_parameters],
+        "parameter_min": [-math.inf if parameter.min is None else parameter.min for parameter in model.flat_parameters],
+        "parameter_max": [math.inf if parameter.max is None else parameter.max for parameter in model.flat_parameters],
         "inputs": model.u,
         "guesses": tables.start.guesses,
         "nominals": model.nominals,
         "state_names": [text(name) for name in model.states],
         "implicit_names": [text(name) for name in model.implicit],
         "singular_names": [text(", ".join(names[:6])) for names, _ in model.singular],
-        "variables": [_variable(one, text) for one in sorted(variables, key=lambda one: one.reference)],
+        "variables": [_variable(variable, text) for variable in sorted(variables, key=lambda v: v.reference)],
         "rising": [(*pair, *(text(model.flat_parameters[k].path) for k in pair)) for pair in model.rising],
         "delays": [
             (text(model.flat_discretes[first].path.removesuffix("[0]")), first) for first, *_ in model.delay_parts
@@ -232,28 +232,30 @@ def _contents(
 def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
     transitions: list[tuple[int, ...]] = []
     resets: list[tuple[float, ...]] = []
-    for k, one in enumerate(model.transitions):
-        path = model.flat_discretes[one.mode].path
-        texts = (text(path), text(_notice(path, one.notice)))
-        sources = sum(1 << source for source in one.sources)
-        ends = 2 if one.ends else int(one.fails)
-        transitions.append((one.mode, one.target, int(one.timed), ends, one.index, *texts, sources))
-        resets += [(_place(model, r), r.value, k, -1, r.factor) for r in one.resets]
-    guards = {one.index: k for k, one in enumerate(model.transitions) if not one.timed}
-    names = [text(name) for one in model.flat_discretes for name in one.names]
+    for k, transition in enumerate(model.transitions):
+        path = model.flat_discretes[transition.mode].path
+        texts = (text(path), text(_notice(path, transition.notice)))
+        sources = sum(1 << source for source in transition.sources)
+        ends = 2 if transition.ends else int(transition.fails)
+        transitions.append(
+            (transition.mode, transition.target, int(transition.timed), ends, transition.index, *texts, sources)
+        )
+        resets += [(_place(model, r), r.value, k, -1, r.factor) for r in transition.resets]
+    guards = {t.index: k for k, t in enumerate(model.transitions) if not t.timed}
+    names = [text(name) for discrete in model.flat_discretes for name in discrete.names]
     return {
         "transitions": transitions,
         "guard_transition": [guards[k] for k in range(len(guards))],
         "resets": resets,
         "reset_nodes": model.reset_nodes,
         "updates": [
-            (_place(model, r), k, 0, r.index if one.at_start else -1, r.factor)
-            for k, (one, r) in enumerate((one, one.reset) for one in model.update_rows)
+            (_place(model, r), k, 0, r.index if e.at_start else -1, r.factor)
+            for k, (e, r) in enumerate((row, row.reset) for row in model.update_rows)
         ],
         "modes": [
-            (*place, int(one.hidden))
-            for place, one in zip(
-                _counted(len(one.names) for one in model.flat_discretes), model.flat_discretes, strict=True
+            (*place, int(discrete.hidden))
+            for place, discrete in zip(
+                _counted(len(d.names) for d in model.flat_discretes), model.flat_discretes, strict=True
             )
         ],
         "mode_names": names,
@@ -271,32 +273,39 @@ def _place(model: CompiledDae, reset: Reset) -> int:
 
 def _counted(counts: Iterable[int]) -> list[tuple[int, int]]:
     """Pairs of first entry and count."""
-    found: list[tuple[int, int]] = []
+    result: list[tuple[int, int]] = []
     for count in counts:
-        found.append((sum(found[-1]) if found else 0, count))
-    return found
+        result.append((sum(result[-1]) if result else 0, count))
+    return result
 
 
 def _holds(model: CompiledDae, text: _Text) -> dict[str, Any]:
     holds: list[tuple[float, ...]] = []
     moved = _moved_from_outside(model)
-    for one in model.holds:
-        state, factor = one.state or (-1, 1.0)
-        name = text(model.flat_discretes[one.mode].path)
-        about = (one.reaction, one.approach, int(one.motion in moved), name, 0)
-        nominal = abs(model.flat_variables[one.motion].nominal)
-        holds.append((one.mode, one.number, one.loose, one.motion, state, *about, factor, nominal))
-    first = _counted(len(one.members) for one in model.circuits)
-    units = {str(one.unit): k for k, one in enumerate(model.flat_variables)}
+    for hold in model.holds:
+        state, factor = hold.state or (-1, 1.0)
+        name = text(model.flat_discretes[hold.mode].path)
+        about = (hold.reaction, hold.approach, int(hold.motion in moved), name, 0)
+        nominal = abs(model.flat_variables[hold.motion].nominal)
+        holds.append((hold.mode, hold.number, hold.loose, hold.motion, state, *about, factor, nominal))
+    first = _counted(len(circuit.members) for circuit in model.circuits)
+    units = {str(variable.unit): k for k, variable in enumerate(model.flat_variables)}
     return {
         "holds": holds,
-        "circuits": [(*place, one.first) for place, one in zip(first, model.circuits, strict=True)],
+        "circuits": [(*place, circuit.first) for place, circuit in zip(first, model.circuits, strict=True)],
         "members": [k for circuit in model.circuits for k in circuit.members],
         "ideals": [
-            (one.row, one.mode, *one.zeros, text(one.component), 0, abs(model.flat_variables[one.zeros[0]].nominal))
-            for one in (model.ideal.elements if model.ideal else ())
+            (
+                element.row,
+                element.mode,
+                *element.zeros,
+                text(element.component),
+                0,
+                abs(model.flat_variables[element.zeros[0]].nominal),
+            )
+            for element in (model.ideal.elements if model.ideal else ())
         ],
-        "units": [units[str(one.unit)] for one in model.flat_variables] if holds or model.ideal else [],
+        "units": [units[str(variable.unit)] for variable in model.flat_variables] if holds or model.ideal else [],
     }
 
 
@@ -310,8 +319,8 @@ def _moved_from_outside(model: CompiledDae) -> set[int]:
 
 def _notice(path: str, notice: str) -> str:
     """Put the component's name before a notice, and names of parameters in place of their values."""
-    told = re.sub(r"\{(.*?)\}", r"\1", notice)
-    return f"{path.rpartition('.')[0]} {told}".strip() if notice else ""
+    sentence = re.sub(r"\{(.*?)\}", r"\1", notice)
+    return f"{path.rpartition('.')[0]} {sentence}".strip() if notice else ""
 
 
 def _starts(start: StartTables, n_x: int, n_z: int, n_y: int) -> dict[str, Any]:
@@ -327,14 +336,14 @@ def _starts(start: StartTables, n_x: int, n_z: int, n_y: int) -> dict[str, Any]:
     }
 
 
-def _variable(one: FmuVariable, text: _Text) -> tuple[int, ...]:
-    kind, index = one.slot
-    start = -1 if one.start_entry is None else one.start_entry
-    tunable = int(kind == "parameter" and one.variability == "tunable")
-    of_type, count = _TYPES[one.type], len(one.elements)
+def _variable(variable: FmuVariable, text: _Text) -> tuple[int, ...]:
+    kind, index = variable.slot
+    start = -1 if variable.start_entry is None else variable.start_entry
+    tunable = int(kind == "parameter" and variable.variability == "tunable")
+    of_type, count = _TYPES[variable.type], len(variable.elements)
     if count:
-        of_type, start = _ARRAY, one.elements[0]
-    return (one.reference, of_type, _KINDS.index(kind), index, start, tunable, text(one.name), count or 1)
+        of_type, start = _ARRAY, variable.elements[0]
+    return (variable.reference, of_type, _KINDS.index(kind), index, start, tunable, text(variable.name), count or 1)
 
 
 def _tape(tape: Tape) -> dict[str, Any]:

@@ -53,12 +53,14 @@ def target_file(path: str | Path, ending: str, what: str) -> Path:
     return target
 
 
-def known_version(asked: str, versions: Any, standard: str) -> Any:
+def known_version(version: str, versions: Any, standard: str) -> Any:
     """Return the requested version of a standard, a member of a `Literal`.
 
     Raises:
         UnknownName: there is no such version.
     """
-    if asked in get_args(versions):
-        return asked
-    raise UnknownName(f"{standard} {asked} is not supported.", advice=f"There are {' and '.join(get_args(versions))}.")
+    if version in get_args(versions):
+        return version
+    raise UnknownName(
+        f"{standard} {version} is not supported.", advice=f"There are {' and '.join(get_args(versions))}."
+    )

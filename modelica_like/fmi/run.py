@@ -33,23 +33,19 @@ def run_fmu(
     """Run an FMU of FMI 1.0, 2.0 or 3.0 with FMPy, in a separate process.
 
     Mode changes of a Co-Simulation are located inside its communication steps, by event mode (FMI 3.0) or by repeating
-    a step from a saved state, unless a mode comes and goes within one step. If an FMU supports neither, they are known
-    to one communication step.
+    a step from a saved state, unless a mode comes and goes within one step; otherwise they are known to one step.
 
     Args:
         path: the FMU.
         inputs: a number, or pairs (time in s, value), by name; linear in between, with jumps where a time is repeated.
             A Co-Simulation gets their slopes if it supports them (FMI 2.0, `canInterpolateInputs`), otherwise their
-            means over steps in which no input changes by more than a five-hundredth of its range, or over its own fixed
-            steps.
-        parameters: start values of parameters and variables by name, in the FMU's units: numbers, and for arrays
-            (FMI 3.0) nested sequences of the array's shape, or all its numbers, row by row.
+            means over its own fixed steps, or over steps in which none changes by more than 1/500 of its range.
+        parameters: start values by name, in the FMU's units; those of an array nested in its shape, or row by row.
         start: start time in s.
         stop: end time in s; by default that of the FMU.
         kind: `me` (Model Exchange) or `cs` (Co-Simulation); by default `cs` if the FMU has it.
         tolerance: relative tolerance.
-        step: communication step, or interval of the results, in s; by default that suggested by the
-            FMU, or a five-hundredth of the run.
+        step: communication step, or interval of the results, in s; by default the FMU's, or 1/500 of the run.
         points: number of equal steps instead.
         outputs: variables to record; by default all that are not parameters.
         timeout: time limit in s.
@@ -60,10 +56,9 @@ def run_fmu(
 
     Raises:
         FmuRefused: the file is not an FMU, is unsafe to unpack, or lacks what was requested.
-        FmuFailed: the FMU reported an error, or a result is not finite; FmuCrashed: it crashed its process; FmuTimeout:
-            it did not finish.
-        UnknownName: it has no such variable.
-        MissingValue: a reading still changes with 100,000 results.
+        FmuFailed: it reported an error, or a result is not finite.
+        FmuCrashed, FmuTimeout: it crashed its process, or did not finish.
+        UnknownName, MissingValue: it has no such variable; a reading still changes with 100,000 results.
         ValueOutOfRange: an array has another shape, or a time is wrong.
         OSError: the file cannot be read.
     """
@@ -82,6 +77,15 @@ def run_fmu(
     return run
 
 
+def _check_times(name: str, start: float, stop: float | None, step: float | None, timeout: float) -> None:
+    if stop is not None and stop <= start:
+        raise ValueOutOfRange(f"{name}: the end time {stop:g} s is not after the start time {start:g} s.")
+    if step is not None and step <= 0:
+        raise ValueOutOfRange(f"{name}: the step must be positive, not {step:g} s.")
+    if timeout <= 0:
+        raise ValueOutOfRange(f"{name}: the time limit must be positive, not {timeout:g} s.")
+
+
 def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:
     begin = time.perf_counter()
     with workplace(job, [path]) as folder:
@@ -89,7 +93,15 @@ def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:
         tell_error(folder, {"": path.name})
         table = np.load(folder / "result.npy", max_header_size=_HEADER)  # names of all columns
         meta = json.loads((folder / "meta.json").read_text())
-    run = _solution(meta, table, job["parameters"], time.perf_counter() - begin)
+    variables = (RecordedVariable(**{**variable, "names": dict(variable["names"])}) for variable in meta["variables"])
+    columns = [variable for variable in variables if variable.path in table.dtype.names]
+    parts = [tuple(column for column in columns if (column.kind == "discrete") is modes) for modes in (False, True)]
+    constants = {name: float(job["parameters"].get(name, value)) for name, value in meta["constants"].items()}
+    model = RecordedModel(meta["name"], parts[0], parts[1], constants)
+    values, modes = (
+        np.array([table[variable.path] for variable in part], float).reshape(-1, len(table)) for part in parts
+    )
+    run = RecordedSolution(model, table["time"].copy(), values, modes, time.perf_counter() - begin)
     if meta["ended"]:
         run._ended = Ended(float(run.time[-1]), run.model.name, TERMINATED)
     if death:
@@ -100,7 +112,7 @@ def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:
 
 def _check_finite(name: str, run: RecordedSolution) -> None:
     """Refuse results that are not finite; the run is on the error."""
-    paths = [one.path for one in run.model.flat_variables]
+    paths = [variable.path for variable in run.model.flat_variables]
     bad = [(int(np.argmin(finite)), path) for path in paths if not (finite := np.isfinite(run[path])).all()]
     if bad:
         first, path = min(bad)
@@ -138,22 +150,3 @@ def _series(name: str, value: Any) -> Any:
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.all(np.isfinite(pairs)) or np.any(np.diff(pairs[:, 0]) < 0):
         raise ValueOutOfRange(f"The input '{name}' must be a number, or pairs of rising time and value.")
     return pairs.tolist()
-
-
-def _check_times(name: str, start: float, stop: float | None, step: float | None, timeout: float) -> None:
-    if stop is not None and stop <= start:
-        raise ValueOutOfRange(f"{name}: the end time {stop:g} s is not after the start time {start:g} s.")
-    if step is not None and step <= 0:
-        raise ValueOutOfRange(f"{name}: the step must be positive, not {step:g} s.")
-    if timeout <= 0:
-        raise ValueOutOfRange(f"{name}: the time limit must be positive, not {timeout:g} s.")
-
-
-def _solution(meta: dict[str, Any], table: Any, given: Mapping[str, float], seconds: float) -> RecordedSolution:
-    known = (RecordedVariable(**{**one, "names": dict(one["names"])}) for one in meta["variables"])
-    columns = [one for one in known if one.path in table.dtype.names]
-    parts = [tuple(one for one in columns if (one.kind == "discrete") is modes) for modes in (False, True)]
-    constants = {name: float(given.get(name, value)) for name, value in meta["constants"].items()}
-    model = RecordedModel(meta["name"], parts[0], parts[1], constants)
-    values, modes = (np.array([table[one.path] for one in part], float).reshape(-1, len(table)) for part in parts)
-    return RecordedSolution(model, table["time"].copy(), values, modes, seconds)

@@ -40,9 +40,9 @@ def runtime_library(platform: str, report: Callable[[str], None] = lambda _: Non
         UnknownName: there is no such platform.
         MissingExtra, ExportError: it must be built, but there is no compiler, or the compiler failed.
     """
-    found = found_runtime(platform)
-    if found is not None:
-        return found
+    library = found_runtime(platform)
+    if library is not None:
+        return library
     stale = any((SHIPPED / platform).glob("runtime-*"))
     report(f"compiling the run-time for {platform}, once" + (": its sources have changed" if stale else ""))
     return build_runtime(platform, cache_folder() / platform)

@@ -61,22 +61,22 @@ def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
 
 def own_sources(faces: Iterable[Face]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
-    own = (name for face in faces for name in _FACES[face])
-    names = ("codes.h", "core.h", "model.h", "modelica_like.h", "operations.h", "model_data.c", *RUNTIME, *own)
+    files = (name for face in faces for name in _FACES[face])
+    names = ("codes.h", "core.h", "model.h", "modelica_like.h", "operations.h", "model_data.c", *RUNTIME, *files)
     return {name: (_ENGINE / name).read_text(encoding="utf-8") for name in names}
 
 
 def licenses(version: Version) -> str:
     """Return the licences of the sources in an FMU: that of the generated code, and that of the standard's headers."""
-    own = (_ENGINE / "license.txt").read_text(encoding="utf-8")
+    engine = (_ENGINE / "license.txt").read_text(encoding="utf-8")
     text = _header(_HEADERS[version][0])
     comment = text[text.index("Copyright") : text.index("*/")]
     lines = [line.strip().strip("-") for line in comment.splitlines()]
-    return f"The C code of the model:\n\n{own}\nThe headers fmi*.h:\n\n" + "\n".join(lines).strip() + "\n"
+    return f"The C code of the model:\n\n{engine}\nThe headers fmi*.h:\n\n" + "\n".join(lines).strip() + "\n"
 
 
 def _header(name: str) -> str:
-    found = find_spec("fmpy")
-    if found is None or found.origin is None:
+    spec = find_spec("fmpy")
+    if spec is None or spec.origin is None:
         raise ExportError("FMPy is not installed; it has the headers of the standard.", advice="pip install fmpy")
-    return (Path(found.origin).parent / "c-code" / name).read_text(encoding="utf-8")
+    return (Path(spec.origin).parent / "c-code" / name).read_text(encoding="utf-8")

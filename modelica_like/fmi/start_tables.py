@@ -70,8 +70,8 @@ def start_tables(model: CompiledDae) -> StartTables:
         settled = initialize(model, start=kind)
     StartProblem(model, point).fix(point)
     plan = start_plan(model, kind, point)
-    own = plan.system.function.size1_out(0) + len(model.implicit)
-    row_of = {node: own + k for k, node in enumerate(plan.system.nodes)}
+    count = plan.system.function.size1_out(0) + len(model.implicit)
+    row_of = {node: count + k for k, node in enumerate(plan.system.nodes)}
 
     def of_states(strength: str) -> tuple[tuple[int, int, float], ...]:
         if settled is not None and strength != "fixed":

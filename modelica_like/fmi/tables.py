@@ -78,10 +78,10 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
 def qr_pattern(pattern: Any) -> Pattern:
     """Analyse a square, structurally regular `casadi.Sparsity` (approximate minimum degree, then elimination tree)."""
     v, r, rows, columns = pattern.qr_sparse(True) if pattern.size1() else (pattern, pattern, (), ())
-    found: Pattern = {"row_place": tuple(rows), "column_order": tuple(columns)}
-    for prefix, one in (("", pattern), ("v_", v), ("r_", r)):
-        found |= {f"{prefix}colind": tuple(one.colind()), f"{prefix}row": tuple(one.row())}
-    return found
+    tables: Pattern = {"row_place": tuple(rows), "column_order": tuple(columns)}
+    for prefix, sparsity in (("", pattern), ("v_", v), ("r_", r)):
+        tables |= {f"{prefix}colind": tuple(sparsity.colind()), f"{prefix}row": tuple(sparsity.row())}
+    return tables
 
 
 def _places(inner: Any, outer: Any) -> tuple[int, ...]:

@@ -94,7 +94,7 @@ def adaptor_for(connector: Connector, takes: Takes) -> tuple[type[Component], st
         ExportError: no library has one.
     """
     for kind in library_types().values():
-        ends = {name: one for name, one in kind._class_connectors.items() if type(one) is type(connector)}
+        ends = {name: c for name, c in kind._class_connectors.items() if type(c) is type(connector)}
         if kind.terminal is not None and kind.terminal.takes == takes and len(ends) == 1:
             return kind, next(iter(ends))
     raise ExportError(

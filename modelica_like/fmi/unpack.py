@@ -81,8 +81,10 @@ def unpack(path: Path, target: Path, limits: Limits = LIMITS, kind: Kind = FMU) 
     except _DAMAGED as error:
         if isinstance(error, OSError) and error.filename is not None:
             raise
+        text = str(error) or "It is truncated."
         raise FmuRefused(
-            f"{path.name} is not an {kind.name}: it is not a valid zip archive.", why=_sentence(error)
+            f"{path.name} is not an {kind.name}: it is not a valid zip archive.",
+            why=text if text.endswith(".") else f"{text}.",
         ) from None
     refuse_document_type(path.name, target / kind.description)
     return target
@@ -112,11 +114,6 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
-def _sentence(error: Exception) -> str:
-    text = str(error) or "It is truncated."
-    return text if text.endswith(".") else f"{text}."
-
-
 def _look_through(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits, kind: Kind) -> None:
     if len(members) > limits.members:
         raise FmuRefused(f"{name} is refused: it holds {len(members)} files, more than {limits.members}.")
@@ -125,7 +122,14 @@ def _look_through(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits,
         if reason := _objection(member, seen):
             raise FmuRefused(f"{name} is refused: '{printable(member.orig_filename)}' {reason}.")
         seen.add(member.filename)
-    _check_size(name, members, limits, kind)
+    unpacked, packed = sum(m.file_size for m in members), sum(m.compress_size for m in members)
+    if unpacked > limits.total:
+        raise FmuRefused(f"{name} is refused: it would unpack to {_size(unpacked)}, more than {_size(limits.total)}.")
+    if unpacked > limits.harmless and unpacked > limits.ratio * packed:
+        raise FmuRefused(
+            f"{name} is refused: {_size(packed)} would unpack to {_size(unpacked)}.",
+            why=f"A file that shrinks to less than 1/{limits.ratio:g} is more likely a zip bomb than an {kind.name}.",
+        )
     if kind.description not in seen:
         raise FmuRefused(f"{name} is not an {kind.name}: it has no {kind.description}.")
 
@@ -148,17 +152,6 @@ def _objection(member: zipfile.ZipInfo, seen: set[str]) -> str:
     if member.flag_bits & _ENCRYPTED:
         return "is encrypted"
     return "occurs twice" if member.filename in seen else ""
-
-
-def _check_size(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits, kind: Kind) -> None:
-    unpacked, packed = sum(m.file_size for m in members), sum(m.compress_size for m in members)
-    if unpacked > limits.total:
-        raise FmuRefused(f"{name} is refused: it would unpack to {_size(unpacked)}, more than {_size(limits.total)}.")
-    if unpacked > limits.harmless and unpacked > limits.ratio * packed:
-        raise FmuRefused(
-            f"{name} is refused: {_size(packed)} would unpack to {_size(unpacked)}.",
-            why=f"A file that shrinks to less than 1/{limits.ratio:g} is more likely a zip bomb than an {kind.name}.",
-        )
 
 
 def _size(count: float) -> str:

@@ -21,7 +21,7 @@ from modelica_like.fmi.failures import tell_error
 from modelica_like.fmi.process import run_child, workplace
 from modelica_like.fmi.run import TIMEOUT, Kind, Solver, run_fmu
 from modelica_like.fmi.unpack import unpack
-from modelica_like.runs.ranges import ranges
+from modelica_like.runs.curves import ranges
 from modelica_like.runs.recorded import RecordedSolution
 from modelica_like.runs.trajectories import Values
 
@@ -122,9 +122,9 @@ class _Subject:
             self.path, stop=stop, kind=kind, solver=solver, step=step, timeout=self.timeout, outputs=self.observed
         )
 
-    def at(self, time: float, known: RecordedSolution) -> Values:
+    def at(self, time: float, run: RecordedSolution) -> Values:
         """Return the values at a time from a run, or from a run to that time if it is before the first result."""
-        return known.at(min(time, known.final.time)) if time >= self.step else self.run("me", time, time).final
+        return run.at(min(time, run.final.time)) if time >= self.step else self.run("me", time, time).final
 
 
 def validate_fmu(path: str | Path, *, timeout: float = TIMEOUT) -> Validation:
@@ -194,8 +194,8 @@ def _schema_check(name: str, file: Path, version: str, schema: str) -> Check:
     rules = etree.XMLSchema(etree.parse(xsd))
     if rules.validate(document):
         return Check(name, PASSED, "It conforms to the schema.")
-    found = "; ".join(f"line {entry.line}: {entry.message}" for entry in list(rules.error_log)[:3])
-    return Check(name, FAILED, found)
+    faults = "; ".join(f"line {entry.line}: {entry.message}" for entry in list(rules.error_log)[:3])
+    return Check(name, FAILED, faults)
 
 
 def _run_check(name: str, subject: _Subject, kind: Kind, solver: Solver, runs: dict[str, RecordedSolution]) -> Check:
@@ -217,7 +217,7 @@ def _run_check(name: str, subject: _Subject, kind: Kind, solver: Solver, runs: d
     return _agreement(name, before, expected, {n: run[n][-1] for n in run.model.position}, stop)
 
 
-def _importer_check(name: str, importer: str, subject: _Subject, known: RecordedSolution | None) -> Check:
+def _importer_check(name: str, importer: str, subject: _Subject, run: RecordedSolution | None) -> Check:
     """Run with another importer; the final values must agree with those of FMPy."""
     if subject.description.coSimulation is None:
         return Check(name, ABSENT, "It has no Co-Simulation.")
@@ -230,9 +230,9 @@ def _importer_check(name: str, importer: str, subject: _Subject, known: Recorded
         if importer == "libcosim" and subject.description.fmiVersion.startswith("3"):
             return Check(name, ABSENT, f"{error.what} It does so with every FMU of FMI 3.0: the importer is at fault.")
         return Check(name, FAILED, error.what)
-    if known is None:
+    if run is None:
         return Check(name, PASSED, f"It runs to {subject.stop:g} s; FMPy has no values to compare with.")
-    return _agreement(name, known, known.final, values, subject.stop)
+    return _agreement(name, run, run.final, values, subject.stop)
 
 
 def _run_importer(importer: str, subject: _Subject, names: Sequence[str]) -> dict[str, float]:
@@ -247,13 +247,13 @@ def _run_importer(importer: str, subject: _Subject, names: Sequence[str]) -> dic
 
 
 def _agreement(
-    name: str, known: RecordedSolution | None, expected: Values | None, values: dict[str, float], stop: float
+    name: str, run: RecordedSolution | None, expected: Values | None, values: dict[str, float], stop: float
 ) -> Check:
     """Compare values with those of another run at the same time, relative to their ranges in that run."""
-    if known is None or expected is None:
+    if run is None or expected is None:
         return Check(name, PASSED, f"It runs to {stop:g} s.")
 
-    scales = ranges(known, values, _LEAST_RANGE)
+    scales = ranges(run, values, _LEAST_RANGE)
     deviations = {signal: abs(values[signal] - expected[signal]) / scales[signal] for signal in values}
     worst = max(values, key=deviations.__getitem__, default="")
     if worst and not deviations[worst] <= (_NEAR if name == _EULER else _SAME):

@@ -26,11 +26,11 @@ class Element:
 
 def element(parent: Element, tag: str, /, **attributes: object) -> Element:
     """Append an element; attributes that are None are left out, numbers are written so that they read back exactly."""
-    one = Element(tag, attributes)
+    child = Element(tag, attributes)
     if parent.inner is None:
         parent.inner = []
-    parent.inner.append(one)
-    return one
+    parent.inner.append(child)
+    return child
 
 
 def document(top: Element) -> str:
@@ -56,9 +56,9 @@ def _text(value: object) -> str:
     return " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
-def _character(one: str) -> str:
+def _character(character: str) -> str:
     """Control characters are not valid in XML."""
-    return _ESCAPED.get(one, one) if one.isprintable() else " "
+    return _ESCAPED.get(character, character) if character.isprintable() else " "
 
 
 @cache

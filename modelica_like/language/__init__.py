@@ -5,6 +5,7 @@ from modelica_like.language.assembly import Assembly as Assembly
 from modelica_like.language.component import Component as Component
 from modelica_like.language.declared import Connector as Connector
 from modelica_like.language.declared import Domain as Domain
+from modelica_like.language.declared import Terminal as Terminal
 from modelica_like.language.delay import delay as delay
 from modelica_like.language.discrete import assert_ as assert_
 from modelica_like.language.discrete import change as change
@@ -72,5 +73,4 @@ from modelica_like.language.mode import BoundMode as BoundMode
 from modelica_like.language.mode import Mode as Mode
 from modelica_like.language.tables import column as column
 from modelica_like.language.tables import rows as rows
-from modelica_like.language.terminal import Terminal as Terminal
 from modelica_like.language.transition import Events as Events

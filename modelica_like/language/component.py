@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like import upper
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
-from modelica_like.language.declared import Connector, Declared, annotated, refuse_collection, unknown
+from modelica_like.language.declared import Connector, Declared, Terminal, annotated, refuse_collection, unknown
 from modelica_like.language.equation import Equations
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
@@ -18,7 +18,6 @@ from modelica_like.language.icon import Icon
 from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
-from modelica_like.language.terminal import Terminal
 from modelica_like.language.transition import Events
 
 
@@ -49,22 +48,22 @@ class Component(Declared):
     def __init_subclass__(cls, partial: bool = False, **options: Any) -> None:
         super().__init_subclass__(**options)
         cls._partial = partial
-        own = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
+        body = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
         hints = {name: str(text) for name, text in annotated(cls).items() if not name.startswith("_")}
         annotations = [name for name, text in hints.items() if not text.startswith(("ClassVar", "typing.ClassVar"))]
         # A class may extend several bases, as in Modelica: declarations are collected along all ancestors.
         ancestors = [base for base in reversed(cls.__mro__[1:]) if issubclass(base, Component)]
         cls._class_connectors = _of_kind(cls, Connector)
         cls._class_modes = _of_kind(cls, Mode)
-        parts = {name: value for name, value in own.items() if _is_part(value)}
+        parts = {name: value for name, value in body.items() if _is_part(value)}
         cls._class_parts = {name: part for base in ancestors for name, part in base._class_parts.items()} | parts
         cls._replaceable = frozenset(parts.keys() & {*annotations}).union(*(base._replaceable for base in ancestors))
         declared = (Field, Connector, Mode)
-        for name, value in own.items():
+        for name, value in body.items():
             if type(value) is list and name not in parts and (name in annotations or name not in hints):
                 refuse_collection(f"{cls.__name__}.{name}", cast(object, value))
         plain = {
-            n: own.get(n, REQUIRED) for n in annotations if not isinstance(own.get(n), declared) and n not in parts
+            n: body.get(n, REQUIRED) for n in annotations if not isinstance(body.get(n), declared) and n not in parts
         }
         tables = {name: value for name, value in plain.items() if isinstance(value, Rows)}
         plain |= {name: table.default for name, table in tables.items()}
@@ -161,8 +160,8 @@ class Component(Declared):
             )  # fmt: skip
         else:
             refuse_collection(f"{type(self).__name__}.{name}", value, caller)
-            known = [*self.fields, *self._class_modes, *self._structural, *self._replaceable]
-            error = unknown("parameter or variable", type(self).__name__, name, known, self.renamed)
+            names = [*self.fields, *self._class_modes, *self._structural, *self._replaceable]
+            error = unknown("parameter or variable", type(self).__name__, name, names, self.renamed)
             error.where = (caller(),)
             raise error
 
@@ -245,7 +244,7 @@ class Component(Declared):
             named = {}
             for name, part in self._parts.items():
                 listed = isinstance(part, list)
-                named |= {f"{name}[{k}]": one for k, one in enumerate(part, 1)} if listed else {name: part}
+                named |= {f"{name}[{k}]": element for k, element in enumerate(part, 1)} if listed else {name: part}
             self.__dict__["_named"] = named
         return MappingProxyType(named)
 
@@ -286,10 +285,10 @@ class Component(Declared):
     def place_of(self, name: str = "") -> Source:
         """Return the place of this part in a netlist, of a parameter of the netlist, or of a value given later."""
         root, path = self.root, f"{self.path}.{name}".lstrip(".")
-        own = root.source_of(f"set.{path}") if isinstance(root, Component) else NOWHERE
-        own = own if own.file else self.source_of(f"parameters.{name}")
-        if own.file or not isinstance(self._owner, Component):
-            return own
+        source = root.source_of(f"set.{path}") if isinstance(root, Component) else NOWHERE
+        source = source if source.file else self.source_of(f"parameters.{name}")
+        if source.file or not isinstance(self._owner, Component):
+            return source
         # All elements of an array are in one line.
         return self._owner.source_of(f"parts.{self._name.partition('[')[0]}")
 
@@ -321,14 +320,14 @@ class Component(Declared):
 
     def _end(self, which: str) -> Connector:
         names = getattr(type(self), which).split()
-        found = next((self._connectors[name] for name in names if name in self._connectors), None)
-        if found is None:
+        connector = next((self._connectors[name] for name in names if name in self._connectors), None)
+        if connector is None:
             error = unknown(which, f"{self.label} ({type(self).__name__})", " or ".join(names), list(self._connectors))
             ends = [*self._connectors, *self.terminal_members()]
             example = f': joint = ["{self.label}.{min(ends)}", …]' if ends else "."
             error.advice = f"Join it in [connect], not in a series{example}"
             raise error
-        return found
+        return connector
 
     def __setattr__(self, name: str, value: Any) -> None:
         if _is_part(value):
@@ -347,8 +346,8 @@ class Component(Declared):
     def _adopt(self, name: str, value: Component | list[Component]) -> None:
         taken = (self.fields, self._connectors, self._structural, self._class_modes)
         if any(name in names for names in taken) or hasattr(Component, name):
-            own = ": every component has something of this name" * hasattr(Component, name)
-            raise DuplicateName(f"{self.label}: '{name}' is already in use{own}.", where=caller())
+            hint = ": every component has something of this name" * hasattr(Component, name)
+            raise DuplicateName(f"{self.label}: '{name}' is already in use{hint}.", where=caller())
         require_identifier(name, type(self).__name__)
         if isinstance(value, list):
             adopted: Any = [self._owned(f"{name}[{k}]", part) for k, part in enumerate(value, 1)]

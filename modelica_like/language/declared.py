@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, Literal, Self, cast
 
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.language.expr import Expr, Symbol, symbol_of
@@ -57,7 +57,7 @@ class Declared:
             size: how many; what was declared under this name before is gone.
             field: of each, such as `var("N.m", "torque")`.
         """
-        kept = {key: one for key, one in self._own_fields.items() if not key.startswith(f"{name}[")}
+        kept = {key: f for key, f in self._own_fields.items() if not key.startswith(f"{name}[")}
         for key in (f"{name}[{k}]" for k in range(1, size + 1)):
             kept[key] = copy(field)
             kept[key].owner, kept[key].name = type(self).__name__, key
@@ -153,7 +153,7 @@ class Connector(Declared):
     @property
     def quantities(self) -> dict[str, Variable]:
         """Its potentials and flows by name."""
-        return {name: one for name, one in self.fields.items() if isinstance(one, Variable)}
+        return {name: f for name, f in self.fields.items() if isinstance(f, Variable)}
 
     def power(self) -> Expr | float:
         """Power in W that flows into the component."""
@@ -191,15 +191,33 @@ def refuse_collection(label: str, value: object, where: Callable[[], Source] | N
     if not isinstance(value, list | tuple | dict):
         return
     elements = list(cast("Iterable[Any]", value.values() if isinstance(value, dict) else value))
-    inner = [part for one in elements for part in cast("Iterable[Any]", one if isinstance(one, tuple) else (one,))]
-    if any(isinstance(one, Connector) for one in inner):
+    inner = [part for e in elements for part in cast("Iterable[Any]", e if isinstance(e, tuple) else (e,))]
+    if any(isinstance(element, Connector) for element in inner):
         advice = "Give each a name of its own: flange_1 and flange_2; where their number varies, by setattr in `build`."
-    elif any(isinstance(one, Declared) for one in inner):
+    elif any(isinstance(element, Declared) for element in inner):
         advice = "An array is a list of parts only: [Inertia(J=1), Inertia(J=2)]; other parts have names of their own."
     else:
         return
     kind = type(cast(object, value)).__name__
-    kinds = ", ".join(dict.fromkeys(type(one).__name__ for one in elements))
+    kinds = ", ".join(dict.fromkeys(type(element).__name__ for element in elements))
     raise LanguageError(
         f"{label} is a {kind} that is no array of parts: it has {kinds}.", where=where() if where else (), advice=advice
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    """The terminal formed by the signals of an adaptor.
+
+    Attributes:
+        kind: kind of the terminal; ends of one kind can be connected.
+        takes: quantity from outside: the `flow` (torque, force, current, heat flow) or the `potential` (angle,
+            position, voltage, temperature).
+        rates: pairs of an input and the input that is its time derivative.
+        power: the flow and the signal whose product is the power through it, such as torque and speed.
+    """
+
+    kind: str
+    takes: Literal["flow", "potential"]
+    rates: tuple[tuple[str, str], ...] = ()
+    power: tuple[str, str] | None = None

@@ -33,7 +33,7 @@ def parts(delay: Marker) -> list[Part]:
     """Return the numbers of a delay, always the same ones."""
     if "_parts" not in delay.__dict__:
         units = [delay.of] * TERMS + [TIME, 1 / TIME]
-        delay.__dict__["_parts"] = [Part(delay, one) for one in units]
+        delay.__dict__["_parts"] = [Part(delay, unit) for unit in units]
     return delay.__dict__["_parts"]
 
 
@@ -55,15 +55,15 @@ def delay(value: Expr, time: Scalar) -> Expr:
         what = f"The time of a delay is an expression of parameters, not the text '{time}'."
         raise LanguageError(what, where=caller(), advice="Declare a parameter in s, and name it.")
     size: Any = ca.SX(cast(Any, time))
-    if any(one.owner is None or not is_fixed(one) for one in symbols_in(size)):
+    if any(symbol.owner is None or not is_fixed(symbol) for symbol in symbols_in(size)):
         what = f"delay({value}, {size}): the delay changes during a run."
         raise LanguageError(what, where=caller(), advice="Use a parameter. A delay that changes is not supported.")
     if size.is_constant() and not 0 < float(size) < float("inf"):
         what = f"delay({value}, {size}): the delay must be positive."
         raise LanguageError(what, where=caller(), advice="Write the value itself where nothing is delayed.")
-    *terms, begin, rate = (cast(Any, one) for one in parts(marker("delay", ca.SX(cast(Any, value)), time)))
+    *terms, begin, rate = (cast(Any, part) for part in parts(marker("delay", ca.SX(cast(Any, value)), time)))
     place = (cast(Any, TIME) - begin) * rate - 1
     last = before = ca.SX(0)
-    for one in reversed(terms[1:]):
-        last, before = one + 2 * place * last - before, last
+    for term in reversed(terms[1:]):
+        last, before = term + 2 * place * last - before, last
     return terms[0] + place * last - before

@@ -67,23 +67,23 @@ def marker(kind: MarkerKind, of: Expr, offset: Scalar = 0.0) -> Marker:
     """Return the marker for an expression, the same one for equal expressions."""
     wanted: Any = ca.vertcat(of, offset)
     owner = _owner_in(of)
-    known: list[Marker] = _timed if owner is None else owner.__dict__.setdefault("_markers", [])
-    same = (one for one in known if one.kind == kind and ca.is_equal(ca.vertcat(one.of, one.offset), wanted, 99))
-    found = next(same, None)
-    if found is None:
-        known.append(found := Marker(kind, of, offset))
-    return found
+    markers: list[Marker] = _timed if owner is None else owner.__dict__.setdefault("_markers", [])
+    same = (m for m in markers if m.kind == kind and ca.is_equal(ca.vertcat(m.of, m.offset), wanted, 99))
+    match = next(same, None)
+    if match is None:
+        markers.append(match := Marker(kind, of, offset))
+    return match
 
 
 def _owner_in(expression: Expr) -> Any:
     """Return the owner of a symbol in an expression, or None where time decides alone."""
-    found = (_owner_in(one.of) if isinstance(one, Marker) else one.owner for one in symbols_in(expression))
-    return next((owner for owner in found if owner is not None), None)
+    owners = (_owner_in(symbol.of) if isinstance(symbol, Marker) else symbol.owner for symbol in symbols_in(expression))
+    return next((owner for owner in owners if owner is not None), None)
 
 
 def moves(expression: Expr) -> bool:
     """Return whether an expression changes between events: it has time or a variable in it."""
-    return any(one is TIME or (one.owner is not None and is_a(one, Variable)) for one in symbols_in(expression))
+    return any(s is TIME or (s.owner is not None and is_a(s, Variable)) for s in symbols_in(expression))
 
 
 def is_a(symbol: Symbol, kind: type | tuple[type, ...]) -> bool:
@@ -103,8 +103,8 @@ def silent(condition: Expr | bool, mark: float = SILENT) -> Expr:
         condition: relations and Boolean variables, joined.
         mark: `SILENT` or `CONTINUOUS`.
     """
-    one: Any = ca.SX(cast(Any, condition))
-    return one if one.is_constant() else ca.logic_and(one, mark)
+    expression: Any = ca.SX(cast(Any, condition))
+    return expression if expression.is_constant() else ca.logic_and(expression, mark)
 
 
 def silence(node: Any) -> float:
@@ -122,22 +122,22 @@ def eventful(condition: Expr | bool) -> Expr:
     Raises:
         LanguageError: it compares values that change continuously by `==`, or is no condition.
     """
-    one: Any = ca.SX(cast(Any, condition))
-    operation = one.op()
-    if silence(one):
-        return one
+    expression: Any = ca.SX(cast(Any, condition))
+    operation = expression.op()
+    if silence(expression):
+        return expression
     if operation in _JOINS:
-        return _JOINS[operation](*(cast(Any, eventful(one.dep(k))) for k in (0, 1)))
+        return _JOINS[operation](*(cast(Any, eventful(expression.dep(k))) for k in (0, 1)))
     if operation == ca.OP_NOT:
-        return ca.logic_not(cast(Any, eventful(one.dep(0))))
-    if not moves(one):
-        return one
+        return ca.logic_not(cast(Any, eventful(expression.dep(0))))
+    if not moves(expression):
+        return expression
     if operation in (ca.OP_LT, ca.OP_LE):
-        return marker("relation", one)
+        return marker("relation", expression)
     if operation in (ca.OP_EQ, ca.OP_NE):
-        what = f"{one} compares values that change continuously: they are equal at single instants only."
+        what = f"{expression} compares values that change continuously: they are equal at single instants only."
         raise LanguageError(what, where=caller(), advice="Write a relation with < or >.")
-    what = f"{one} is not a condition: it changes continuously."
+    what = f"{expression} is not a condition: it changes continuously."
     raise LanguageError(what, where=caller(), advice="Write a relation, as in `self.w > 0`, or a Boolean variable.")
 
 
@@ -188,8 +188,8 @@ def edge(condition: Expr) -> Expr:
         LanguageError: it is no condition.
     """
     plain = isinstance(condition, Symbol) and condition.owner is not None and not moves(condition)
-    known = condition if plain else marker("was", eventful(condition))
-    return ca.logic_and(cast(Any, known), ca.logic_not(cast(Any, pre(known))))
+    before = condition if plain else marker("was", eventful(condition))
+    return ca.logic_and(cast(Any, before), ca.logic_not(cast(Any, pre(before))))
 
 
 def change(value: Expr) -> Expr:
@@ -217,7 +217,7 @@ def clock(period: Expr, offset: Scalar = 0.0) -> Expr:
     Raises:
         LanguageError: a time is a text, or changes between events.
     """
-    text = next((one for one in (period, offset) if isinstance(one, str)), None)
+    text = next((value for value in (period, offset) if isinstance(value, str)), None)
     if text is not None:
         what = f"A time of a clock is an expression of parameters, not the text '{text}'."
         advice = f'Declare it, T = param("s", "period", default="{text}"), and use self.T.'
@@ -352,10 +352,10 @@ def when(condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> W
 def _at_tick(value: Scalar) -> Expr:
     """Return a new value with what `sample` and `previous` mean at a tick."""
     whole: Any = ca.SX(cast(Any, value))
-    marked = [one for one in symbols_in(whole) if isinstance(one, Marker) and one.kind in ("sample", "previous")]
+    marked = [s for s in symbols_in(whole) if isinstance(s, Marker) and s.kind in ("sample", "previous")]
     if not marked:
         return whole
-    meant = (pre(one.of) if one.kind == "previous" else _at_tick(one.of) for one in marked)
+    meant = (pre(marker_.of) if marker_.kind == "previous" else _at_tick(marker_.of) for marker_ in marked)
     return ca.substitute(whole, ca.vertcat(*marked), ca.vertcat(*meant))
 
 

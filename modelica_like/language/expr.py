@@ -111,8 +111,8 @@ def flag_name(name: str) -> str:
 
 def flagged_motion(name: str) -> str:
     """Return the name of the motion of such a symbol, or an empty text for other symbols."""
-    found = _FLAG.fullmatch(name)
-    return found.group(1) if found else ""
+    match = _FLAG.fullmatch(name)
+    return match.group(1) if match else ""
 
 
 TIME = Symbol(None, "time")

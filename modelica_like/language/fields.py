@@ -84,7 +84,7 @@ class Field:
     @cached_property
     def bounds(self) -> tuple[float | None, float | None]:
         """Smallest and largest value in SI units, or None."""
-        low, high = (None if one is None else to_si(one, self.unit, self.label) for one in (self.min, self.max))
+        low, high = (None if limit is None else to_si(limit, self.unit, self.label) for limit in (self.min, self.max))
         return low, high
 
     @property
@@ -289,9 +289,9 @@ def var(
         driving: sign of a torque or force while it drives what is on its right; pictures show that as positive.
         difference: a difference of temperatures, which is shown in K and not counted from the zero of degC.
     """
-    made = Variable(unit, description, state=state, guess=guess, default=default, min=min, max=max, nominal=nominal)
-    made.driving, made.difference = driving, difference
-    return made
+    variable = Variable(unit, description, state=state, guess=guess, default=default, min=min, max=max, nominal=nominal)
+    variable.driving, variable.difference = driving, difference
+    return variable
 
 
 def flow(unit: str, description: str = "", *, nominal: float = 1.0) -> Any:

@@ -40,8 +40,8 @@ _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
 
 
 def _operator(sign: str, *, turned: bool = False) -> Callable[[Any, Any], Formula]:
-    def apply(one: Any, other: Any) -> Formula:
-        return Formula(sign, tuple(as_formula(side) for side in ((other, one) if turned else (one, other))))
+    def apply(part: Any, other: Any) -> Formula:
+        return Formula(sign, tuple(as_formula(side) for side in ((other, part) if turned else (part, other))))
 
     return apply
 
@@ -148,14 +148,14 @@ class Formula(Arithmetic):
             return self.operands[0] if outer <= 3 else f"({self.operands[0]})"
         if self.operation in _FUNCTIONS:
             return f"{self.operation}({', '.join(str(operand) for operand in self.operands)})"
-        own = _PRECEDENCE[self.operation]
+        precedence = _PRECEDENCE[self.operation]
         if self.operation == "neg":
-            text = f"-{self.operands[0]._text(own)}"
+            text = f"-{self.operands[0]._text(precedence)}"
         elif self.operation == "**":
-            text = f"{self.operands[0]._text(own + 1)}**{self.operands[1]._text(own)}"
+            text = f"{self.operands[0]._text(precedence + 1)}**{self.operands[1]._text(precedence)}"
         else:
-            text = f"{self.operands[0]._text(own)} {self.operation} {self.operands[1]._text(own + 1)}"
-        return f"({text})" if own < outer else text
+            text = f"{self.operands[0]._text(precedence)} {self.operation} {self.operands[1]._text(precedence + 1)}"
+        return f"({text})" if precedence < outer else text
 
 
 def as_formula(value: Any) -> Formula:
@@ -187,7 +187,11 @@ def parse_formula(text: str) -> Formula:
             tree = ast.parse(replaced, mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise _not_a_formula(text) from None
-    if _depth(tree) > _MAX_DEPTH:
+    layer, depth = [tree], 0
+    while layer:
+        layer = [child for node in layer for child in ast.iter_child_nodes(node)]
+        depth += 1
+    if depth > _MAX_DEPTH:
         raise _not_a_formula(text, "it is nested too deeply")
     return _convert(tree.body, text, quantities)
 
@@ -198,24 +202,16 @@ def _without_quantities(text: str) -> tuple[str, dict[str, str]]:
 
     def name(match: re.Match[str]) -> str:
         try:
-            known = match.group(2) not in _CONSTANTS and parse_unit(match.group(2)).factor
+            is_name = match.group(2) not in _CONSTANTS and parse_unit(match.group(2)).factor
         except UnitError:
-            known = False
-        if not known:
+            is_name = False
+        if not is_name:
             return match.group()
         placeholder = _PLACEHOLDER.format(len(quantities))
         quantities[placeholder] = match.group()
         return placeholder
 
     return _QUANTITY.sub(name, text), quantities
-
-
-def _depth(tree: ast.AST) -> int:
-    layer, depth = [tree], 0
-    while layer:
-        layer = [child for node in layer for child in ast.iter_child_nodes(node)]
-        depth += 1
-    return depth
 
 
 def _not_a_formula(text: str, why: str = "") -> NetlistError:
@@ -228,7 +224,13 @@ def _not_a_formula(text: str, why: str = "") -> NetlistError:
 
 def _convert(node: ast.expr, text: str, quantities: dict[str, str]) -> Formula:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
-        return Formula("number", (_finite(node.value, text),))
+        try:
+            number = float(node.value)
+        except OverflowError:
+            number = math.inf
+        if math.isinf(number):
+            raise _not_a_formula(text, "a number in it is too large")
+        return Formula("number", (number,))
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
         return Formula(
             _BINARY[type(node.op)], (_convert(node.left, text, quantities), _convert(node.right, text, quantities))
@@ -245,16 +247,6 @@ def _convert(node: ast.expr, text: str, quantities: dict[str, str]) -> Formula:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
         return _call(node, node.func.id, text, quantities)
     raise _not_a_formula(text)
-
-
-def _finite(value: float, text: str) -> float:
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if math.isinf(number):
-        raise _not_a_formula(text, "a number in it is too large")
-    return number
 
 
 def _call(node: ast.Call, name: str, text: str, quantities: dict[str, str]) -> Formula:

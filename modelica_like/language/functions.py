@@ -244,10 +244,10 @@ def interpolate(
     Raises:
         LanguageError: lengths differ, `xs` does not increase, or `extrapolate` is unknown.
     """
-    known = not any(is_expression(x) for x in xs)
+    numeric = not any(is_expression(x) for x in xs)
     if extrapolate not in BEYOND:
         raise LanguageError(f"A table has extrapolate = '{extrapolate}', which is not {', '.join(BEYOND)}.")
-    if len(xs) != len(ys) or not xs or (known and any(b <= a for a, b in itertools.pairwise(xs))):
+    if len(xs) != len(ys) or not xs or (numeric and any(b <= a for a, b in itertools.pairwise(xs))):
         raise LanguageError(
             f"A table has the abscissae {list(xs)} and the values {list(ys)}.",
             advice="Give both the same length, and let the abscissae increase strictly.",

@@ -47,7 +47,7 @@ class Mode:
         self.start = names[0] if start is None else start
         self.description = description
         self.hysteresis = hysteresis
-        self.holds = {name: Hold(one) if isinstance(one, str) else one for name, one in (holds or {}).items()}
+        self.holds = {name: Hold(hold) if isinstance(hold, str) else hold for name, hold in (holds or {}).items()}
         self.ideal = dict(ideal or {})
 
     def __set_name__(self, owner: type, name: str) -> None:

@@ -129,7 +129,7 @@ def source_of(code: CodeType, instruction: int) -> Source:
         lines[-1] = lines[-1].encode()[:end_column].decode(errors="ignore")
         lines[0] = lines[0].encode()[column:].decode(errors="ignore")
     # Reading tokens is slow at first, and few statements have comments inside.
-    text = _without_comments(lines) if len(lines) > 1 and any("#" in one for one in lines) else " ".join(lines)
+    text = _without_comments(lines) if len(lines) > 1 and any("#" in line for line in lines) else " ".join(lines)
     return Source(code.co_filename, line, " ".join(text.split()))
 
 
@@ -148,11 +148,11 @@ def _without_comments(lines: list[str]) -> str:
 
 def texts_of_fields(kind: type) -> dict[str, str]:
     """Return the texts below the annotated fields in the bodies of a component class and its bases."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         if not (base is object or base.__module__.startswith("modelica_like.language")):
-            found |= _own_texts(base)
-    return found
+            texts |= _own_texts(base)
+    return texts
 
 
 @cache

@@ -188,4 +188,4 @@ def comparison(**results: Result) -> str:
 def beside(columns: Iterable[Sequence[Line]]) -> list[tuple[str, ...]]:
     """Return lines of results of one kind: name, values, unit and description."""
     rows = zip(*columns, strict=True)
-    return [(one[0].name, *(line.value for line in one), one[0].unit, one[0].description) for one in rows]
+    return [(row[0].name, *(line.value for line in row), row[0].unit, row[0].description) for row in rows]

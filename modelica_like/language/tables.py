@@ -53,8 +53,8 @@ class Rows:
     @property
     def description(self) -> str:
         """Description of the rows: `Rows of slip speed in w_scale and friction coefficient.`."""
-        parts = [f"{one.what} in {one.scale or one.unit}" if one.scale or one.unit != "1" else one.what
-                 for one in self.columns]  # fmt: skip
+        parts = [f"{c.what} in {c.scale or c.unit}" if c.scale or c.unit != "1" else c.what
+                 for c in self.columns]  # fmt: skip
         listed = ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else parts[0]
         return f"{'List' if self.flat else 'Rows'} of {listed}{' and so on' if self.more else ''}."
 
@@ -73,7 +73,7 @@ class Rows:
             NetlistError: it does not have the shape of the table, or a column does not rise.
             UnitError, ValueOutOfRange: a cell has another dimension or is not finite.
         """
-        wanted = [one.described(fields) for one in self.columns]
+        wanted = [c.described(fields) for c in self.columns]
         row = wanted[0] if self.flat else f"[{', '.join(wanted)}{', …' if self.more else ''}]"
         if not isinstance(given, tuple) or not given:
             shape = f"a list of {row}" if self.flat else f"a list of rows {row}"
@@ -93,7 +93,7 @@ class Rows:
             table.append(tuple(_cell(f"{place}{column.what}", column, fields, cell) for column, cell in pairs))
             measured |= {column.scale for column, cell in pairs if column.scale and isinstance(cell, str)}
         self._check_rising(label, table)
-        return tuple(one[0] for one in table) if self.flat else tuple(table), frozenset(measured)
+        return tuple(r[0] for r in table) if self.flat else tuple(table), frozenset(measured)
 
     def store(self, owner: Any, name: str, given: Any) -> tuple[Any, ...]:
         """Read a table for a component, which stores it as given, and the scales that must then have no value.
@@ -152,7 +152,7 @@ def _short(given: Any) -> str:
 
 
 def _as_written(given: Any) -> Any:
-    return [_as_written(one) for one in cast("tuple[Any, ...]", given)] if isinstance(given, tuple) else given
+    return [_as_written(cell) for cell in cast("tuple[Any, ...]", given)] if isinstance(given, tuple) else given
 
 
 def frozen_rows(value: Any) -> Any:

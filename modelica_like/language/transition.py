@@ -47,8 +47,8 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
 
 def _check_transition(transition: Transition, source: Source, component: str) -> None:
     """Check that a time event is known in advance, and that only variables and discrete values are reset."""
-    asked = () if transition.at is None else symbols_in(transition.at)
-    moving = [s for s in asked if s is TIME or isinstance(_field(s), Variable)]
+    symbols = () if transition.at is None else symbols_in(transition.at)
+    moving = [s for s in symbols if s is TIME or isinstance(_field(s), Variable)]
     if moving:
         raise LanguageError(
             f"{component}: the time of an event depends on {moving[0].name}, so it is not known in advance.",
@@ -67,10 +67,10 @@ def _check_transition(transition: Transition, source: Source, component: str) ->
 def _check_notice(transition: Transition, source: Source, component: str) -> None:
     """Check that the names in a reason are parameters, and those in a notice parameters or inputs."""
     fields = transition.mode.symbol.owner.fields
-    known = {"notice": Parameter | Input, "reason": Parameter}
-    told = {"notice": transition.notice, "reason": transition.because}
-    for kind, name in ((kind, name) for kind, text in told.items() for name in NAME_IN_NOTICE.findall(text)):
-        names = [name for name, field in fields.items() if isinstance(field, known[kind])]
+    kinds = {"notice": Parameter | Input, "reason": Parameter}
+    texts = {"notice": transition.notice, "reason": transition.because}
+    for kind, name in ((kind, name) for kind, text in texts.items() for name in NAME_IN_NOTICE.findall(text)):
+        names = [name for name, field in fields.items() if isinstance(field, kinds[kind])]
         if name not in names:
             what = "parameter" if kind == "reason" else "parameter or input"
             raise LanguageError(

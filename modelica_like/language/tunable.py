@@ -30,8 +30,10 @@ def with_tunable_tables(root: _Root, patterns: Iterable[str]) -> _Root:
         LanguageError: a named table has texts, or is passed on to parts.
     """
     root = copy.deepcopy(root)
-    found = [(part, name, rows) for part in cast("Iterable[Any]", root.walk()) for name, rows in part._tables.items()]
-    tables = {f"{one[0].path}.{one[1]}".lstrip("."): one for one in found}
+    with_tables = [
+        (part, name, rows) for part in cast("Iterable[Any]", root.walk()) for name, rows in part._tables.items()
+    ]
+    tables = {f"{table[0].path}.{table[1]}".lstrip("."): table for table in with_tables}
     for pattern in patterns:
         met = [path for path in tables if fnmatchcase(path, pattern.replace("[", "[[]"))]
         if not met:
@@ -55,7 +57,7 @@ def with_tunable_tables(root: _Root, patterns: Iterable[str]) -> _Root:
 
 def _cells(owner: Component, table: str, rows: Rows) -> dict[str, Parameter]:
     """Return a parameter for every number of a table, row by row."""
-    found: dict[str, Parameter] = {}
+    cells: dict[str, Parameter] = {}
     for i, row in enumerate(owner.__dict__[table], 1):
         numbers: tuple[float, ...] = (row,) if rows.flat else row
         for j, number in enumerate(numbers, 1):
@@ -64,8 +66,8 @@ def _cells(owner: Component, table: str, rows: Rows) -> dict[str, Parameter]:
             cell = cast("Parameter", param(unit, f"{column.what} in row {i} of {table}", default=number))
             cell.owner, cell.name = type(owner).__name__, f"{table}[{i}]" if rows.flat else f"{table}[{i},{j}]"
             cell.above = len(numbers) if column.rising and i > 1 else 0
-            found[cell.name] = cell
-    return found
+            cells[cell.name] = cell
+    return cells
 
 
 @contextmanager

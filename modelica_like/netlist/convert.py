@@ -21,9 +21,9 @@ def as_assembly(component: Component) -> Assembly:
         NetlistError: the class has variables, modes or equations of its own.
     """
     root = component.copy()
-    own = [name for name, field in root.fields.items() if not isinstance(field, Parameter)]
-    if own or root.modes:
-        raise _not_only_wires(component, ", ".join([*own, *root.modes]))
+    names = [name for name, field in root.fields.items() if not isinstance(field, Parameter)]
+    if names or root.modes:
+        raise _not_only_wires(component, ", ".join([*names, *root.modes]))
     parameters = {name: value_text(root, name) for name in root.fields}
     parts: dict[str, Any] = dict(root._parts)
     wires: list[list[str]] = []

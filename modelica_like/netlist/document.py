@@ -122,7 +122,15 @@ def parse(text: str, file: str) -> Document:
         )
     data = parse_toml(text, lines)
     errors: list[ModelicaLikeError] = []
-    document = _document(data, lines, errors)
+    sections = read_sections(data, "A netlist", _READERS, lines, errors)
+    document = Document(lines, **{"name": Path(lines.file).stem, **sections})
+    for name in document.parts.keys() & document.parameters.keys():
+        places = (lines.source("parameters", name), lines.source("parts", name))
+        errors.append(DuplicateName(f"'{name}' is both a parameter and a part.", where=places))
+    if not document.parts and not errors:
+        errors.append(
+            NetlistError(f"{document.name} has no parts.", where=Source(lines.file), advice="Declare them in [parts].")
+        )
     if errors:
         raise raise_together_or_one(errors)
     return document
@@ -166,19 +174,6 @@ def _not_toml(message: str, lines: Lines) -> ModelicaLikeError:
 # --- the form -------------------------------------------------------------------------------------------------------
 
 
-def _document(data: dict[str, Any], lines: Lines, errors: list[ModelicaLikeError]) -> Document:
-    sections = read_sections(data, "A netlist", _READERS, lines, errors)
-    document = Document(lines, **{"name": Path(lines.file).stem, **sections})
-    for name in document.parts.keys() & document.parameters.keys():
-        places = (lines.source("parameters", name), lines.source("parts", name))
-        errors.append(DuplicateName(f"'{name}' is both a parameter and a part.", where=places))
-    if not document.parts and not errors:
-        errors.append(
-            NetlistError(f"{document.name} has no parts.", where=Source(lines.file), advice="Declare them in [parts].")
-        )
-    return document
-
-
 def read_sections(
     data: Mapping[str, Any], what: str, readers: Mapping[str, Reader], lines: Lines, errors: list[ModelicaLikeError]
 ) -> dict[str, Any]:
@@ -195,8 +190,8 @@ def read_sections(
     for key, value in data.items():
         try:
             if key not in readers:
-                known = ", ".join(readers)
-                raise UnknownName(f"{what} has no entry '{key}'{did_you_mean(key, readers) or '.'} It has {known}.")
+                sections = ", ".join(readers)
+                raise UnknownName(f"{what} has no entry '{key}'{did_you_mean(key, readers) or '.'} It has {sections}.")
             read[key] = readers[key](key, value, lines, errors)
         except ModelicaLikeError as error:
             errors.append(_placed(error, lines.source(key)))
@@ -267,7 +262,7 @@ def _names(key: str, value: Any) -> list[str]:
 
 
 def _ends(key: str, value: Any) -> list[str]:
-    if isinstance(value, list) and any(isinstance(one, list) for one in value):
+    if isinstance(value, list) and any(isinstance(entry, list) for entry in value):
         raise NetlistError(
             f"{key} must be a list of names.",
             advice="Write a separate entry for every list.",

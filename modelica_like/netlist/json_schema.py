@@ -50,16 +50,16 @@ def schema() -> dict[str, Any]:
     }
 
 
-def chosen(known: Iterable[str], others: Iterable[dict[str, Any]] = ()) -> dict[str, Any]:
+def chosen(types: Iterable[str], others: Iterable[dict[str, Any]] = ()) -> dict[str, Any]:
     """Return the schema of a table whose `is` chooses a definition, in the form that language servers complete."""
-    return {"anyOf": [*({"$ref": f"#/definitions/{name}"} for name in known), *others]}
+    return {"anyOf": [*({"$ref": f"#/definitions/{name}"} for name in types), *others]}
 
 
 def _units(types: Iterable[type[Component]]) -> set[str]:
     fields = {field.unit_text for kind in types for field in kind._class_fields.values()}
     columns = {
-        str(one.unit_in(kind._class_fields)) for kind in types for table in kind._tables.values()
-        for one in table.columns if not one.text
+        str(column.unit_in(kind._class_fields)) for kind in types for table in kind._tables.values()
+        for column in table.columns if not column.text
     }  # fmt: skip
     return fields | columns
 
@@ -110,7 +110,7 @@ def _map(entries: dict[str, Any], description: str, example: dict[str, Any]) -> 
 
 def _others() -> list[dict[str, Any]]:
     """Return the schemas of parts that are no component of a library."""
-    known = {
+    patterns = {
         r"^[\w.]+:\w+$": "class of a Python module",
         r"\.toml$": "another netlist",
         r"\.mo(:[\w.]+)?$": "class of a Modelica text",
@@ -121,7 +121,7 @@ def _others() -> list[dict[str, Any]]:
             "type": "object", "description": text, "required": ["is"], "additionalProperties": True,
             "properties": {"is": {"type": "string", "pattern": pattern}},
         }
-        for pattern, text in known.items()
+        for pattern, text in patterns.items()
     ]  # fmt: skip
 
 
@@ -173,11 +173,11 @@ def _field(field: Field, quantities: Quantities) -> dict[str, Any]:
 
 
 def _table(table: Rows, fields: Mapping[str, Field], quantities: Quantities) -> dict[str, Any]:
-    cells = [{"description": one.described(fields), **_cell(one, fields, quantities)} for one in table.columns]
+    cells = [{"description": column.described(fields), **_cell(column, fields, quantities)} for column in table.columns]
     size = {"minItems": len(cells), "additionalItems": cells[-1] if table.more else False}
     row = cells[0] if table.flat else {"type": "array", "items": cells, **size}
-    found: dict[str, Any] = {"type": "array", "description": table.description, "minItems": 1, "items": row}
-    return found if table.default is REQUIRED else found | {"default": table.default}
+    array: dict[str, Any] = {"type": "array", "description": table.description, "minItems": 1, "items": row}
+    return array if table.default is REQUIRED else array | {"default": table.default}
 
 
 def _cell(column: Column, fields: Mapping[str, Field], quantities: Quantities) -> dict[str, Any]:
@@ -189,5 +189,7 @@ def _cell(column: Column, fields: Mapping[str, Field], quantities: Quantities) -
 
 def _structural(kind: type[Component], name: str) -> dict[str, Any]:
     default = kind._structural[name]
-    made: dict[str, Any] = {"type": known, "default": default} if (known := _JSON_TYPES.get(type(default))) else {}
-    return made | ({"enum": choices} if (choices := kind.choices(name)) else {})
+    entry: dict[str, Any] = (
+        {"type": json_type, "default": default} if (json_type := _JSON_TYPES.get(type(default))) else {}
+    )
+    return entry | ({"enum": choices} if (choices := kind.choices(name)) else {})

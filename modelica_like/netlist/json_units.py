@@ -30,8 +30,8 @@ class Quantities:
     """
 
     def __init__(self, units: Iterable[str]) -> None:
-        known = {parse_unit(text) for text in (*units, *_USUAL)} | {parse_unit(name) for name in ATOMS}
-        self._patterns = {unit: _pattern(unit) for unit in sorted(known, key=str) if unit.atoms and unit != ANY}
+        named_units = {parse_unit(text) for text in (*units, *_USUAL)} | {parse_unit(name) for name in ATOMS}
+        self._patterns = {unit: _pattern(unit) for unit in sorted(named_units, key=str) if unit.atoms and unit != ANY}
         self._used: dict[str, Unit] = {}
 
     def text(self, unit: Unit) -> dict[str, Any]:
@@ -44,17 +44,15 @@ class Quantities:
 
     def definitions(self) -> dict[str, Any]:
         """Return the schemas to which those of `text` refer."""
-        found = {
+        schemas = {
             name: {"type": "string", "anyOf": [{"pattern": self._of(unit)}, {"$ref": f"#/definitions/{_UNKNOWN}"}]}
             for name, unit in self._used.items()
         }
-        return {_UNKNOWN: {"not": {"pattern": _whole([*self._patterns.values(), _WRONG])}}} | found
+        return {_UNKNOWN: {"not": {"pattern": _whole([*self._patterns.values(), _WRONG])}}} | schemas
 
     def _of(self, unit: Unit) -> str:
         return _whole(
-            pattern
-            for known, pattern in self._patterns.items()
-            if same_dimension(known, unit) and not counts_turns(known, unit)
+            pattern for u, pattern in self._patterns.items() if same_dimension(u, unit) and not counts_turns(u, unit)
         )
 
 
@@ -73,7 +71,7 @@ def _pattern(unit: Unit) -> str:
 
 def _factor(name: str, power: Exponent) -> str:
     names = _alike(ATOMS[name].exponents) if name in ATOMS else (name,)
-    alternatives = "|".join(re.escape(one) if one == "%" else one for one in names)
+    alternatives = "|".join(re.escape(n) if n == "%" else n for n in names)
     spelled = "" if power == 1 else rf"\^?{power}" if isinstance(power, int) else re.escape(f"^({power})")
     return f"({alternatives}){spelled}"
 

@@ -50,8 +50,8 @@ class Lines:
 
     def line(self, number: int) -> Source:
         """Return a line as a place, with its text."""
-        known = 0 < number <= len(self.text)
-        return Source(self.file, number, _shortened(self.text[number - 1].strip()) if known else "")
+        exists = 0 < number <= len(self.text)
+        return Source(self.file, number, _shortened(self.text[number - 1].strip()) if exists else "")
 
     def add(self, path: Path, number: int, *, table: bool = False) -> None:
         """Store a key.

@@ -192,7 +192,11 @@ class _Task:
         values = {key: value for key, value in table.items() if key not in ("is", "count")}
         kind, folder, number = table["is"], Path(self.document.lines.file).parent, table.get("count", 1)
         if kind == FMU_PART:
-            raise _among_equations(name)
+            raise NetlistError(
+                f"{name} is an FMU, which cannot be part of a system of equations.",
+                why="An FMU computes its outputs in its own steps, and its equations are not known.",
+                advice="Run the netlist as a co-simulation: cosim(…) or `modelica-like cosim`.",
+            )
         if is_modelica(kind):
             part = self._copied(_modelica(folder / kind), number)
         elif kind.endswith(".toml"):
@@ -233,14 +237,6 @@ class _Task:
 def is_modelica(path: str | Path) -> bool:
     """Tell whether a path names a Modelica text, or a class in one: `drive.mo`, `drive.mo:Rotor`."""
     return str(path).endswith(".mo") or ".mo:" in str(path)
-
-
-def _among_equations(name: str) -> NetlistError:
-    return NetlistError(
-        f"{name} is an FMU, which cannot be part of a system of equations.",
-        why="An FMU computes its outputs in its own steps, and its equations are not known.",
-        advice="Run the netlist as a co-simulation: cosim(…) or `modelica-like cosim`.",
-    )
 
 
 def new_component(kind: type[Component], values: dict[str, Any]) -> Component:

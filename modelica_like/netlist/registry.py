@@ -33,8 +33,8 @@ def library_types() -> Mapping[str, type[Component]]:
     Raises:
         NetlistError: a library cannot be imported, or two libraries have a type with the same name.
     """
-    found = {name: kind for name in _libraries() if (kind := _library_type(name)) is not None}
-    return MappingProxyType(dict(sorted(found.items())))
+    types = {name: kind for name in _libraries() if (kind := _library_type(name)) is not None}
+    return MappingProxyType(dict(sorted(types.items())))
 
 
 @lru_cache(maxsize=1)
@@ -169,9 +169,9 @@ def _class_of_module(name: str, folder: Path) -> type[Component]:
     module = _named_module(module_name, folder.resolve())
     kind = vars(module).get(class_name)
     if kind is None:
-        known = [key for key, value in vars(module).items() if isinstance(value, type) and issubclass(value, Component)]
+        names = [key for key, value in vars(module).items() if isinstance(value, type) and issubclass(value, Component)]
         raise UnknownName(
-            f"Module {module_name} has no component '{class_name}'{did_you_mean(class_name, known) or '.'}"
+            f"Module {module_name} has no component '{class_name}'{did_you_mean(class_name, names) or '.'}"
         )
     if not (isinstance(kind, type) and issubclass(kind, Component)):
         raise NetlistError(f"'{name}' is not a component class.")
@@ -222,10 +222,10 @@ def _own_module(name: str, folder: Path, spec: ModuleSpec) -> ModuleType:
 
 
 def _check_home(top: str, folder: Path) -> None:
-    known = sys.modules.get(top)
-    if known is not None and Path(_place(known)).resolve().parent not in (folder, folder / top):
+    module = sys.modules.get(top)
+    if module is not None and Path(_place(module)).resolve().parent not in (folder, folder / top):
         raise NetlistError(
-            f"The module '{top}' of '{folder}' cannot be used: '{_place(known)}' is loaded under this name.",
+            f"The module '{top}' of '{folder}' cannot be used: '{_place(module)}' is loaded under this name.",
             advice="Rename one of the two.",
         )
 

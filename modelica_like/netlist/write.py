@@ -89,21 +89,21 @@ class _Writer:
     def entry(self, path: str, part: Component) -> dict[str, Any]:
         """Return the table of one part: its type, and the differences from a new one of that type."""
         if isinstance(part, Assembly):
-            return {"is": self.file_of(part), **self.changes(path, part, load(part.__dict__["_origin"]))}
+            origin = part.__dict__["_origin"]
+            if not origin:
+                raise NetlistError(
+                    f"{part.label} is an assembly without a file, so a netlist cannot name it.",
+                    advice="Save it to a separate file, load that file, and use it as the part.",
+                )
+            relative = Path(os.path.relpath(origin, self.folder.resolve())).as_posix()
+            return {
+                "is": (relative if relative.startswith(".") else f"./{relative}"),
+                **self.changes(path, part, load(part.__dict__["_origin"])),
+            }
         structural = {key: plain(part._given_tables.get(key, part.__dict__[key])) for key in part._structural}
         reference = new_component(type(part), dict(structural))
         different = {key: value for key, value in structural.items() if frozen_rows(value) != part._structural[key]}
         return {"is": type_name(type(part)), **different, **self.changes(path, part, reference)}
-
-    def file_of(self, assembly: Assembly) -> str:
-        origin = assembly.__dict__["_origin"]
-        if not origin:
-            raise NetlistError(
-                f"{assembly.label} is an assembly without a file, so a netlist cannot name it.",
-                advice="Save it to a separate file, load that file, and use it as the part.",
-            )
-        relative = Path(os.path.relpath(origin, self.folder.resolve())).as_posix()
-        return relative if relative.startswith(".") else f"./{relative}"
 
     def changes(self, path: str, part: Component, reference: Component) -> dict[str, Any]:
         """Return the values that differ from those of `reference`; start values go to their sections."""
@@ -117,11 +117,11 @@ class _Writer:
         for name in part.modes:
             if part.start_mode(name) != reference.start_mode(name):
                 self.start[f"{path}.{name}"] = part.start_mode(name)
-        known = reference.parts
+        parts = reference.parts
         for name, inner in part.parts.items():
-            if type(inner) is not type(known[name]):
+            if type(inner) is not type(parts[name]):
                 table[name] = self.entry(f"{path}.{name}", inner)
-            elif change := self.changes(f"{path}.{name}", inner, known[name]):
+            elif change := self.changes(f"{path}.{name}", inner, parts[name]):
                 table[name] = change
         return table
 

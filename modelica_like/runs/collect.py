@@ -50,12 +50,12 @@ class Collector:
 
     def __init__(self, model: CompiledDae, outputs: Sequence[Output], atol: float) -> None:
         self._model, self.outputs = model, list(outputs)
-        self._parts = [one.parts(model) for one in outputs]
+        self._parts = [output.parts(model) for output in outputs]
         self._every = [part for parts in self._parts for part in parts]
         self._along = [k for k, part in enumerate(self._every) if part.kind not in ("change", "impact")]
         self._between = [k for k in self._along if self._every[k].kind in ("integral", "max", "first")]
         self._curves, self._fits = (self._curves_of(numbers, atol) for numbers in (self._along, self._between))
-        self._values = np.array([0.0 if one.kind in ("integral", "impact") else np.nan for one in self._every])
+        self._values = np.array([0.0 if part.kind in ("integral", "impact") else np.nan for part in self._every])
         self._times = np.full(len(self._every), np.nan)
 
     @property
@@ -65,8 +65,8 @@ class Collector:
 
     def _curves_of(self, numbers: Sequence[int], atol: float) -> Curves:
         parts = [self._every[k] for k in numbers]
-        key = tuple((one.text, one.form, one.change) for one in parts)
-        return Curves(self._model, key, lambda: [ca.SX(one.expression(self._model)) for one in parts], atol)
+        key = tuple((part.text, part.form, part.change) for part in parts)
+        return Curves(self._model, key, lambda: [ca.SX(part.expression(self._model)) for part in parts], atol)
 
     def feed(self, dense: Dense) -> None:
         """Read stretches that follow those before."""
@@ -74,7 +74,11 @@ class Collector:
             return
         for row, k in enumerate(self._along):
             if self._every[k].kind == "at":
-                self._read_at(dense, k, row, self._every[k].moment)
+                piece = int(np.searchsorted(dense.begins, self._every[k].moment, side="right")) - 1
+                if piece >= 0 and self._every[k].moment <= dense.ends[piece]:
+                    pieces, times = np.array([piece]), np.array([self._every[k].moment])
+                    x, z = dense.points(pieces, times)
+                    self._values[k] = self._curves.at(times, x, z, dense.d[:, pieces])[row, 0]
         if not self._between:
             return
         fitted = self._fits.fitted(dense)
@@ -89,17 +93,10 @@ class Collector:
                 self._values[k] = fitted.first(row)
 
     def _take(self, k: int, value: float, time: float) -> None:
-        known = self._values[k]
-        if not value <= known + SAME * abs(known):
+        previous = self._values[k]
+        if not value <= previous + SAME * abs(previous):
             self._times[k] = time
-        self._values[k] = np.fmax(known, value)
-
-    def _read_at(self, dense: Dense, k: int, row: int, moment: float) -> None:
-        piece = int(np.searchsorted(dense.begins, moment, side="right")) - 1
-        if piece >= 0 and moment <= dense.ends[piece]:
-            pieces, times = np.array([piece]), np.array([moment])
-            x, z = dense.points(pieces, times)
-            self._values[k] = self._curves.at(times, x, z, dense.d[:, pieces])[row, 0]
+        self._values[k] = np.fmax(previous, value)
 
     def finish(self, record: Recorder | Solution) -> list[Number]:
         """Return the numbers, with both sides of every event of the run and with its end."""
@@ -108,13 +105,13 @@ class Collector:
             self._read_ends(segments)
         for k, part in enumerate(self._every):
             if part.kind == "impact":
-                self._values[k] = sum(one.energy for one in record.impacts if part.text in ("", one.component))
+                self._values[k] = sum(impact.energy for impact in record.impacts if part.text in ("", impact.component))
             elif part.kind == "change":
                 self._values[k] = self._change(record, part)
         span, first = float(segments[-1].times[-1] - segments[0].times[0]), 0
         numbers: list[Number] = []
         for output, parts in zip(self.outputs, self._parts, strict=True):
-            values, times = (one[first : first + len(parts)] for one in (self._values, self._times))
+            values, times = (x[first : first + len(parts)] for x in (self._values, self._times))
             best = int(np.argmax(values)) if output.kind == "peak" else 0
             number = Number(output.combined(values, span))
             number.name, number.unit, number.time = output.name, str(output.unit), float(times[best])
@@ -124,10 +121,10 @@ class Collector:
         return numbers
 
     def _read_ends(self, segments: Sequence[Segment]) -> None:
-        places = [(one, k) for one in segments for k in (0, -1)]
-        times = np.array([one.times[k] for one, k in places])
-        x, z = (np.array([getattr(one, name)[:, k] for one, k in places]).T for name in "xz")
-        values = self._curves.at(times, x, z, np.array([one.d for one, _ in places]).T)
+        places = [(segment, k) for segment in segments for k in (0, -1)]
+        times = np.array([piece.times[k] for piece, k in places])
+        x, z = (np.array([getattr(piece, name)[:, k] for piece, k in places]).T for name in "xz")
+        values = self._curves.at(times, x, z, np.array([piece.d for piece, _ in places]).T)
         latest = times[-1] + _SAME_END * (times[-1] - times[0])
         for row, k in enumerate(self._along):
             part = self._every[k]
@@ -142,14 +139,14 @@ class Collector:
     def _change(self, record: Recorder | Solution, part: Part) -> float:
         before, after, number = part.change
         names = self._model.flat_discretes[self._model.discrete_position[part.text]].names
-        found = [
-            one.time
-            for one in record.events
-            if one.mode == part.text
-            and (before < 0 or one.before == names[before])
-            and (after < 0 or one.after == names[after])
+        times = [
+            event.time
+            for event in record.events
+            if event.mode == part.text
+            and (before < 0 or event.before == names[before])
+            and (after < 0 or event.after == names[after])
         ]
-        return found[number - 1] if len(found) >= number else np.nan
+        return times[number - 1] if len(times) >= number else np.nan
 
 
 def collector(model: CompiledDae, names: Sequence[str], atol: float) -> Collector:

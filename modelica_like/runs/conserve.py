@@ -82,8 +82,8 @@ def conserving(run: Solution, repeat: Callable[[Options], Solution]) -> Solution
         run = repeat(replace(run.options, max_step=step))
         left = find_astray(run)
         if left is None:
-            told = f"{first.told}: the run was repeated with steps of at most {step:.3g} s."
-            return replace(run, notices=(*run.notices, told), _cache={})
+            notice = f"{first.told}: the run was repeated with steps of at most {step:.3g} s."
+            return replace(run, notices=(*run.notices, notice), _cache={})
         astray = left
     error = EnergyDrift(
         f"{astray.told}, also with steps of at most {step:.3g} s.",
@@ -113,7 +113,7 @@ def find_astray(run: Solution) -> Astray | None:
             return None
     places = _Places(run)
     wrong = (places.wrong(k) for k in sorted(suspects.tolist(), key=lambda k: -abs(drifts[k])))
-    return next((one for one in wrong if one is not None), None)
+    return next((name for name in wrong if name is not None), None)
 
 
 def _drifts(
@@ -139,7 +139,7 @@ class _Places:
 
     def wrong(self, component: int) -> Astray | None:
         """Find two neighbouring results with the largest drift, by halves; None if the tolerances explain it."""
-        low, high = 0, sum(len(one.times) - 1 for one in self.run.segments)
+        low, high = 0, sum(len(segment.times) - 1 for segment in self.run.segments)
         while high - low > 1:
             middle = (low + high) // 2
             halves = (low, middle), (middle, high)
@@ -162,12 +162,12 @@ class _Places:
 
 def _between(segments: Sequence[Segment], low: int, high: int) -> Iterator[Segment]:
     """Yield the part of a run from interval `low` to `high`, which is not included."""
-    counts = [len(one.times) - 1 for one in segments]
-    for one, first, count in zip(segments, accumulate(counts, initial=0), counts, strict=False):
+    counts = [len(s.times) - 1 for s in segments]
+    for segment, first, count in zip(segments, accumulate(counts, initial=0), counts, strict=False):
         begin, end = max(low - first, 0), min(high - first, count)
         if begin < end:
             part = slice(begin, end + 1)
-            yield Segment(one.times[part], one.x[:, part], one.z[:, part], one.d)
+            yield Segment(segment.times[part], segment.x[:, part], segment.z[:, part], segment.d)
 
 
 def _allowed(run: Solution, segments: Sequence[Segment]) -> Vector:
@@ -176,10 +176,10 @@ def _allowed(run: Solution, segments: Sequence[Segment]) -> Vector:
     Returns:
         Of every component, shape (components,).
     """
-    intervals = max(sum(len(one.times) - 1 for one in run.segments), 1)
+    intervals = max(sum(len(segment.times) - 1 for segment in run.segments), 1)
     some = segments[:: -(-len(segments) // _PIECES)]
-    points = [(one, k) for one in some for k in {0, len(one.times) // 2, len(one.times) - 1}]
-    worst = np.max([_tolerated(run, *one) for one in points], axis=0)
+    points = [(segment, k) for segment in some for k in {0, len(segment.times) // 2, len(segment.times) - 1}]
+    worst = np.max([_tolerated(run, *point) for point in points], axis=0)
     return _WRONG * worst * max(1.0, run.statistics.steps / intervals / _STEPS)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,6 @@ import numpy as np
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import UnknownName, ValueOutOfRange
 from modelica_like.runs.display import Display
-from modelica_like.runs.ranges import ranges
 from modelica_like.runs.trajectories import Trajectories, fitting
 from modelica_like.solve.recorder import Event
 from modelica_like.style import COLOURS, picture, text_width, with_unit
@@ -19,6 +18,7 @@ from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 
 _Rows = np.ndarray[Any, np.dtype[np.intp]]
 _Marks = np.ndarray[Any, np.dtype[np.bool_]]
@@ -123,10 +123,12 @@ class Curves(Shown):
         ours, theirs = (run.together(*names) for run in (self.first, self.second))
         # After the events at the start: what writes a table may leave out the values before.
         k, n = (int(np.searchsorted(run.time, run.time[0], "right")) - 1 for run in (self.first, self.second))
-        found = (StartDifference(r.signal, r.unit, float(ours[r.signal][k]), float(theirs[r.signal][n])) for r in rows)
+        differences = (
+            StartDifference(r.signal, r.unit, float(ours[r.signal][k]), float(theirs[r.signal][n])) for r in rows
+        )
         scales = (row.largest / row.relative for row in rows)
         return tuple(
-            one for one, scale in zip(found, scales, strict=True) if abs(one.second - one.first) > _SAME_START * scale
+            d for d, scale in zip(differences, scales, strict=True) if abs(d.second - d.first) > _SAME_START * scale
         )
 
     def __getitem__(self, signal: str) -> Deviation:
@@ -189,7 +191,13 @@ def compare_solutions(
     """
     if min(first.time[-1], second.time[-1]) <= max(first.time[0], second.time[0]):
         raise ValueOutOfRange(f"{' and '.join(labels)} have no time in common.")
-    names = _signals(first, second, labels, signals)
+    common = [name for name in first.names if name in first.model.position and name in second.model.position]
+    if not common:
+        raise UnknownName(
+            f"{' and '.join(labels)} have no signal in common.",
+            advice="Signals are compared by their names, such as clutch.tau.",
+        )
+    names = fitting(common, signals, "They have no common signal") or common
     events = tuple(_match_events(first, second))
     grid = _Grid.of(first, second, events)
     scales = ranges(first, names, least)
@@ -198,21 +206,11 @@ def compare_solutions(
     return Curves(first, second, ordered, events, labels, grid.interpolated)
 
 
-def _signals(first: Trajectories, second: Trajectories, labels: tuple[str, str], patterns: Sequence[str]) -> list[str]:
-    common = [name for name in first.names if name in first.model.position and name in second.model.position]
-    if not common:
-        raise UnknownName(
-            f"{' and '.join(labels)} have no signal in common.",
-            advice="Signals are compared by their names, such as clutch.tau.",
-        )
-    return fitting(common, patterns, "They have no common signal") or common
-
-
-def _instants(events: Sequence[Event], start: float, known: set[str]) -> dict[str, list[tuple[float, str]]]:
+def _instants(events: Sequence[Event], start: float, modes: set[str]) -> dict[str, list[tuple[float, str]]]:
     """Return time and last mode of every instant after the start, by mode."""
     by_mode: dict[str, list[tuple[float, str]]] = {}
     for event in events:
-        if event.mode in known and event.time > start + _SAME_INSTANT:
+        if event.mode in modes and event.time > start + _SAME_INSTANT:
             instants = by_mode.setdefault(event.mode, [])
             if instants and event.time - instants[-1][0] < _SAME_INSTANT:
                 instants.pop()
@@ -222,22 +220,22 @@ def _instants(events: Sequence[Event], start: float, known: set[str]) -> dict[st
 
 def _match_events(first: Trajectories, second: Trajectories) -> list[EventDifference]:
     """Pair the changes of each mode that both have, in their order."""
-    known = set(first.model.discrete_position) & set(second.model.discrete_position)
-    ours, theirs = (_instants(run.events, float(run.time[0]), known) for run in (first, second))
-    found: list[EventDifference] = []
+    modes = set(first.model.discrete_position) & set(second.model.discrete_position)
+    ours, theirs = (_instants(run.events, float(run.time[0]), modes) for run in (first, second))
+    differences: list[EventDifference] = []
     for mode in {**ours, **theirs}:
         left, right = list(ours.get(mode, ())), list(theirs.get(mode, ()))
         while left or right:
             if left and right and left[0][1] == right[0][1]:
                 (t, after), (u, _) = left.pop(0), right.pop(0)
-                found.append(EventDifference(mode, after, t, u))
+                differences.append(EventDifference(mode, after, t, u))
             elif left and (not right or left[0][0] <= right[0][0]):
                 t, after = left.pop(0)
-                found.append(EventDifference(mode, after, t, None))
+                differences.append(EventDifference(mode, after, t, None))
             else:
                 u, after = right.pop(0)
-                found.append(EventDifference(mode, after, None, u))
-    return sorted(found, key=lambda event: min(t for t in (event.first, event.second) if t is not None))
+                differences.append(EventDifference(mode, after, None, u))
+    return sorted(differences, key=lambda event: min(t for t in (event.first, event.second) if t is not None))
 
 
 @dataclass(frozen=True)
@@ -297,3 +295,25 @@ def _deviation(first: Trajectories, second: Trajectories, name: str, grid: _Grid
     k = int(np.argmax(difference))
     largest = float(difference[k])
     return Deviation(name, first.unit_of(name), largest, largest / scale, float(grid.times[k]))
+
+
+_NOISE = 1e-6
+
+
+def ranges(solution: Trajectories, names: Iterable[str], least: float = _NOISE) -> dict[str, float]:
+    """Return the range of each signal, largest minus smallest value.
+
+    The slip of a stuck clutch is rounding noise without a range. So the range is at least a share of the largest value
+    among the signals of its unit.
+
+    Args:
+        solution: the run.
+        names: signals.
+        least: that share.
+    """
+    spans = {name: float(np.ptp(solution[name])) for name in names}
+    largest: dict[str, float] = {}
+    for name in spans:
+        unit = solution.unit_of(name)
+        largest[unit] = max(largest.get(unit, 0.0), float(np.abs(solution[name]).max()))
+    return {name: max(span, least * largest[solution.unit_of(name)]) or 1.0 for name, span in spans.items()}

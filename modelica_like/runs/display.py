@@ -32,8 +32,8 @@ class Display:
     """
 
     def __init__(self, model: Any, chosen: Mapping[str, str] | None = None) -> None:
-        self._own = {one.path: str(one.unit) for one in (*model.flat_variables, *model.flat_discretes)}
-        self._differences = {one.path for one in model.flat_variables if getattr(one, "difference", False)}
+        self._own = {variable.path: str(variable.unit) for variable in (*model.flat_variables, *model.flat_discretes)}
+        self._differences = {v.path for v in model.flat_variables if getattr(v, "difference", False)}
         wanted = {**getattr(model, "settings", {}).get("display", {}), **(chosen or {})}
         self._quantities: dict[str, str] = {}
         self._paths: dict[str, str] = {}
@@ -47,8 +47,8 @@ class Display:
                 continue
             fitting = [path for path in self._own if path == key or fnmatchcase(path, key)]
             if not fitting:
-                known = [*self._own, *QUANTITIES.values()]
-                near = did_you_mean(key, known) or "."
+                quantities = [*self._own, *QUANTITIES.values()]
+                near = did_you_mean(key, quantities) or "."
                 raise UnknownName(f"{model.name} has no variable or quantity '{key}' to show in {text}{near}")
             if key in self._own:
                 _check(key, self._own[key], unit)
@@ -71,11 +71,11 @@ class Display:
         """Convert values of a variable from SI units to its shown unit."""
         return self.converted(values, self._own[path], self.of(path))
 
-    def converted(self, values: Any, own: str, shown: str) -> Any:
+    def converted(self, values: Any, unit: str, shown: str) -> Any:
         """Return values in another unit."""
-        if own == shown:
+        if unit == shown:
             return values
-        here, there = parse_unit(own), parse_unit(shown)
+        here, there = parse_unit(unit), parse_unit(shown)
         return (values * here.factor + here.offset - there.offset) / there.factor
 
     def quantity(self, path: str) -> str:
@@ -83,13 +83,13 @@ class Display:
         return QUANTITIES.get(self._own[path], "value")
 
 
-def _fits(own: str, unit: Unit) -> bool:
+def _fits(si_unit: str, unit: Unit) -> bool:
     try:
-        return same_dimension(parse_unit(own), unit) and own not in ("1", "*")
+        return same_dimension(parse_unit(si_unit), unit) and si_unit not in ("1", "*")
     except UnitError:  # unit names of other FMUs
         return False
 
 
-def _check(key: str, own: str, unit: Unit) -> None:
-    if not _fits(own, unit):
-        raise UnitError(f"{key} is in {own}: it cannot be shown in {unit}.")
+def _check(key: str, si_unit: str, unit: Unit) -> None:
+    if not _fits(si_unit, unit):
+        raise UnitError(f"{key} is in {si_unit}: it cannot be shown in {unit}.")

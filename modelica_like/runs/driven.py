@@ -89,10 +89,10 @@ def _rows(drive: Assembly, path: str, times: Any, values: Any, unit: str) -> lis
     owner, _, name = path.rpartition(".")
     fields = drive.find(owner).fields if owner == "" or _has(drive, owner) else {}
     if not isinstance(fields.get(name), Input):
-        known = [f"{one.path}.{key}".lstrip(".") for one in drive.walk() for key, field in one.fields.items()
+        paths = [f"{node.path}.{key}".lstrip(".") for node in drive.walk() for key, field in node.fields.items()
                  if isinstance(field, Input)]  # fmt: skip
-        raise UnknownName(f"{drive.label} has no input '{path}'{did_you_mean(path, known) or '.'}")
-    own = fields[name].unit
+        raise UnknownName(f"{drive.label} has no input '{path}'{did_you_mean(path, paths) or '.'}")
+    si_unit = fields[name].unit
     try:
         moments = [float(t) for t in times]
     except (TypeError, ValueError):
@@ -103,12 +103,9 @@ def _rows(drive: Assembly, path: str, times: Any, values: Any, unit: str) -> lis
         raise ValueOutOfRange(
             f"The times of the input '{path}' do not rise.", advice="For a jump, write two times close to each other."
         )
-    numbers = [to_si(f"{float(one)!r} {unit}" if unit else _plain(one), own, path) for one in values]
+    plain = [value.item() if isinstance(value, np.generic) else value for value in values]
+    numbers = [to_si(f"{float(value)!r} {unit}" if unit else value, si_unit, path) for value in plain]
     return [list(row) for row in zip(moments, numbers, strict=True)]
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def _has(drive: Assembly, path: str) -> bool:
@@ -134,5 +131,5 @@ def _drive(drive: Assembly, path: str, rows: list[list[float]]) -> None:
     label = f"{inner}_over_time".translate(str.maketrans(".[", "__", "]"))
     setattr(drive, label, find_type("Table")(table=rows, scale=scale))
     drive.__dict__["_own_connectors"] = tuple(pair for pair in drive.exposed if pair[0] != path)
-    drive.__dict__["_own_fields"] = {key: one for key, one in drive._own_fields.items() if key != path}
+    drive.__dict__["_own_fields"] = {key: field for key, field in drive._own_fields.items() if key != path}
     drive.__dict__["_wires"] = {**drive.wires, label: (f"{label}.y", inner)}

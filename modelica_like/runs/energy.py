@@ -161,26 +161,26 @@ class EnergyBalance(Shown):
     @property
     def notices(self) -> tuple[str, ...]:
         """Messages about errors: powers that do not balance, negative losses, energies that drift."""
-        told: list[str] = []
+        notes: list[str] = []
         for row in self.rows:
             name = row.component or "The model itself"
             if row.imbalance:
-                told.append(
+                notes.append(
                     f"{name} does not balance at {row.imbalance_time:.9g} s: power in, source, loss and rate of the "
                     f"stored energy differ by {row.imbalance:.2g} of its largest power."
                 )
             if row.gain:
-                told.append(f"{name} has a negative loss, {-row.gain:.6g} W at {row.gain_time:.9g} s.")
+                notes.append(f"{name} has a negative loss, {-row.gain:.6g} W at {row.gain_time:.9g} s.")
         if self.at_events > _ROUNDING * self.throughput:
-            told.append(f"At an event {self.at_events:.6g} J appear or vanish without an impact or a reset.")
+            notes.append(f"At an event {self.at_events:.6g} J appear or vanish without an impact or a reset.")
         if self.tolerance and self.drift > _ADDED_UP * self.tolerance:
             worst = max(self.rows, key=lambda row: abs(row.drift))
-            told.append(
+            notes.append(
                 f"The stored energy of {worst.component or 'the model itself'} drifts by {worst.drift:.2g} J, "
                 f"{self.drift / self.tolerance:.2g} times the run's relative tolerance: errors of the integrator's "
                 f"steps add up. Smaller tolerances (rtol, atol) lower them."
             )
-        return tuple(told)
+        return tuple(notes)
 
     @property
     def drift(self) -> float:
@@ -248,10 +248,10 @@ def energy_balance(
     rows = tuple(map(EnergyRow, model.components, *(column.tolist() for column in columns)))
     exchanged = (inflow, source + work, lost + impact)
     throughput = max([powers.stored, powers.cancelled, *(float(np.sum(np.abs(part))) for part in exchanged)])
-    resets = {number for number, one in enumerate(model.transitions) if one.resets}
+    resets = {number for number, transition in enumerate(model.transitions) if transition.resets}
     reset = [event.time for event in events if event.transition in resets]
-    told = [(one.time, one.energy - float(np.sum(work))) for one, work in zip(impacts, given, strict=True)]
-    at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, told)
+    unexplained = [(hit.time, hit.energy - float(np.sum(work))) for hit, work in zip(impacts, given, strict=True)]
+    at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, unexplained)
     return EnergyBalance(rows, throughput, at_events, options.rtol)
 
 
@@ -308,7 +308,7 @@ def _is_rounding(model: CompiledDae, point: Point, component: int) -> bool:
     It is where it changes as much as it is large when the last digits of all numbers change; what a wrong law leaves
     hardly changes.
     """
-    digits, found = np.random.default_rng(0), list[float]()
+    digits, sums = np.random.default_rng(0), list[float]()
 
     def moved(numbers: Vector) -> Vector:
         return numbers * (1.0 + _LAST_DIGITS * digits.uniform(-1.0, 1.0, len(numbers)))
@@ -319,8 +319,8 @@ def _is_rounding(model: CompiledDae, point: Point, component: int) -> bool:
         _, lost, source, inflow, rate, _ = call(twin, twin.energy, near).reshape(-1, len(model.components))[
             :, component
         ]
-        found.append(float(inflow + source - lost - rate))
-    return bool(np.ptp(found) > 0.5 * np.max(np.abs(found)))
+        sums.append(float(inflow + source - lost - rate))
+    return bool(np.ptp(sums) > 0.5 * np.max(np.abs(sums)))
 
 
 def _impacts(
@@ -338,17 +338,19 @@ def _impacts(
     """
     struck, given = np.zeros((2, len(impacts), len(stored)))
     at_start: Vector | None = None
-    for lost, work, one in zip(struck, given, impacts, strict=True):
-        lost[model.components.index(one.component)] = one.energy
-        if one.trials:
-            before, after = (call(model, model.energy, point).reshape(-1, len(stored)) for point in one.trials)
+    for lost, work, impact in zip(struck, given, impacts, strict=True):
+        lost[model.components.index(impact.component)] = impact.energy
+        if impact.trials:
+            before, after = (call(model, model.energy, point).reshape(-1, len(stored)) for point in impact.trials)
             work[:] = INSTANT * (after[2] - before[2])
-            if at_start is None and one.time == start:
+            if at_start is None and impact.time == start:
                 at_start = stored - before[0]
     return struck, given, np.zeros(len(stored)) if at_start is None else at_start
 
 
-def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], told: Sequence[tuple[float, float]]) -> float:
+def _unexplained(
+    times: Vector, jumps: Vector, reset: Sequence[float], unexplained: Sequence[tuple[float, float]]
+) -> float:
     """Return the largest unexplained change of all stored energies together at an instant, in J."""
     left: dict[float, float] = {}
     for time, jump in zip(times.tolist(), jumps.tolist(), strict=True):
@@ -360,7 +362,7 @@ def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], told: Seq
         k = bisect_left(instants, time - near)
         return instants[k] if k < len(instants) and instants[k] <= time + near else None
 
-    for time, lost in told:
+    for time, lost in unexplained:
         if (instant := at(time)) is not None:
             left[instant] += lost
     for time in reset:

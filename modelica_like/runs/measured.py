@@ -24,8 +24,8 @@ _SEPARATOR = re.compile(r"\Asep=(.)\r?\n")
 
 def title_and_unit(title: str) -> tuple[str, str]:
     """Return name and unit of a column: `motor.w [rpm]`; without a unit that is empty."""
-    found = _WITH_UNIT.fullmatch(title.strip().strip('"'))
-    return (found[1], found[2].strip()) if found else (title.strip().strip('"'), "")
+    match = _WITH_UNIT.fullmatch(title.strip().strip('"'))
+    return (match[1], match[2].strip()) if match else (title.strip().strip('"'), "")
 
 
 def read_columns(path: Path) -> dict[str, tuple[Vector, str]]:
@@ -40,7 +40,8 @@ def read_columns(path: Path) -> dict[str, tuple[Vector, str]]:
     """
     text = _text(path)
     said = _SEPARATOR.match(text)
-    separator = said[1] if said else next((one for one in ";\t" if one in _line_of_names(text)), ",")
+    head = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+    separator = said[1] if said else next((mark for mark in ";\t" if mark in head), ",")
     before = 1 if said else 0
     reader = csv.reader(io.StringIO(text[said.end() if said else 0 :], newline=""), delimiter=separator)
     try:
@@ -52,7 +53,7 @@ def read_columns(path: Path) -> dict[str, tuple[Vector, str]]:
     rows = [(line, _trimmed(row, len(titles))) for line, row in rows]
     if len(rows) > 1 and len(rows[1][1]) == len(titles) and _number(rows[1][1][0]) is None:
         units = [unit.strip() for unit in rows.pop(1)[1]]
-        titles = [(name, unit or own) for (name, unit), own in zip(titles, units, strict=True)]
+        titles = [(name, unit or unit_text) for (name, unit), unit_text in zip(titles, units, strict=True)]
     if len(rows) < 2 or _number(titles[0][0]) is not None:
         raise NetlistError(f"{path.name} is not a table: it needs a line of names, and lines of numbers.")
     names = [name for name, _ in titles]
@@ -107,10 +108,6 @@ def _text(path: Path) -> str:
         if "\0" not in text:
             return text
     raise NetlistError(f"{path.name} is not a text: a table is UTF-8, UTF-16 or Windows-1252.")
-
-
-def _line_of_names(text: str) -> str:
-    return next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
 
 
 def _trimmed(row: list[str], least: int) -> list[str]:

@@ -78,9 +78,9 @@ class Fitted:
         near = np.flatnonzero(tops + _RISE * np.ptp(grid, axis=1) >= best)
         same = best - SAME * abs(best)
         near = near[np.argsort(-np.minimum(tops[near], same), kind="stable")][:_CANDIDATES]
-        found = [self._top(row, piece, grid[piece]) for piece in near.tolist()]
-        best = max(value for value, _ in found)
-        return best, min(time for value, time in found if value >= best - SAME * abs(best))
+        peaks = [self._top(row, piece, grid[piece]) for piece in near.tolist()]
+        best = max(value for value, _ in peaks)
+        return best, min(time for value, time in peaks if value >= best - SAME * abs(best))
 
     def _top(self, row: int, piece: int, grid: Vector) -> tuple[float, float]:
         same = SAME * float(np.abs(grid).max())
@@ -94,16 +94,16 @@ class Fitted:
     def turning(self, row: int) -> Vector:
         """Return the values of an expression at its turning points and at the ends of pieces, in order."""
         grid = self._grid(row)
-        found: list[float] = []
+        places: list[float] = []
         for piece, line in enumerate(grid):
             rises = np.diff(line)
-            found.append(float(line[0]))
+            places.append(float(line[0]))
             for k in np.flatnonzero(rises[:-1] * rises[1:] < 0) + 1:
                 series = _TO_SERIES @ self.values[row, piece] * np.sign(rises[k - 1])
                 place = _climbed(series, _GRID[k - 1], _GRID[k], _GRID[k + 1])
-                found.append(float(np.sign(rises[k - 1]) * legendre.legval(place, series)))
-            found.append(float(line[-1]))
-        return np.array(found)
+                places.append(float(np.sign(rises[k - 1]) * legendre.legval(place, series)))
+            places.append(float(line[-1]))
+        return np.array(places)
 
     def within(self, begin: float, end: float) -> Fitted:
         """Return what lies between two times in s."""
@@ -221,10 +221,10 @@ class Curves:
                 break
             middles = 0.5 * (begins + ends)[rough]
             begins, ends = _mixed(begins[rough], middles), _mixed(middles, ends[rough])
-            owner, before, stuck = (np.repeat(one[rough], 2) for one in (owner, excess, stuck))
-        begins, ends = (np.concatenate([one[k] for one in kept]) for k in (0, 1))
+            owner, before, stuck = (np.repeat(x[rough], 2) for x in (owner, excess, stuck))
+        begins, ends = (np.concatenate([x[k] for x in kept]) for k in (0, 1))
         order = np.argsort(begins, kind="stable")
-        return Fitted(begins[order], ends[order], np.concatenate([one[2] for one in kept], axis=1)[:, order])
+        return Fitted(begins[order], ends[order], np.concatenate([k[2] for k in kept], axis=1)[:, order])
 
     def _values(self, dense: Dense, owner: Any, begins: Vector, ends: Vector) -> Vector:
         times = begins[:, None] + 0.5 * (1.0 + NODES) * (ends - begins)[:, None]

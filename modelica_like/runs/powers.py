@@ -108,17 +108,17 @@ def _together(model: CompiledDae, segments: list[Segment]) -> Results:
     owner = np.repeat(np.arange(len(sizes)), sizes)
     # One array, so that the results whose last digits are changed stand at its end.
     some, whole = [0, count // 2, count - 1], np.empty((1 + nx + len(segments[0].z), count + 3))
-    for one, rows in (("times", 0), ("x", slice(1, 1 + nx)), ("z", slice(1 + nx, None))):
-        np.concatenate([getattr(segment, one) for segment in segments], axis=-1, out=whole[rows, :count])
+    for name, rows in (("times", 0), ("x", slice(1, 1 + nx)), ("z", slice(1 + nx, None))):
+        np.concatenate([getattr(segment, name) for segment in segments], axis=-1, out=whole[rows, :count])
     whole[:, count:] = whole[:, some]
     whole[1::2, count:] *= 1.0 + _DIGITS * _SIGNS
     whole[2::2, count:] *= 1.0 - _DIGITS * _SIGNS
     d = np.array([segment.d for segment in segments]).T[:, np.append(owner, owner[some])]
     function = model.along("energy terms", lambda: _terms(model))
-    found = function(whole[0], whole[1 : 1 + nx], whole[1 + nx :], model.p, model.u, d)[0]
-    found, whole = found.reshape(-1, len(model.components), count + 3), whole[:, :count]
-    terms, first, last = found[..., :count], (ends - sizes)[owner], (ends - 1)[owner]
-    shaken = np.abs(found[..., count:] - terms[..., some])
+    columns = function(whole[0], whole[1 : 1 + nx], whole[1 + nx :], model.p, model.u, d)[0]
+    columns, whole = columns.reshape(-1, len(model.components), count + 3), whole[:, :count]
+    terms, first, last = columns[..., :count], (ends - sizes)[owner], (ends - 1)[owner]
+    shaken = np.abs(columns[..., count:] - terms[..., some])
     return Results(whole[0], whole[1 : 1 + nx], whole[1 + nx :], d[:, :count], first, last, terms, shaken)
 
 
@@ -179,17 +179,15 @@ class Powers:
             weights[bent, :, :2] = _BESIDE * np.diff(every.times[ends[:, bent]], axis=0)[0][:, None, None]
             coarse = self._coarse(every.terms, ends, places, weights, bent, bends, depth)
         again, finer = self._again(every, ends, _stretches(coarse, first) if depth < _DEEPEST else [])
-        self._miss(every, ends, places, weights, coarse & ~again)
+        # What is unknown in intervals that remain too coarse.
+        missed = coarse & ~again
+        for k in missed.nonzero()[0]:
+            change = np.diff(every.terms[0][:, ends[:, k]])[:, 0]
+            self.unknown += np.abs(change - every.terms[POWERS][:, places[k]] @ weights[k, 0])
         weights[again] = 0.0
         total = _summed(powers, places, weights[:, 0]) + bends[0] @ ~again[bent]
         parts = (self.integrals(some, depth + 1) for some in results(self.model, finer))
         return sum(parts, total.reshape(POWERS, -1))
-
-    def _miss(self, every: Results, ends: Places, places: Places, weights: Vector, missed: Places) -> None:
-        """Note what is unknown in intervals that remain too coarse."""
-        for k in missed.nonzero()[0]:
-            change = np.diff(every.terms[0][:, ends[:, k]])[:, 0]
-            self.unknown += np.abs(change - every.terms[POWERS][:, places[k]] @ weights[k, 0])
 
     def _again(self, every: Results, ends: Places, stretches: list[Places]) -> tuple[Places, list[Segment]]:
         """Return the intervals with finer results, and these; a stretch lies within one smooth piece.
@@ -275,14 +273,16 @@ class Powers:
             for rule, more in zip((best, lower), bends, strict=True):
                 rule[:, bent] += _mixed(more.reshape(POWERS, terms.shape[1], -1))
         near, far = np.abs(best - lower), np.abs(lower - lowest)
-        known = np.maximum(*np.abs(stored[:, ends[1]] - stored[:, ends[0]] - best[2:]))
+        change = np.maximum(*np.abs(stored[:, ends[1]] - stored[:, ends[0]] - best[2:]))
         smooth = np.maximum(*near[2:])
-        gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(known, smooth))
-        errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(known, smooth))
+        gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(change, smooth))
+        errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(change, smooth))
         allowed = self.options.rtol * max(self.moved, self.cancelled)
         # A weight that exactly balances a motion leaves nothing but rounding, which no finer result makes smaller.
         noise = self._noise[0] + self._noise[1] * np.abs(weights[:, 0].sum(axis=1))
-        return ~((errors <= np.maximum(self._share * allowed, noise)) & (known <= np.maximum(_ASTRAY * allowed, noise)))
+        return ~(
+            (errors <= np.maximum(self._share * allowed, noise)) & (change <= np.maximum(_ASTRAY * allowed, noise))
+        )
 
 
 def _summed(powers: Vector, places: Places, weights: Vector) -> Vector:

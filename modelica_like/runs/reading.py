@@ -77,7 +77,7 @@ class _Expressions:
 
     def __init__(self, model: CompiledDae, results: Any) -> None:
         self._needed: list[list[int]] = [[] for _ in model.arguments]
-        for number, row in sorted(model.symbol_places[one.element_hash()] for one in ca.symvar(results)):
+        for number, row in sorted(model.symbol_places[symbol.element_hash()] for symbol in ca.symvar(results)):
             self._needed[number].append(row)
         given = zip(model.arguments.values(), self._needed, strict=True)
         arguments = [argument[rows] if rows else ca.SX(0, 1) for argument, rows in given]

@@ -124,10 +124,10 @@ def listed(names: str | Sequence[str], what: str) -> list[str]:
     Raises:
         ValueOutOfRange: there is none.
     """
-    found = [names] if isinstance(names, str) else list(names)
-    if not found:
+    result = [names] if isinstance(names, str) else list(names)
+    if not result:
         raise ValueOutOfRange(f"There is no {what}: give at least one name.")
-    return found
+    return result
 
 
 def is_series(name: str) -> bool:
@@ -196,19 +196,19 @@ def _plain(model: CompiledDae, name: str) -> Output:
     if last in _ENERGY and owner in model.components:
         return Output(name, _JOULE, "integral", name)
     if last in ("lock_time", "unlock_time"):
-        found = _holding_mode(model, owner)
-        if found is not None:
-            mode, held = found
+        holding = _holding_mode(model, owner)
+        if holding is not None:
+            mode, held = holding
             return Output(name, _SECOND, "time", mode, change=("", held, 1) if last == "lock_time" else (held, "", 1))
     return Output(name, expression_of(model, name)[1], "end", name)
 
 
 def _holding_mode(model: CompiledDae, owner: str) -> tuple[str, str] | None:
     """The mode of a component in which it holds a motion, and the name of that."""
-    for one in model.holds:
-        if one.component == owner:
-            mode = model.flat_discretes[one.mode]
-            return mode.path, mode.names[one.number]
+    for hold in model.holds:
+        if hold.component == owner:
+            mode = model.flat_discretes[hold.mode]
+            return mode.path, mode.names[hold.number]
     return None
 
 
@@ -221,20 +221,20 @@ def _mode_change(model: CompiledDae, name: str, inside: str) -> Output:
             "time(clutch.mode -> stuck, 2).",
         )
     mode = parts["mode"]
-    _check_mode(model, mode, *(one for one in (parts["before"], parts["after"]) if one is not None))
+    _check_mode(model, mode, *(value for value in (parts["before"], parts["after"]) if value is not None))
     return Output(
         name, _SECOND, "time", mode, change=(parts["before"] or "", parts["after"], int(parts["number"] or 1))
     )
 
 
 def _check_mode(model: CompiledDae, mode: str, *names: str) -> None:
-    modes = {one.path: one.names for one in model.flat_discretes if one.names}
+    modes = {discrete.path: discrete.names for discrete in model.flat_discretes if discrete.names}
     if mode not in modes:
         raise UnknownName(f"{model.name} has no mode '{mode}'{did_you_mean(mode, modes) or '.'}")
-    for one in names:
-        if one not in modes[mode]:
+    for name in names:
+        if name not in modes[mode]:
             raise UnknownName(
-                f"{mode} has no mode '{one}'{did_you_mean(one, modes[mode]) or '.'} It has {', '.join(modes[mode])}."
+                f"{mode} has no mode '{name}'{did_you_mean(name, modes[mode]) or '.'} It has {', '.join(modes[mode])}."
             )
 
 
@@ -268,11 +268,11 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
         rows = [model.components.index(owner)] if owner else list(range(len(model.components)))
         unit = _JOULE if last in (*_ENERGY, "stored_energy") else _WATT
         return lambda: ca.sum1(model.energy(*arguments)[rows, columns[last]]), unit
-    known = [*model.position, *(f"{one}.{last}" for one in model.components if last in columns)]
+    words = [*model.position, *(f"{component}.{last}" for component in model.components if last in columns)]
     if owner in model.components:
-        known += [f"{owner}.{word}" for word in (*columns, "lock_time", "unlock_time")]
+        words += [f"{owner}.{word}" for word in (*columns, "lock_time", "unlock_time")]
     raise UnknownName(
-        f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}",
+        f"{model.name} has no variable '{path}'{did_you_mean(path, words) or '.'}",
         advice="Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(…), at(…, time), first(… > …), "
         "duration(mode: name), series(…), time(mode: before -> after), and of components loss_energy, source_energy, "
         "lock_time, unlock_time.",
@@ -281,6 +281,6 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
 
 def quadratures(model: CompiledDae, outputs: Sequence[Output]) -> tuple[Any, str]:
     """Return all integrands of outputs as one SX column, and a name for them."""
-    parts = [part for one in outputs for part in one.parts(model) if part.kind == "integral"]
+    parts = [part for output in outputs for part in output.parts(model) if part.kind == "integral"]
     column = ca.vertcat(*(part.expression(model) for part in parts)) if parts else ca.SX(0, 1)
     return column, ";".join(f"{part.text} {part.form} {part.change}" for part in parts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -86,7 +86,12 @@ class RecordedSolution(Trajectories):
     def __init__(self, model: RecordedModel, time: Vector, values: Vector, discretes: Vector, seconds: float) -> None:
         self._time, self._values_table, self._discretes = time, values, discretes
         self.model: RecordedModel = model
-        self.events = tuple(mode_changes(model.flat_discretes, time, discretes))
+        events: list[Event] = []
+        for variable, row in zip(model.flat_discretes, discretes, strict=True):
+            for k in np.flatnonzero(np.diff(row)):
+                before, after = (variable.names.get(int(value), f"{value:g}") for value in row[k : k + 2])
+                events.append(Event(float(time[k + 1]), variable.path, before, after, Source("")))
+        self.events = tuple(sorted(events, key=lambda event: event.time))
         self.statistics = Statistics(len(time), 0, 0, len(self.events), seconds)
 
     @property
@@ -114,12 +119,12 @@ class RecordedSolution(Trajectories):
             return self._discretes[model.discrete_position[path]]
         if path in model.parameters:
             return np.full(len(self._time), model.parameters[path])
-        known = [*self.names, *model.parameters]
-        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
+        names = [*self.names, *model.parameters]
+        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, names) or '.'}")
 
     def __contains__(self, key: object) -> bool:
         path, model = self.path(key), self.model
-        return any(path in known for known in (model.position, model.discrete_position, model.parameters))
+        return any(path in positions for positions in (model.position, model.discrete_position, model.parameters))
 
     def at(self, t: float) -> Values:
         """Return all variables at a time, interpolated between the results (after an event at that time).
@@ -176,13 +181,3 @@ class RecordedSolution(Trajectories):
     def __repr__(self) -> str:
         span = f"t = {self._time[0]:g} … {self._time[-1]:g} s"
         return f"<Solution of {self.model.name}: {len(self.names)} variables, {span}, {len(self.events)} mode changes>"
-
-
-def mode_changes(discretes: Sequence[RecordedVariable], time: Vector, values: Vector) -> list[Event]:
-    """Return the changes of discrete values between one result and the next, by time."""
-    events: list[Event] = []
-    for variable, row in zip(discretes, values, strict=True):
-        for k in np.flatnonzero(np.diff(row)):
-            before, after = (variable.names.get(int(value), f"{value:g}") for value in row[k : k + 2])
-            events.append(Event(float(time[k + 1]), variable.path, before, after, Source("")))
-    return sorted(events, key=lambda event: event.time)

@@ -73,7 +73,7 @@ class OfResults(Dense):
 
     def _through(self, pieces: Any, times: Vector, width: int) -> tuple[Vector, Vector]:
         """Values at times of the polynomials through results around pieces, and the ranges of those results."""
-        left, low, high = (one[pieces] for one in (self._left, self._first, self._last))
+        left, low, high = (x[pieces] for x in (self._left, self._first, self._last))
         widths = np.minimum(width, high - low + 1)
         values, spread = np.zeros((2, len(self._values), len(times)))
         for size in np.unique(widths).tolist():
@@ -97,25 +97,34 @@ class _Columns:
     recorded: RecordedModel
 
     def __post_init__(self) -> None:
-        known, own = self.recorded, vars(self)
-        constants = {name: value for name, value in known.parameters.items() if np.isscalar(value)}
-        own.update(
-            name=known.name, position=known.position, discrete_position=known.discrete_position, holds=(),
-            components=known.components, flat_variables=known.flat_variables, u=np.zeros(0),
+        recorded, attributes = self.recorded, vars(self)
+        constants = {name: value for name, value in recorded.parameters.items() if np.isscalar(value)}
+        attributes.update(
+            name=recorded.name, position=recorded.position, discrete_position=recorded.discrete_position, holds=(),
+            components=recorded.components, flat_variables=recorded.flat_variables, u=np.zeros(0),
             parameter_position={name: k for k, name in enumerate(constants)}, p=np.array([*constants.values()], float),
-            units={one.path: _unit(one.unit) for one in (*known.flat_variables, *known.flat_discretes)},
-            flat_discretes=[SimpleNamespace(path=one.path, names=_names(one.names)) for one in known.flat_discretes],
+            units={v.path: _unit(v.unit) for v in (*recorded.flat_variables, *recorded.flat_discretes)},
+            flat_discretes=[SimpleNamespace(path=d.path, names=_names(d.names)) for d in recorded.flat_discretes],
         )  # fmt: skip
-        sizes = {"t": 1, "x": len(known.position), "z": 0, "p": len(constants), "u": 0, "d": len(own["flat_discretes"])}
-        own["arguments"] = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
+        sizes = {
+            "t": 1,
+            "x": len(recorded.position),
+            "z": 0,
+            "p": len(constants),
+            "u": 0,
+            "d": len(attributes["flat_discretes"]),
+        }
+        attributes["arguments"] = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
 
     def variables(self, *arguments: Any) -> Any:
         return arguments[1]
 
     def energy(self, *arguments: Any) -> Any:
-        rows = [[f"{one}.{term}" for term in ENERGY_TERMS] for one in self.recorded.components]
-        x, known = arguments[1], self.recorded.position
-        return ca.vertcat(*(ca.horzcat(*(x[known[one]] if one in known else 0 for one in row)) for row in rows))
+        rows = [[f"{component}.{term}" for term in ENERGY_TERMS] for component in self.recorded.components]
+        x, position = arguments[1], self.recorded.position
+        return ca.vertcat(
+            *(ca.horzcat(*(x[position[value]] if value in position else 0 for value in row)) for row in rows)
+        )
 
     def once(self, _: Any, make: Callable[[], Any]) -> Any:
         return make()
@@ -140,14 +149,14 @@ def read_results(run: RecordedSolution, names: Sequence[str]) -> tuple[list[Numb
     """
     model: Any = _Columns(run.model)
     outputs, dense = [read_output(model, name) for name in names], OfResults(run)
-    sized = [replace(one, kind="peak") if one.kind not in _TIMES else replace(one, kind="end", path="time")
-             for one in outputs]  # fmt: skip
-    asked = Collector(model, [*outputs, *sized], _NOISE)
-    asked.feed(dense)
+    sized = [replace(output, kind="peak") if output.kind not in _TIMES else replace(output, kind="end", path="time")
+             for output in outputs]  # fmt: skip
+    readings = Collector(model, [*outputs, *sized], _NOISE)
+    readings.feed(dense)
     record: Any = SimpleNamespace(segments=dense.stretches, events=run.events, impacts=())
-    numbers, span = asked.finish(record), float(run.time[-1] - run.time[0])
-    sizes = [span if one.kind in _TIMES else abs(size) * (span if one.kind == "integral" else 1.0)
-             for one, size in zip(outputs, numbers[len(outputs):], strict=True)]  # fmt: skip
+    numbers, span = readings.finish(record), float(run.time[-1] - run.time[0])
+    sizes = [span if output.kind in _TIMES else abs(size) * (span if output.kind == "integral" else 1.0)
+             for output, size in zip(outputs, numbers[len(outputs):], strict=True)]  # fmt: skip
     return numbers[: len(outputs)], np.array(sizes)
 
 
@@ -160,11 +169,11 @@ def read_after(run: Trajectories, names: Sequence[str]) -> list[Number]:
     """
     if isinstance(run, RecordedSolution) and run.measured:
         return read_results(run, names)[0]
-    known: Any = run if isinstance(run, Solution) else dense_of(run, names[0])
-    asked = collector(known.model, names, known.options.atol)
-    if asked.along:
-        asked.feed(dense_of(known, names[0]))
-    return asked.finish(known)
+    source: Any = run if isinstance(run, Solution) else dense_of(run, names[0])
+    readings = collector(source.model, names, source.options.atol)
+    if readings.along:
+        readings.feed(dense_of(source, names[0]))
+    return readings.finish(source)
 
 
 def along(run: Any, *texts: str) -> tuple[Fitted, str]:

@@ -62,8 +62,8 @@ class Signal:
         symbols = {name: ca.SX.sym(name) for name in names}
         value = self.formula.evaluate(symbols.__getitem__, lambda text: ca.SX(si_value(text)))
         columns = run.together(*names)
-        made: Any = ca.Function("shown", list(symbols.values()), [value])(*(columns[name][None] for name in names))
-        return np.asarray(made.full())[0]
+        result: Any = ca.Function("shown", list(symbols.values()), [value])(*(columns[name][None] for name in names))
+        return np.asarray(result.full())[0]
 
 
 def read_signals(model: Any, words: Iterable[str]) -> list[Signal]:
@@ -78,11 +78,11 @@ def read_signals(model: Any, words: Iterable[str]) -> list[Signal]:
         NetlistError: a text is no formula.
         UnitError: the units in a formula do not fit together.
     """
-    known = _units(model)
-    terms = {f"{one}.{term}" for one in getattr(model, "components", ()) for term in ENERGY_TERMS}
-    names = [one.path for one in (*model.flat_variables, *model.flat_discretes) if not one.hidden]
-    signs = {one.path: getattr(one, "driving", 1) for one in model.flat_variables}
-    found: dict[str, Signal] = {}
+    unit_of_path = _units(model)
+    terms = {f"{component}.{term}" for component in getattr(model, "components", ()) for term in ENERGY_TERMS}
+    names = [variable.path for variable in (*model.flat_variables, *model.flat_discretes) if not variable.hidden]
+    signs = {variable.path: getattr(variable, "driving", 1) for variable in model.flat_variables}
+    signals: dict[str, Signal] = {}
     for word in words:
         pool = sorted(terms) if word.rpartition(".")[2] in ENERGY_TERMS else names
         try:
@@ -91,29 +91,29 @@ def read_signals(model: Any, words: Iterable[str]) -> list[Signal]:
             formula = formula_of(word)
             if formula is None:
                 raise error from None
-            found[word] = Signal(word, unit_of(formula, known | _energies(terms), model.name), formula)
+            signals[word] = Signal(word, unit_of(formula, unit_of_path | _energies(terms), model.name), formula)
         else:
-            units = known | _energies(terms)
-            found |= {path: Signal(path, units[path], Formula("name", (path,)), signs.get(path, 1)) for path in paths}
-    return list(found.values())
+            units = unit_of_path | _energies(terms)
+            signals |= {path: Signal(path, units[path], Formula("name", (path,)), signs.get(path, 1)) for path in paths}
+    return list(signals.values())
 
 
 def named(model: Any, paths: Sequence[str]) -> list[Signal]:
     """Return variables as signals."""
-    variables = {one.path: one for one in (*model.flat_variables, *model.flat_discretes)}
+    variables = {variable.path: variable for variable in (*model.flat_variables, *model.flat_discretes)}
     pairs = ((path, variables[path]) for path in paths)
     return [Signal(p, str(v.unit), Formula("name", (p,)), getattr(v, "driving", 1)) for p, v in pairs]
 
 
 def evaluated(run: Trajectories, signals: Sequence[Signal]) -> dict[str, Vector]:
     """Return the trajectories of signals by name, in SI units."""
-    plain = run.together(*(one.name for one in signals if one.plain))
-    return {one.name: plain[one.name] if one.plain else one.values(run) for one in signals}
+    plain = run.together(*(signal.name for signal in signals if signal.plain))
+    return {signal.name: plain[signal.name] if signal.plain else signal.values(run) for signal in signals}
 
 
 def _units(model: Any) -> dict[str, str]:
-    units = {one.path: str(one.unit) for one in getattr(model, "flat_parameters", ())} | {"time": "s"}
-    return units | {one.path: str(one.unit) for one in (*model.flat_variables, *model.flat_discretes)}
+    units = {parameter.path: str(parameter.unit) for parameter in getattr(model, "flat_parameters", ())} | {"time": "s"}
+    return units | {variable.path: str(variable.unit) for variable in (*model.flat_variables, *model.flat_discretes)}
 
 
 def _energies(terms: Iterable[str]) -> dict[str, str]:
@@ -148,10 +148,13 @@ def unit_of(formula: Formula, units: dict[str, str], model: str) -> str:
             raise UnknownName(f"'{formula}': {model} has no variable '{name}'{did_you_mean(name, units) or '.'}")
         return parse_unit(units[name])
 
-    found = formula.unit(unit)
-    if str(found) in QUANTITIES:
-        return str(found)
-    return next((one for one in QUANTITIES if one not in _KEPT and same_dimension(parse_unit(one), found)), str(found))
+    formula_unit = formula.unit(unit)
+    if str(formula_unit) in QUANTITIES:
+        return str(formula_unit)
+    return next(
+        (q for q in QUANTITIES if q not in _KEPT and same_dimension(parse_unit(q), formula_unit)),
+        str(formula_unit),
+    )
 
 
 def si_value(text: str) -> float:

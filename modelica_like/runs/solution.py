@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
@@ -13,7 +14,6 @@ from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.options import Options
 from modelica_like.runs.energy import EnergyBalance, energy_balance
-from modelica_like.runs.rates import differentiated, rate_along
 from modelica_like.runs.reading import TOGETHER, blocks, energy_term, variables
 from modelica_like.runs.trajectories import ENERGY_TERMS, Statistics, Trajectories, Values
 from modelica_like.solve.dense import Dense
@@ -60,7 +60,7 @@ class Solution(Trajectories):
     @property
     def ended(self) -> Ended | None:
         """Where and why a component has ended the run, or None."""
-        ends = (one for one in self.events if one.transition >= 0 and self.model.transitions[one.transition].ends)
+        ends = (e for e in self.events if e.transition >= 0 and self.model.transitions[e.transition].ends)
         if (event := next(ends, None)) is None:
             return None
         component, dot, _ = event.mode.rpartition(".")
@@ -97,14 +97,14 @@ class Solution(Trajectories):
         owner, _, term = path.rpartition(".")
         if term in ENERGY_TERMS and owner in model.components:
             return energy_term(model, self.segments, model.components.index(owner), ENERGY_TERMS.index(term))
-        known = [*model.position, *model.discrete_position, *model.parameter_position, *model.derived_position]
-        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
+        names = [*model.position, *model.discrete_position, *model.parameter_position, *model.derived_position]
+        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, names) or '.'}")
 
     def __contains__(self, key: object) -> bool:
         path = self.path(key)  # type: ignore[arg-type]
         model = self.model
-        known = (model.position, model.discrete_position, model.parameter_position, model.derived_position)
-        return any(path in one for one in known) or differentiated(path) in model.position
+        positions = (model.position, model.discrete_position, model.parameter_position, model.derived_position)
+        return any(path in position for position in positions) or differentiated(path) in model.position
 
     @property
     def _small(self) -> bool:
@@ -122,10 +122,10 @@ class Solution(Trajectories):
             UnknownName: there is no such variable.
         """
         paths = [self.path(key) for key in keys]
-        found = list(dict.fromkeys(path for path in paths if path in self.model.position and not self._small))
-        rows = [self.model.position[path] for path in found]
-        known = dict(zip(found, variables(self.model, self.segments, rows), strict=True)) if found else {}
-        return {path: known[path] if path in known else self[path] for path in paths}
+        names = list(dict.fromkeys(path for path in paths if path in self.model.position and not self._small))
+        rows = [self.model.position[path] for path in names]
+        columns = dict(zip(names, variables(self.model, self.segments, rows), strict=True)) if names else {}
+        return {path: columns[path] if path in columns else self[path] for path in paths}
 
     def at(self, t: float) -> Values:
         """Return all variables at a time, integrated from the result before (after an event at that time).
@@ -156,8 +156,8 @@ class Solution(Trajectories):
         return self._values(self.segments[-1].point(-1))
 
     def _values(self, now: Point) -> Values:
-        one = Segment(np.array([now.t]), now.x[:, None], now.z[:, None], now.d)
-        return Values(replace(self, segments=(one,), _cache={}))
+        segment = Segment(np.array([now.t]), now.x[:, None], now.z[:, None], now.d)
+        return Values(replace(self, segments=(segment,), _cache={}))
 
     def energy(self, begin: float | None = None, end: float | None = None) -> EnergyBalance:
         """Return the energy balance of every component over the run, or over a part of it.
@@ -174,22 +174,26 @@ class Solution(Trajectories):
             first, last = (self.time[k] if t is None else float(t) for k, t in ((0, begin), (-1, end)))
             segments = self.segments if (begin, end) == (None, None) else tuple(self._part(first, last))
             until = np.inf if last == self.time[-1] else last
-            events = [one for one in self.events if first <= one.time < until]
-            impacts = [one for one in self.impacts if first <= one.time < until]
+            events = [event for event in self.events if first <= event.time < until]
+            impacts = [impact for impact in self.impacts if first <= impact.time < until]
             self._cache[key] = energy_balance(self.model, segments, self.options, events, impacts)
         return self._cache[key]
 
     def _part(self, begin: float, end: float) -> Iterator[Segment]:
         """Yield the segments between two times."""
         edges = {t: self.point(t) for t in (begin, end)}
-        for one in self.segments:
-            inside = (one.times >= begin) & (one.times <= end)
-            cuts = [edges[t] for t in (begin, end) if one.times[0] < t < one.times[-1] and t not in one.times[inside]]
-            times = np.concatenate([one.times[inside], [cut.t for cut in cuts]])
+        for segment in self.segments:
+            inside = (segment.times >= begin) & (segment.times <= end)
+            cuts = [
+                edges[t]
+                for t in (begin, end)
+                if segment.times[0] < t < segment.times[-1] and t not in segment.times[inside]
+            ]
+            times = np.concatenate([segment.times[inside], [cut.t for cut in cuts]])
             order = np.argsort(times, kind="stable")
             if len(order) > 1:
-                x, z = (np.column_stack([getattr(one, n)[:, inside], *(getattr(c, n) for c in cuts)]) for n in "xz")
-                yield Segment(times[order], x[:, order], z[:, order], one.d)
+                x, z = (np.column_stack([getattr(segment, n)[:, inside], *(getattr(c, n) for c in cuts)]) for n in "xz")
+                yield Segment(times[order], x[:, order], z[:, order], segment.d)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_cache": {}, "dense": None}
@@ -200,3 +204,44 @@ class Solution(Trajectories):
             f"<Solution of {self.model.name}: {len(self.model.flat_variables)} variables, {span}, "
             f"{len(self.events)} mode changes, {self.statistics.steps} steps in {self.statistics.seconds * 1e3:.1f} ms>"
         )
+
+
+def differentiated(path: str) -> str:
+    """Return the variable in `der(variable)`, or an empty text for other paths."""
+    return path[4:-1].strip() if path.startswith("der(") and path.endswith(")") else ""
+
+
+def rate_along(model: CompiledDae, name: str, times: Any, x: Vector, z: Vector, d: Vector) -> Vector:
+    """Return the time derivative of one variable, with the inputs held.
+
+    Args:
+        model: the compiled model.
+        name: path of the variable.
+        times: shape (n,), in s.
+        x: states, shape (nx, n).
+        z: implicit unknowns, shape (nz, n).
+        d: modes and discrete values, shape (nd, n).
+
+    Returns:
+        Shape (n,), in the variable's unit per second.
+
+    Raises:
+        UnknownName: there is no such variable, or it changes only at events.
+    """
+    if name not in model.position:
+        near = did_you_mean(name, list(model.position)) or "."
+        raise UnknownName(f"{model.name} has no continuous variable '{name}'{near}")
+    row, arguments = model.position[name], list(model.arguments.values())
+
+    def make() -> ca.Function:
+        parts = model.motion.parts(model.variables(*arguments)[row])
+        return ca.Function("rate", arguments, [ca.densify(part) for part in parts])
+
+    parts = model.once(("rate", name), make)(np.reshape(times, (1, -1)), x, z, model.p, model.u, d)
+    direct, by_z, drift, jacobian = (np.asarray(part.full()) for part in parts)
+    if not model.implicit:
+        return direct.ravel()
+    count, size = len(times), len(model.implicit)
+    slopes = jacobian.reshape(size, count, size).transpose(1, 0, 2)
+    z_rates = -np.linalg.solve(slopes, drift.T[:, :, None])[:, :, 0]
+    return direct.ravel() + np.sum(by_z.reshape(count, size) * z_rates, axis=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from types import MappingProxyType
@@ -14,7 +14,6 @@ from modelica_like.compile.compiled import Vector
 from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean, extra_module
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
-from modelica_like.runs.branches import member, next_names
 from modelica_like.solve.initialize import Point
 from modelica_like.solve.recorder import Ended, Event
 from modelica_like.upper import Shown
@@ -25,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from modelica_like.runs.energy import EnergyBalance
+    from modelica_like.runs.trajectories import Trajectories
+
 
 ENERGY_TERMS = ("stored_energy", "loss_power", "source_power")
 
@@ -51,9 +52,9 @@ class Statistics:
 class Values(Mapping[str, float]):
     """All variables at one time, by path."""
 
-    def __init__(self, one: Trajectories) -> None:
-        self.time = float(one.time[0])
-        self._one = one
+    def __init__(self, trajectories: Trajectories) -> None:
+        self.time = float(trajectories.time[0])
+        self._one = trajectories
 
     def __getitem__(self, key: str | Any) -> float:
         return float(self._one[key][0])
@@ -152,7 +153,7 @@ class Trajectories(Shown, ABC):
     def names(self) -> tuple[str, ...]:
         """Paths of all variables, modes and discrete values that somebody has declared."""
         every = (*self.model.flat_variables, *self.model.flat_discretes)
-        return tuple(one.path for one in every if not one.hidden)
+        return tuple(variable.path for variable in every if not variable.hidden)
 
     def unit_of(self, name: str) -> str:
         """Return the coherent SI unit of a variable; that of a mode is `1`."""
@@ -181,8 +182,8 @@ class Trajectories(Shown, ABC):
         from modelica_like.runs.results import read_after  # which has trajectories as results
 
         more = [name for name in names if name not in self.readings]
-        known = {**self.readings, **(dict(zip(more, read_after(self, more), strict=True)) if more else {})}
-        return [known[name] for name in names]
+        values = {**self.readings, **(dict(zip(more, read_after(self, more), strict=True)) if more else {})}
+        return [values[name] for name in names]
 
     def _check_within(self, t: float) -> None:
         first, last = float(self.time[0]), float(self.time[-1])
@@ -245,17 +246,59 @@ def matching(model: Any, patterns: Sequence[str]) -> list[str]:
     return fitting((*model.position, *model.discrete_position), patterns, f"{model.name} has no variable")
 
 
-def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
+def fitting(candidates: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
     """Return the names that match patterns, a name itself before all; `missing` begins the message where none does.
 
     Raises:
         UnknownName: nothing matches a pattern.
     """
     names: dict[str, None] = {}
-    every = set(known)
+    every = set(candidates)
     for pattern in patterns:
-        some = [pattern] if pattern in every else [name for name in known if fnmatchcase(name, pattern)]
+        some = [pattern] if pattern in every else [name for name in candidates if fnmatchcase(name, pattern)]
         if not some:
-            raise UnknownName(f"{missing} '{pattern}'{did_you_mean(pattern, known) or '.'}")
+            raise UnknownName(f"{missing} '{pattern}'{did_you_mean(pattern, candidates) or '.'}")
         names.update(dict.fromkeys(some))
     return list(names)
+
+
+class Branch:
+    """Variables of a run below a path.
+
+    Args:
+        run: the run.
+        path: path of a part.
+    """
+
+    def __init__(self, run: Trajectories, path: str) -> None:
+        self._run, self._path = run, path
+
+    def __getattr__(self, name: str) -> Any:
+        return member(self._run, f"{self._path}.{name}")
+
+    def __dir__(self) -> list[str]:
+        return next_names(self._run.names, f"{self._path}.")
+
+    def __repr__(self) -> str:
+        return f"<{self._path}: {', '.join(dir(self))}>"
+
+
+def member(run: Trajectories, path: str) -> Any:
+    """Return a variable, shape (n,), or what is below a part.
+
+    Raises:
+        AttributeError: there is no such path.
+    """
+    if path in run.names:
+        return run[path]
+    if next_names(run.names, f"{path}."):
+        return Branch(run, path)
+    before, dot, name = path.rpartition(".")
+    near = did_you_mean(name, next_names(run.names, before + dot))
+    raise AttributeError(f"The run of {run.model.name} has no '{path}'{near or '.'}")
+
+
+def next_names(names: Iterable[str], before: str) -> list[str]:
+    """Return the words that follow the beginning of a path, each once."""
+    after = (name.removeprefix(before) for name in names if name.startswith(before))
+    return [*dict.fromkeys(word for name in after if (word := name.partition(".")[0]).isidentifier())]

@@ -43,23 +43,23 @@ def bands_of(run: Trajectories, wanted: Sequence[str] = ()) -> tuple[list[Bands]
     """
     holds = getattr(run.model, "holds", ())
     held: dict[str, set[str]] = {}
-    for one in holds:
-        mode = run.model.flat_discretes[one.mode]
-        held.setdefault(mode.path, set()).add(mode.names[one.number])
+    for hold in holds:
+        mode = run.model.flat_discretes[hold.mode]
+        held.setdefault(mode.path, set()).add(mode.names[hold.number])
     paths = list(wanted) or list(dict.fromkeys(event.mode for event in _declared(run)))
     if not wanted and len(paths) > _MOST_BANDS and any(path in held for path in paths):
         paths = [path for path in paths if path in held]
     most = len(paths) if wanted else _MOST_HELD
     left = [f"No bands: {listed(paths[most:])}."] if paths[most:] else []
-    names = {one.path: tuple(one.names) for one in run.model.flat_discretes}
+    names = {discrete.path: tuple(discrete.names) for discrete in run.model.flat_discretes}
     least = _SHORT * float(run.time[-1] - run.time[0])
-    spans = {path: tuple(one for one in mode_spans(run, path) if one[1] - one[0] > least) for path in paths[:most]}
+    spans = {path: tuple(span for span in mode_spans(run, path) if span[1] - span[0] > least) for path in paths[:most]}
     return [Bands(p, some, names.get(p, ()), frozenset(held.get(p, ()))) for p, some in spans.items()], left
 
 
 def _declared(run: Trajectories) -> list[Event]:
     """Return the changes of modes that a user has declared."""
-    hidden = {one.path for one in run.model.flat_discretes if one.hidden}
+    hidden = {discrete.path for discrete in run.model.flat_discretes if discrete.hidden}
     return [event for event in run.events if event.mode not in hidden]
 
 
@@ -72,7 +72,12 @@ def mode_spans(run: Trajectories, mode: str) -> tuple[tuple[float, float, str], 
         names = [*(event.before for event in changes), changes[-1].after]
     else:
         number = int(run[mode][0])
-        names = [next((one.names[number] for one in run.model.flat_discretes if one.path == mode and one.names), "")]
+        names = [
+            next(
+                (d.names[number] for d in run.model.flat_discretes if d.path == mode and d.names),
+                "",
+            )
+        ]
     return tuple(span for span in zip(times, times[1:], names, strict=False) if span[1] > span[0])
 
 

@@ -63,7 +63,7 @@ def draw_panels(
     heights = [_HEIGHT] * max(len(panels), 1) + [_ROW * max(len(bands), len(states) * 0.8) + 0.1] * bool(bands)
     reach = float(time[0]), float(time[-1])
     texts = [f"{k}  {told(t)} s  {text}" for k, (t, text) in enumerate(marks, 1)]
-    wrapped = [(one, _wrapped(texts, (width - 0.2) / one - 0.3)) for one in (1, 2, 3)]
+    wrapped = [(step, _wrapped(texts, (width - 0.2) / step - 0.3)) for step in (1, 2, 3)]
     _, listed = min(wrapped, key=lambda pair: -(-len(pair[1]) // pair[0]))
     below = [listed, _wrapped(notes, width - 0.5)]
     with picture(title, count, 0.85 + sum(heights), width=width, below=below, height_ratios=heights) as (figure, rows):
@@ -113,15 +113,15 @@ def _looks(bands: Sequence[Bands]) -> dict[str, tuple[str, str]]:
 def _draw_bands(axes: Any, bands: Sequence[Bands], looks: dict[str, tuple[str, str]]) -> None:
     from matplotlib.patches import Patch
 
-    made = {n: {"facecolor": c, "hatch": h, "linewidth": 0.0, "edgecolor": "#ffffff"} for n, (c, h) in looks.items()}
+    styles = {n: {"facecolor": c, "hatch": h, "linewidth": 0.0, "edgecolor": "#ffffff"} for n, (c, h) in looks.items()}
     for row, band in enumerate(bands):
         for name in dict.fromkeys(span[2] for span in band.spans):
             # One collection for all spans of a name: a chopper has thousands.
             places = [(begin, end - begin) for begin, end, other in band.spans if other == name]
-            axes.broken_barh(places, (row - 0.36, 0.72), label=name, **made[name])
+            axes.broken_barh(places, (row - 0.36, 0.72), label=name, **styles[name])
     axes.set_yticks(np.arange(len(bands)), [band.mode.removesuffix(".mode") for band in bands], fontsize=8)
     axes.set_ylim(len(bands) - 0.5, -0.5)
     axes.grid(visible=False)
     axes.tick_params(axis="y", length=0)
-    handles = [Patch(label=name, **look) for name, look in made.items()]
+    handles = [Patch(label=name, **look) for name, look in styles.items()]
     axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)

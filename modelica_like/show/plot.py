@@ -51,29 +51,29 @@ def plot(
         UnitError: a variable cannot be shown in a unit, or the units in a formula do not fit together.
     """
     shown = Display(solution.model, display)
-    modes = {one.path for one in solution.model.flat_discretes if one.names}
-    asked = read_signals(solution.model, patterns)
-    units = [one for one in _USUAL if one in (*_on_page(solution), *_BESIDE)]
-    curves = [one for one in asked if one.name not in modes] if asked else usual(solution, units)
+    modes = {discrete.path for discrete in solution.model.flat_discretes if discrete.names}
+    chosen = read_signals(solution.model, patterns)
+    units = [kind for kind in _USUAL if kind in (*_on_page(solution), *_BESIDE)]
+    curves = [signal for signal in chosen if signal.name not in modes] if chosen else usual(solution, units)
     values = evaluated(solution, curves)
     groups: dict[tuple[str, str], list[Signal]] = {}
     for one in curves:
         groups.setdefault((quantity_of(one), one.shown_in(shown)), []).append(one)
-    panels, left = _panels(groups, 0 if asked else _MOST_PANELS[0])
-    bands, unbanded = bands_of(solution, [one.name for one in asked if one.name in modes])
+    panels, left = _panels(groups, 0 if chosen else _MOST_PANELS[0])
+    bands, unbanded = bands_of(solution, [signal.name for signal in chosen if signal.name in modes])
     marks, unmarked = marks_of(solution, [band.mode for band in bands])
-    left += [] if asked else _quantities_left(solution, units)
+    left += [] if chosen else _quantities_left(solution, units)
     notes = [f"Not drawn: {', '.join(left)}; name them to draw them."] if left else []
 
     def draw(axes: Any, signals: Sequence[Signal]) -> None:
-        for k, one in enumerate(signals):
-            curve = one.driving * shown.converted(values[one.name], one.unit, one.shown_in(shown))
+        for k, signal in enumerate(signals):
+            curve = signal.driving * shown.converted(values[signal.name], signal.unit, signal.shown_in(shown))
             style = {"linestyle": "-" if k < len(COLOURS) else "--", "color": COLOURS[k % len(COLOURS)]}
-            axes.plot(solution.time, curve, label=one.label, **style)
+            axes.plot(solution.time, curve, label=signal.label, **style)
 
-    made = [Panel(name, unit, [one.label for one in some], lambda axes, some=some: draw(axes, some))
+    drawn = [Panel(name, unit, [signal.label for signal in some], lambda axes, some=some: draw(axes, some))
             for (name, unit), some in panels]  # fmt: skip
-    return draw_panels(title or solution.model.name, solution.time, made, bands, marks, [*notes, *unbanded, *unmarked])
+    return draw_panels(title or solution.model.name, solution.time, drawn, bands, marks, [*notes, *unbanded, *unmarked])
 
 
 def _panels(
@@ -89,7 +89,7 @@ def _panels(
         panels += [(key, signals[k * each : (k + 1) * each]) for k in range(min(count, room))]
         rest = signals[each * room :]
         if rest:
-            left.append(f"{len(rest)} more of {key[0]} ({listed([one.name for one in rest])})")
+            left.append(f"{len(rest)} more of {key[0]} ({listed([signal.name for signal in rest])})")
     return panels, left
 
 
@@ -102,9 +102,9 @@ def check_picture(path: Path) -> None:
     """
     from matplotlib.backend_bases import FigureCanvasBase
 
-    known = FigureCanvasBase.get_supported_filetypes()
-    if path.suffix.lower().lstrip(".") not in known:
-        raise NetlistError(f"'{path.name}': a picture can be {', '.join(sorted(known))}.")
+    formats = FigureCanvasBase.get_supported_filetypes()
+    if path.suffix.lower().lstrip(".") not in formats:
+        raise NetlistError(f"'{path.name}': a picture can be {', '.join(sorted(formats))}.")
     check_writable(path)
 
 
@@ -151,23 +151,23 @@ def for_page(solution: Trajectories, words: Sequence[str] = ()) -> tuple[list[Si
         UnitError: the units in a formula do not fit together.
     """
     if words:
-        modes = {one.path for one in solution.model.flat_discretes if one.names}
-        return [one for one in read_signals(solution.model, words) if one.name not in modes], ""
+        modes = {discrete.path for discrete in solution.model.flat_discretes if discrete.names}
+        return [signal for signal in read_signals(solution.model, words) if signal.name not in modes], ""
     units = _on_page(solution)
-    found = {unit: usual(solution, [unit], slips=True) for unit in units}
+    signals = {unit: usual(solution, [unit], slips=True) for unit in units}
     left = [
-        f"{len(some) - _MOST} of {len(some)} {_plural(quantity(unit))} ({listed([one.name for one in some[_MOST:]])})"
-        for unit, some in found.items()
+        f"{len(some) - _MOST} of {len(some)} {_plural(quantity(unit))} ({listed([s.name for s in some[_MOST:]])})"
+        for unit, some in signals.items()
         if len(some) > _MOST
     ]
     left += _quantities_left(solution, units)
-    told = f"Not drawn: {', '.join(left)}; --show draws them." if left else ""
-    return [one for some in found.values() for one in some[:_MOST]], told
+    note = f"Not drawn: {', '.join(left)}; --show draws them." if left else ""
+    return [signal for some in signals.values() for signal in some[:_MOST]], note
 
 
 def _on_page(solution: Trajectories) -> tuple[str, ...]:
-    known = {str(one.unit) for one in _of_parts(solution)}
-    return next((units for units in _ON_PAGES if known.intersection(units)), ())
+    part_units = {str(part.unit) for part in _of_parts(solution)}
+    return next((units for units in _ON_PAGES if part_units.intersection(units)), ())
 
 
 def usual(solution: Trajectories, units: Sequence[str], *, slips: bool = False) -> list[Signal]:
@@ -178,18 +178,18 @@ def usual(solution: Trajectories, units: Sequence[str], *, slips: bool = False) 
         units: coherent SI units.
         slips: also relative positions and angles.
     """
-    model, found = solution.model, dict[bytes, str]()
+    model, signals = solution.model, dict[bytes, str]()
     wanted = getattr(model, "settings", {}).get("display", {})
     for unit in units:
-        some = [one.path for one in _of_parts(solution) if str(one.unit) == unit]
-        signs = {one.name: one.driving for one in named(model, some)}
+        some = [part.path for part in _of_parts(solution) if str(part.unit) == unit]
+        signs = {signal.name: signal.driving for signal in named(model, some)}
         for path, values in solution.together(*some).items():
             if np.any(values) and (slips or unit != "m" or not path.endswith("_rel")):
                 scale = float(np.abs(values).max())
                 curve = np.round(signs[path] * values / scale, 6) + 0.0
                 key = curve.tobytes() + f"{unit}{scale:.6g}".encode()
-                found[key] = path if key not in found or path in wanted else found[key]
-    return named(model, list(found.values()))
+                signals[key] = path if key not in signals or path in wanted else signals[key]
+    return named(model, list(signals.values()))
 
 
 def quantity_of(signal: Signal) -> str:
@@ -207,12 +207,12 @@ def quantity(unit: str) -> str:
 
 def _of_parts(solution: Trajectories) -> list[Any]:
     """Return the variables of parts without their connectors and inputs."""
-    return [one for one in solution.model.flat_variables if one.kind in ("local", "output") and not one.hidden]
+    return [v for v in solution.model.flat_variables if v.kind in ("local", "output") and not v.hidden]
 
 
 def _quantities_left(solution: Trajectories, drawn: Sequence[str]) -> list[str]:
     """Count the variables of parts with a unit that is not drawn."""
-    units = [str(one.unit) for one in _of_parts(solution)]
+    units = [str(part.unit) for part in _of_parts(solution)]
     names = [QUANTITIES.get(unit, "signal") for unit in units if unit not in drawn]
     counts = {name: names.count(name) for name in names}
     return [f"{count} {name if count == 1 else _plural(name)}" for name, count in counts.items()]

@@ -47,7 +47,7 @@ def sankey(balance: EnergyBalance, title: str = "") -> Figure:
         title: heading.
     """
     brought, went = (_together(side) for side in streams(balance))
-    total = max(sum(one.amount for one in brought), sum(one.amount for one in went), 1e-300)
+    total = max(sum(flow.amount for flow in brought), sum(flow.amount for flow in went), 1e-300)
     rows = max(len(brought), len(went), 3)
     with picture(f"{title or 'energy'}: {total:.4g} J", 1, 1.0 + 0.45 * rows) as (figure, (axes,)):
         axes.set_axis_off()
@@ -60,11 +60,11 @@ def sankey(balance: EnergyBalance, title: str = "") -> Figure:
 
 def _together(side: Sequence[Stream]) -> list[Stream]:
     """Sort streams by size within a colour, and merge small ones."""
-    total = sum(one.amount for one in side) or 1.0
-    shown = [one for one in side if one.amount >= _SMALL * total]
-    rest = sum(one.amount for one in side if one.amount < _SMALL * total)
-    colours = list(dict.fromkeys(one.colour for one in side))
-    shown.sort(key=lambda one: (colours.index(one.colour), -one.amount))
+    total = sum(flow.amount for flow in side) or 1.0
+    shown = [flow for flow in side if flow.amount >= _SMALL * total]
+    rest = sum(flow.amount for flow in side if flow.amount < _SMALL * total)
+    colours = list(dict.fromkeys(flow.colour for flow in side))
+    shown.sort(key=lambda flow: (colours.index(flow.colour), -flow.amount))
     return [*shown, Stream("others", rest, "#999999")] if rest > 1e-9 * total else shown
 
 
@@ -72,12 +72,14 @@ def _side(axes: Axes, side: Sequence[Stream], total: float, x: float) -> None:
     """Draw the streams of one side, spread by gaps, to or from the bar in the middle."""
     spread = _GAP * (len(side) - 1) / 2
     outer, inner = spread, 0.0
-    for one in side:
-        height = one.amount / total
-        _ribbon(axes, (x, outer), (_MIDDLE, inner), height, one.colour)
-        _box(axes, x, outer, outer - height, one.colour)
+    for flow in side:
+        height = flow.amount / total
+        _ribbon(axes, (x, outer), (_MIDDLE, inner), height, flow.colour)
+        _box(axes, x, outer, outer - height, flow.colour)
         where = (x - 0.03, "right") if x < _MIDDLE else (x + 0.03, "left")
-        axes.text(where[0], outer - height / 2, f"{one.name}  {one.amount:.4g} J", ha=where[1], va="center", fontsize=8)
+        axes.text(
+            where[0], outer - height / 2, f"{flow.name}  {flow.amount:.4g} J", ha=where[1], va="center", fontsize=8
+        )
         outer -= height + _GAP
         inner -= height
 

@@ -75,9 +75,9 @@ class _Elimination:
                 if affected not in queued and affected not in used:
                     queued.add(affected)
                     queue.append(affected)
-        found = [self.find(node) for node in range(len(self.model.nodes))]
+        roots = [self.find(node) for node in range(len(self.model.nodes))]
         return Aliases(
-            root=[root for root, _ in found], factor=[factor for _, factor in found], known=self.known,
+            root=[root for root, _ in roots], factor=[factor for _, factor in roots], known=self.known,
             derivative={n: self._derivative(n) for n in self.derivative if self.parent[n] == n},
             remaining=sorted(self.remaining), contradictions=self.contradictions,
         )  # fmt: skip
@@ -107,11 +107,11 @@ class _Elimination:
         terms: dict[int, float | None] = {}
         sizes: dict[int, float] = {}
         products: list[tuple[Any, Any]] = []
-        find, known = self.find, self.known
+        find, values = self.find, self.known
         for node, coefficient in equation.terms:
             root, factor = find(node)
-            if root in known:
-                products.append((coefficient, factor * known[root]))
+            if root in values:
+                products.append((coefficient, factor * values[root]))
                 continue
             before = terms.get(root, 0.0)
             if before is None or isinstance(coefficient, Coefficient):
@@ -136,7 +136,14 @@ class _Elimination:
         terms, products = self._reduce(equation)
         self.remaining.discard(number)
         if not terms:
-            self.contradictions.append(self._causes(number))
+            causes = [number]
+            for one in causes:
+                for node, _ in self.model.linear[one].terms:
+                    cause = self.cause.get(self.find(node)[0])
+                    if cause is not None and cause not in causes:
+                        causes.append(cause)
+            ends = [c for c in causes if len(self.model.linear[c].terms) == 1]
+            self.contradictions.append(tuple(ends if len(ends) > 1 else dict.fromkeys([number, *ends])))
             return set()
         match [*terms.items()]:
             case [(root, float(slope))] if root not in self.integral and root not in self.inputs:
@@ -156,17 +163,6 @@ class _Elimination:
             self.watchers.setdefault(root, set()).add(number)
         return set()
 
-    def _causes(self, number: int) -> tuple[int, ...]:
-        """Follow the values of the unknowns of an equation back to the equations that gave them."""
-        found = [number]
-        for one in found:
-            for node, _ in self.model.linear[one].terms:
-                cause = self.cause.get(self.find(node)[0])
-                if cause is not None and cause not in found:
-                    found.append(cause)
-        ends = [one for one in found if len(self.model.linear[one].terms) == 1]
-        return tuple(ends if len(ends) > 1 else dict.fromkeys([number, *ends]))
-
     def _learn(self, root: int, value: Any) -> set[int]:
         """Store the constant value of a class; its derivatives are zero."""
         self.known[root] = value
@@ -184,8 +180,8 @@ class _Elimination:
         if first in self.inputs and second in self.inputs:
             return False
         # As a derivative, an input would take the factor of the integral's name; only that of another input has none.
-        for one, other, times in ((first, second, 1.0 / ratio), (second, first, ratio)):
-            if one in self.inputs and other in self.integral:
+        for node, other, times in ((first, second, 1.0 / ratio), (second, first, ratio)):
+            if node in self.inputs and other in self.integral:
                 base = self._integral_root(other)
                 if base not in self.inputs or self._derivative(base)[1] * times != 1.0:
                     return False
@@ -200,10 +196,10 @@ class _Elimination:
         return self.find(self.integral[root])[0]
 
     def _integrals(self, root: int) -> set[int]:
-        found: set[int] = set()
-        while root in self.integral and (root := self._integral_root(root)) not in found:
-            found.add(root)
-        return found
+        integrals: set[int] = set()
+        while root in self.integral and (root := self._integral_root(root)) not in integrals:
+            integrals.add(root)
+        return integrals
 
     def _merge(self, first: int, second: int, ratio: float) -> set[int]:
         """First = ratio * second."""

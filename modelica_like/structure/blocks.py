@@ -90,8 +90,16 @@ class BlockSolver:
         self.unknowns = ca.vertsplit(unknowns)
         self.jacobian = ca.jacobian(residual, unknowns)
         self.residual = self._without_cancelled(residual)
-        self.rows = _places_by_row(self.jacobian.sparsity())
-        self.safe = self._safe_entries(volatile)
+        # Columns in each row, with the place of the entry among all.
+        sparsity = self.jacobian.sparsity()
+        rows: list[dict[int, int]] = [{} for _ in range(sparsity.size1())]
+        for place, (k, column) in enumerate(zip(*sparsity.get_triplet(), strict=True)):
+            rows[k][column] = place
+        self.rows = rows
+        # Entries that depend on parameters only cannot become zero during a run.
+        moving = ca.which_depends(self.jacobian.nz[:], volatile, 1, True)
+        places = zip(*self.jacobian.sparsity().get_triplet(), strict=True)
+        self.safe = {place for place, moves in zip(places, moving, strict=True) if not moves}
         self.rates, self.kept = set(rates), set(kept)
         self.first = self.rates - {c for r, row in enumerate(self.rows) for c in row if (r, c) not in self.safe}
         self.solved = Solved()
@@ -109,26 +117,20 @@ class BlockSolver:
         self.jacobian = ca.SX(pattern, ca.vertcat(ca.SX(0, 1), *(k[2] for k in kept)))
         return rows
 
-    def _safe_entries(self, volatile: Any) -> set[tuple[int, int]]:
-        """Entries of the Jacobian that depend on parameters only: they cannot become zero during a run."""
-        moving = ca.which_depends(self.jacobian.nz[:], volatile, 1, True)
-        places = zip(*self.jacobian.sparsity().get_triplet(), strict=True)
-        return {place for place, moves in zip(places, moving, strict=True) if not moves}
-
     def run(self) -> Solved:
         """Solve all blocks."""
         for rows, columns in triangular(self.jacobian.sparsity()):
             if len(rows) != len(columns):
-                raise self._not_square(columns)
+                names = ", ".join(str(self.unknowns[column]) for column in columns[:6])
+                raise (
+                    StructureError(
+                        f"After index reduction the equations do not determine {names or 'all unknowns'}.",
+                        advice="Look for rigid parts that form a loop, or a part whose motion needs the "
+                        "derivative of an input.",
+                    )
+                )
             self._solve(tuple(rows), tuple(columns))
         return self.solved
-
-    def _not_square(self, columns: list[int]) -> StructureError:
-        names = ", ".join(str(self.unknowns[column]) for column in columns[:6])
-        return StructureError(
-            f"After index reduction the equations do not determine {names or 'all unknowns'}.",
-            advice="Look for rigid parts that form a loop, or a part whose motion needs the derivative of an input.",
-        )
 
     def _solve(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> None:
         sequence, tears, rest = self._tear(rows, columns)
@@ -248,11 +250,3 @@ def triangular(sparsity: ca.Sparsity) -> Iterator[tuple[list[int], list[int]]]:
     _, rows, columns, row_starts, column_starts, _, _ = sparsity.btf()
     for at_rows, at_columns in zip(pairwise(row_starts), pairwise(column_starts), strict=True):
         yield rows[slice(*at_rows)], columns[slice(*at_columns)]
-
-
-def _places_by_row(sparsity: ca.Sparsity) -> list[dict[int, int]]:
-    """Columns in each row, with the place of the entry among all."""
-    rows: list[dict[int, int]] = [{} for _ in range(sparsity.size1())]
-    for place, (row, column) in enumerate(zip(*sparsity.get_triplet(), strict=True)):
-        rows[row][column] = place
-    return rows

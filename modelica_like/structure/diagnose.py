@@ -44,7 +44,11 @@ def check_solvable(system: System, incidence: list[list[int]], contradictions: l
         over, under = ([_chain_name(system, chains[c]) for c in block] for block in (over_cols, under_cols))
         raise _overdetermined(system.model, [system.origins[r] for r in over_rows], over, under)
     if contradictions:
-        raise _contradiction(system.model, contradictions)
+        parts = _parts(contradictions)
+        what = (
+            f"{_list(parts)} {'fixes' if len(parts) == 1 else 'fix'} the same {{potential}} or {{flow}} more than once."
+        )
+        raise doubly_fixed(system.model, contradictions, what, "Two parts prescribe it, or rigid parts form a loop.")
     if len(under_cols) > len(under_rows):
         raise _underdetermined(
             system,
@@ -95,12 +99,6 @@ def _overdetermined(model: FlatModel, origins: list[Origin], over: list[str], un
     return doubly_fixed(model, origins, what, "Two rigid parts fix the same {potential} or {flow}.")
 
 
-def _contradiction(model: FlatModel, origins: list[Origin]) -> Overdetermined:
-    parts = _parts(origins)
-    what = f"{_list(parts)} {'fixes' if len(parts) == 1 else 'fix'} the same {{potential}} or {{flow}} more than once."
-    return doubly_fixed(model, origins, what, "Two parts prescribe it, or rigid parts form a loop.")
-
-
 def doubly_fixed(model: FlatModel, origins: Sequence[Origin], what: str, why: str) -> Overdetermined:
     """Return the error about equations that fix the same quantity more than once.
 
@@ -142,21 +140,21 @@ def _domain(model: FlatModel, origins: Sequence[Origin]) -> tuple[Domain, list[s
     ends = {f"{path}.{name}" if path else name: (path, connector)
             for path, part in model.components.items() for name, connector in part.connectors.items()}  # fmt: skip
     named = {path for origin in origins for path in origin.path.split(" – ")}
-    found = [one for end, one in ends.items() if not named.isdisjoint((end, one[0]))]
-    if not found:
+    connectors = [connector for end, connector in ends.items() if not named.isdisjoint((end, connector[0]))]
+    if not connectors:
         return Domain(), []
-    domains = {id(connector.domain): connector.domain for _, connector in found}.values()
-    networks = [(domain, _network(model, ends, found, domain)) for domain in domains]
-    return next((one for one in networks if _has_no_reference(model, *one)), networks[0])
+    domains = {id(connector.domain): connector.domain for _, connector in connectors}.values()
+    networks = [(domain, _network(model, ends, connectors, domain)) for domain in domains]
+    return next((network for network in networks if _has_no_reference(model, *network)), networks[0])
 
 
 def _network(
-    model: FlatModel, ends: dict[str, tuple[str, Connector]], found: list[tuple[str, Connector]], domain: Domain
+    model: FlatModel, ends: dict[str, tuple[str, Connector]], connectors: list[tuple[str, Connector]], domain: Domain
 ) -> list[str]:
     """Return the parts that the connections of a domain join with those found."""
-    sets = [origin.path.split(" – ") for one in model.linear if (origin := one.origin).kind == "connection"]
-    joined = [{ends[end][0] for end in one} for one in sets if one[0] in ends and ends[one[0]][1].domain is domain]
-    network = {path for path, connector in found if connector.domain is domain}
-    while larger := [one for one in joined if not (one <= network or one.isdisjoint(network))]:
+    sets = [origin.path.split(" – ") for equation in model.linear if (origin := equation.origin).kind == "connection"]
+    joined = [{ends[end][0] for end in n} for n in sets if n[0] in ends and ends[n[0]][1].domain is domain]
+    network = {path for path, connector in connectors if connector.domain is domain}
+    while larger := [nodes for nodes in joined if not (nodes <= network or nodes.isdisjoint(network))]:
         network = network.union(*larger)
     return [path for path in model.components if path in network]

@@ -115,7 +115,7 @@ def singular_groups(system: System, counts: list[int], states: list[int]) -> tup
         counts: number of differentiations of each equation.
         states: chosen levels.
     """
-    entries, found = _entries(system, counts), list[Group]()
+    entries, groups = _entries(system, counts), list[Group]()
     for together in _connected(system, entries):
         count = max(counts[row] for row in together)
         part = {row: entries[row] for row in together if counts[row] == count}
@@ -124,8 +124,8 @@ def singular_groups(system: System, counts: list[int], states: list[int]) -> tup
         moves = any(moving for row in part.values() for level, moving in row.items() if level not in chosen)
         always = any(system.levels[level].preference == _ALWAYS for level in chosen)
         if moves and chosen and not always and _vanishes(system, [*part], sorted(levels - chosen)):
-            found.append(_group(system, part, count))
-    return tuple(found)
+            groups.append(_group(system, part, count))
+    return tuple(groups)
 
 
 def moving_chains(system: System, counts: list[int]) -> set[int]:
@@ -153,8 +153,8 @@ def _connected(system: System, entries: dict[int, dict[int, bool]]) -> list[list
     """Constraints that share chains."""
     chains = {row: {system.levels[level].chain for level in levels} for row, levels in entries.items()}
     users: dict[int, list[int]] = {}
-    for row, own in chains.items():
-        for chain in own:
+    for row, chains_of in chains.items():
+        for chain in chains_of:
             users.setdefault(chain, []).append(row)
     groups: list[list[int]] = []
     while chains:
@@ -183,23 +183,25 @@ def _vanishes(system: System, rows: list[int], dependent: list[int]) -> bool:
     points = nominal * spread(-np.pi, np.pi, (len(nominal), _SAMPLES))
     times = np.logspace(*_TIMES, _SAMPLES)[None]
     values = function.map(_SAMPLES)(points, *system.constants, times).full().T.reshape(_SAMPLES, len(rows), -1)
-    found = np.linalg.det(values[[bool(np.isfinite(one).all()) for one in values]])
-    sizes = np.abs(found)
-    return bool(len(found) and (found.min() < 0 < found.max() or sizes.min() < _VANISHES * sizes.max()))
+    determinants = np.linalg.det(values[[bool(np.isfinite(value).all()) for value in values]])
+    sizes = np.abs(determinants)
+    return bool(
+        len(determinants) and (determinants.min() < 0 < determinants.max() or sizes.min() < _VANISHES * sizes.max())
+    )
 
 
 def _group(system: System, part: dict[int, dict[int, bool]], count: int) -> Group:
     """Set aside constraints with a variable of their own, whose slope is constant; the others are the core."""
-    rows, own = dict(part), list[int]()
+    rows, columns = dict(part), list[int]()
     while True:
         users = Counter(level for levels in rows.values() for level in levels)
         pairs = [(row, level) for row, levels in rows.items() for level in levels
                  if not levels[level] and users[level] == 1]  # fmt: skip
         if not pairs:
-            return Group(tuple(rows), tuple(sorted(users)), count, tuple(own))
+            return Group(tuple(rows), tuple(sorted(users)), count, tuple(columns))
         row, level = min(pairs, key=lambda pair: system.levels[pair[1]].preference)
         del rows[row]
-        own.append(level)
+        columns.append(level)
 
 
 def follow(system: System, groups: tuple[Group, ...]) -> tuple[Following, ...]:
@@ -226,10 +228,17 @@ def _follow(system: System, group: Group, numbers: Counter[str]) -> Following:
     for row in first:
         numbers[prefix] += 1
         name = f"{prefix}state[{numbers[prefix]}]"
-        chains.append(_add_chain(system, name, group.count))
+        # A state has as many derivatives as the constraints have.
+        added = len(system.chains)
+        system.chains.append([len(system.levels)])
+        system.levels.append(Level(added, 0, name, _ALWAYS, 1.0, 0.0))
+        system.symbols.append(ca.SX.sym(name))
+        for _ in range(group.count):
+            system.add_level(added)
+        chains.append(added)
         discretes += [FlatDiscrete(f"{name}.{of}", ONE, f"weight of {of} in {name}", float(weight), hidden=True)
                       for of, weight in zip(moved, row, strict=True)]  # fmt: skip
-    symbols = ca.vertcat(*(ca.SX.sym(one.path) for one in discretes))
+    symbols = ca.vertcat(*(ca.SX.sym(discrete.path) for discrete in discretes))
     system.model = replace(model, discretes=[*model.discretes, *discretes], d=ca.vertcat(model.d, symbols))
     weights = ca.reshape(symbols[1:], len(moved), -1)
     states = ca.vertcat(*(system.symbols[system.chains[chain][0]] for chain in chains))
@@ -244,17 +253,6 @@ def _measured(system: System, group: Group, levels: Sequence[int]) -> Any:
     return system.column(levels) / ca.DM([system.levels[level].nominal for level in group.levels])
 
 
-def _add_chain(system: System, name: str, count: int) -> int:
-    """Add a state with as many derivatives as the constraints have."""
-    chain = len(system.chains)
-    system.chains.append([len(system.levels)])
-    system.levels.append(Level(chain, 0, name, _ALWAYS, 1.0, 0.0))
-    system.symbols.append(ca.SX.sym(name))
-    for _ in range(count):
-        system.add_level(chain)
-    return chain
-
-
 def _first_weights(system: System, slopes: Any) -> Any:
     """Weights that fit the start values, as numbers; shape (states, variables)."""
     model = system.model
@@ -265,17 +263,17 @@ def _first_weights(system: System, slopes: Any) -> Any:
             p, d = system.constants
             values[placed[0]] = float(ca.Function("start", [model.p, model.d], [start.value])(p, d)) / placed[1]
     function = ca.Function("slopes", [system.everything, model.p, model.d, model.time], [ca.densify(slopes)])
-    found = function(values, *system.constants, 0.0).full()
-    found = np.where(np.isfinite(found), found, 0.0)
-    sizes = np.linalg.norm(found, axis=1, keepdims=True)
-    found += _OFF * np.where(sizes > 0, sizes, 1.0) * spread(-1.0, 1.0, found.shape)
-    return np.linalg.svd(found)[2][len(found) :]
+    weights = function(values, *system.constants, 0.0).full()
+    weights = np.where(np.isfinite(weights), weights, 0.0)
+    sizes = np.linalg.norm(weights, axis=1, keepdims=True)
+    weights += _OFF * np.where(sizes > 0, sizes, 1.0) * spread(-1.0, 1.0, weights.shape)
+    return np.linalg.svd(weights)[2][len(weights) :]
 
 
 def prefer(system: System, groups: tuple[Group, ...], following: tuple[Following, ...]) -> None:
     """Prefer the states that follow, and no variable that a constraint determines."""
-    for one in following:
-        _set_preference(system, one.chains, _ALWAYS + 1)
+    for choice in following:
+        _set_preference(system, choice.chains, _ALWAYS + 1)
     for group in groups:
         _set_preference(system, [system.levels[level].chain for level in group.own], -1)
 

@@ -87,15 +87,15 @@ def add_approaches(system: System) -> tuple[HeldMotion, ...]:
     holds = _find(system.model)
     if holds:
         approaches = ca.SX.sym("approach", len(holds))
-        for one, gain, approach in zip(holds, gains(system), ca.vertsplit(approaches), strict=True):
-            system.residual[one.row] -= gain * approach
+        for hold, gain, approach in zip(holds, gains(system), ca.vertsplit(approaches), strict=True):
+            system.residual[hold.row] -= gain * approach
         system.model = replace(system.model, d=ca.vertcat(system.model.d, approaches))
     return holds
 
 
 def _find(model: FlatModel) -> tuple[HeldMotion, ...]:
     row_of = {pair: row for row, pair in enumerate(model.general)}
-    found: list[HeldMotion] = []
+    holds: list[HeldMotion] = []
     for number, instance in enumerate(model.instances):
         template = instance.template
         if not template.holds:
@@ -103,19 +103,19 @@ def _find(model: FlatModel) -> tuple[HeldMotion, ...]:
         node = {slot.path: instance.nodes[k] for k, slot in enumerate(template.slots) if slot.order == 0}
         discrete = dict(zip(template.discretes, instance.discretes, strict=True))
         for form in template.holds:
-            found.append(
+            holds.append(
                 HeldMotion(
                     instance.path, discrete[form.mode], form.number, form.loose, node[form.motion],
                     node.get(form.reaction, -1), row_of[number, form.row], form.rigid,
-                    len(model.discretes) + len(found),
+                    len(model.discretes) + len(holds),
                 )
             )  # fmt: skip
-    return tuple(found)
+    return tuple(holds)
 
 
 def hold_terms(model: FlatModel, values: Any) -> Any:
     """Gain, capacities and restitution of every held motion, one row each; shape (holds, TERMS)."""
-    if not any(one.template.holds for one in model.instances):
+    if not any(instance.template.holds for instance in model.instances):
         return ca.SX(0, TERMS)
     columns = evaluate(model, "hold_terms", values)
     return ca.reshape(ca.vertcat(*(columns[k] for k in sorted(columns))), TERMS, -1).T
@@ -137,7 +137,7 @@ def find_circuits(
         order: explicit unknowns (symbols) with their expressions in earlier ones.
         states: levels that are states.
     """
-    rigid = [k for k, one in enumerate(holds) if one.rigid and one.reaction >= 0]
+    rigid = [k for k, hold in enumerate(holds) if hold.rigid and hold.reaction >= 0]
     if len(rigid) < 2:
         return []
     slopes = system.generic(_slopes(system, [holds[k].motion for k in rigid], order, states)).full()
@@ -248,13 +248,13 @@ def held_rates(model: FlatModel, ode: Any, values: Any, holds: tuple[HeldMotion,
         holds: the held motions, with their states.
         circuits: those that depend on each other.
     """
-    switched = {k: one.first + place for one in circuits for place, k in enumerate(one.members)}
+    switched = {k: circuit.first + place for circuit in circuits for place, k in enumerate(circuit.members)}
     gain, rates, d = hold_terms(model, values)[:, 0], ca.SX(ode), model.d
-    for k, one in enumerate(holds):
-        if one.rigid and one.state is not None:
-            state, factor = one.state
-            own = ca.logic_and(d[one.mode] == one.number, gain[k] != 0)
+    for k, hold in enumerate(holds):
+        if hold.rigid and hold.state is not None:
+            state, factor = hold.state
+            rate = ca.logic_and(d[hold.mode] == hold.number, gain[k] != 0)
             if k in switched:
-                own = ca.logic_and(own, d[switched[k]] == 0)
-            rates[state] = ca.if_else(own, d[one.approach] / factor, rates[state])
+                rate = ca.logic_and(rate, d[switched[k]] == 0)
+            rates[state] = ca.if_else(rate, d[hold.approach] / factor, rates[state])
     return rates

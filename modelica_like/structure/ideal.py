@@ -73,15 +73,15 @@ class IdealNetwork:
 def find_ideals(model: FlatModel) -> list[IdealElement]:
     """Find the ideal elements of all components."""
     row_of = {pair: row for row, pair in enumerate(model.general)}
-    found: list[IdealElement] = []
+    ideals: list[IdealElement] = []
     for number, instance in enumerate(model.instances):
         template = instance.template
         node = {slot.path: instance.nodes[k] for k, slot in enumerate(template.slots) if slot.order == 0}
         discrete = dict(zip(template.discretes, instance.discretes, strict=True))
         for form in template.ideals:
             zeros = node[form.zeros[0]], node[form.zeros[1]]
-            found.append(IdealElement(instance.path, discrete[form.mode], zeros, row_of[number, form.row]))
-    return found
+            ideals.append(IdealElement(instance.path, discrete[form.mode], zeros, row_of[number, form.row]))
+    return ideals
 
 
 def complete(reduced: ReducedDae, ideals: list[IdealElement], rows: list[int]) -> ReducedDae:
@@ -93,21 +93,21 @@ def complete(reduced: ReducedDae, ideals: list[IdealElement], rows: list[int]) -
         rows: positions in the residual of the equations in `alg`.
     """
     flat, size = reduced.flat, len(rows)
-    elements = tuple(replace(one, row=rows.index(one.row)) for one in ideals)
+    elements = tuple(replace(ideal, row=rows.index(ideal.row)) for ideal in ideals)
     network = IdealNetwork(elements, flat.d.numel(), HEAD + size)
     table = ca.SX.sym("ideal", network.width, len(elements))
     rates = ca.jtimes(reduced.alg, reduced.x, reduced.ode) + ca.jtimes(reduced.alg, flat.time, ca.SX(1))
     rates += _BACK * reduced.alg
     missed = ca.substitute(reduced.alg, reduced.z, ca.SX.zeros(size))  # linear: what is left of it is the condition
-    zeros = [reduced.values[list(one.zeros)] for one in elements]
-    reactions = [ca.if_else(flat.d[one.mode] == 0, pair[1], pair[0]) for one, pair in zip(elements, zeros, strict=True)]
-    reacting = [one.row for one in elements]
+    zeros = [reduced.values[list(e.zeros)] for e in elements]
+    reactions = [ca.if_else(flat.d[e.mode] == 0, pair[1], pair[0]) for e, pair in zip(elements, zeros, strict=True)]
+    reacting = [e.row for e in elements]
     alg = ca.SX(reduced.alg)
-    for k, one in enumerate(elements):
+    for k, element in enumerate(elements):
         replaced, impulse, is_norm, weights = *ca.vertsplit(table[:HEAD, k]), table[HEAD:, k]
         # The sums one by one: reactions are lost in terms that are a million times as large.
         norm = ca.dot(weights[reacting], ca.vertcat(*reactions)) - _CONDUCTANCE * ca.dot(weights, missed)
-        own = ca.if_else(is_norm, norm, ca.dot(weights, rates) + impulse)
-        alg[one.row] = ca.if_else(replaced, own, alg[one.row])
+        equation = ca.if_else(is_norm, norm, ca.dot(weights, rates) + impulse)
+        alg[element.row] = ca.if_else(replaced, equation, alg[element.row])
     flat = replace(flat, d=ca.vertcat(flat.d, ca.vec(table)))
     return replace(reduced, flat=flat, alg=alg, ideal=network)

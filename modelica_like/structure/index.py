@@ -17,12 +17,12 @@ def prefer_relative_states(system: System) -> None:
     tolerance allows. Behind a gear the shaft's angle is not differentiated itself, but its linear relation to the
     motor's angle is enough. A relation to an input gives no derivative: the state would need the input's derivatives.
     """
-    known = set(system.inputs)
+    inputs = set(system.inputs)
     reach = [len(chain) for chain in system.chains]
     relations = [
         [system.levels[level].chain for level in levels]
         for levels in system.linear_rows
-        if len(levels) > 1 and not any(system.levels[level].order or level in known for level in levels)
+        if len(levels) > 1 and not any(system.levels[level].order or level in inputs for level in levels)
     ]
     changed = True
     while changed:
@@ -66,12 +66,12 @@ class Pantelides:
 
     def _match(self, equation: int) -> None:
         while True:
-            equations, levels, found = self._augment(equation)
-            if found:
+            equations, levels, complete = self._augment(equation)
+            if complete:
                 return
             above = {level: self.system.add_level(self.system.levels[level].chain) for level in levels}
-            for one in equations:
-                self._differentiate(one)
+            for row in equations:
+                self._differentiate(row)
             for level in levels:
                 self._assign(above[level], self._derived[self._equation_of[level]])
             equation = self._derived[equation]

@@ -34,16 +34,16 @@ def isolate(residual: Any, unknown: Any) -> Any | None:
 
 def _find(root: Any, target: int) -> list[tuple[Any, int]] | None:
     """Return the way from the root to the only occurrence: pairs of a node and the operand to go to."""
-    found: list[tuple[Any, int]] | None = None
+    path: list[tuple[Any, int]] | None = None
     pending: list[tuple[Any, list[tuple[Any, int]]]] = [(root, [])]
     for _ in range(_MAX_NODES):
         if not pending:
-            return found
+            return path
         node, trail = pending.pop()
         if node.element_hash() == target:
-            if found is not None:
+            if path is not None:
                 return None
-            found = trail
+            path = trail
             continue
         for position in range(node.n_dep()):
             pending.append((node.dep(position), [*trail, (node, position)]))

@@ -111,16 +111,16 @@ class Elimination:
         pending = [self._row_of[column] for column in values if column in self._row_of]
         heapify(pending)
         while pending:
-            pivot, known = self._rows[heappop(pending)]
+            pivot, pivot_row = self._rows[heappop(pending)]
             value = values.pop(pivot)
             if abs(value) <= _ROUNDING * sizes[pivot]:
                 continue
-            for column, entry in known.items():
+            for column, entry in pivot_row.items():
                 if column == pivot:
                     continue
                 if column not in values and column in self._row_of:
                     heappush(pending, self._row_of[column])
-                change = value * entry / known[pivot]
+                change = value * entry / pivot_row[pivot]
                 values[column] = values.get(column, 0.0) - change
                 sizes[column] = sizes.get(column, 0.0) + abs(change)
         return {column: value for column, value in values.items() if abs(value) > _ROUNDING * sizes[column]}

@@ -36,7 +36,7 @@ class Motion:
         A model with many implicit unknowns is solved for their rates in numbers.
         """
         both = (expressions, self.alg)
-        return [part for one in both for part in (self.held(one), ca.jacobian(one, self.z))]
+        return [part for symbol in both for part in (self.held(symbol), ca.jacobian(symbol, self.z))]
 
     def rate(self, expressions: Any) -> Any:
         """Return time derivatives as expressions, with inputs held."""

@@ -51,11 +51,8 @@ class Flags:
             block_of_level |= dict.fromkeys((unknowns[column] for column in columns), number)
         values = ca.SX.ones(len(self.variables))
         for row, column in zip(*ca.jacobian_sparsity(self._residual, self._symbols).get_triplet(), strict=True):
-            if block_of_level.get(self._acceleration(self.variables[column])) == block_of_row[row]:
+            placed = self.system.node_level[self.variables[column]]
+            if block_of_level.get(None if placed is None else self.system.derivative(placed[0])) == block_of_row[row]:
                 values[column] = 0
         self._put(values)
         return True
-
-    def _acceleration(self, variable: int) -> int | None:
-        placed = self.system.node_level[variable]
-        return None if placed is None else self.system.derivative(placed[0])

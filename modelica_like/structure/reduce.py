@@ -128,9 +128,9 @@ class ReducedDae:
         text = f"{count} constraint{'s' if count > 1 else ''} differentiated; states kept: {', '.join(self.states)}."
         index = f"Index {self.index}: {named} motions. {text}"
         return index, *(
-            f"No fixed choice of states fits {one.told} everywhere: {self.flat.discretes[one.mode].path} makes it anew "
-            "at events."
-            for one in self.choices
+            f"No fixed choice of states fits {choice.told} everywhere: {self.flat.discretes[choice.mode].path} makes "
+            "it anew at events."
+            for choice in self.choices
         )
 
 
@@ -145,13 +145,14 @@ def reduce(flat: FlatModel) -> ReducedDae:
         chosen = _choose(flat, find_aliases(flat), groups)
     system, counts, states, holds, flags = chosen.system, chosen.counts, chosen.states, chosen.holds, chosen.flags
     residual, origins = _differentiate(system, counts)
-    unknowns = _unknowns(system, states)
+    determined = {*states, *system.inputs}
+    unknowns = [n for n in range(len(system.levels)) if n not in determined]
     if flags.settle(residual, unknowns):
         residual, origins = _differentiate(system, counts)
     derivatives = {system.derivative(state) for state in states}
     rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
     ideals = find_ideals(flat)
-    kept = [one.row for one in ideals]
+    kept = [ideal.row for ideal in ideals]
     solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
@@ -161,11 +162,11 @@ def reduce(flat: FlatModel) -> ReducedDae:
     if changed is not residual:
         residual = changed
         solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
-    own = len(counts) - sum(len(one.chains) for one in chosen.following)
-    reduced = _assemble(system, counts[:own], states, unknowns, origins, solved)
-    held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
+    degrees = len(counts) - sum(len(choice.chains) for choice in chosen.following)
+    reduced = _assemble(system, counts[:degrees], states, unknowns, origins, solved)
+    held = tuple(replace(hold, state=reduced.node_states[hold.motion]) for hold in holds)
     ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
-    choices = tuple(write_choice(one, system, states, reduced.level_values) for one in chosen.following)
+    choices = tuple(write_choice(choice, system, states, reduced.level_values) for choice in chosen.following)
     reduced = replace(reduced, ode=ode, holds=held, circuits=tuple(circuits), choices=choices)
     return complete(reduced, ideals, solved.rows) if ideals else reduced
 
@@ -188,19 +189,7 @@ def _choose(flat: FlatModel, aliases: Aliases, groups: tuple[Group, ...]) -> _Ch
     following = follow(system, groups)
     holds = add_approaches(system)
     flags = Flags(system)
-    _check_input_rates(system)
-    prefer_relative_states(system)
-    contradictions = [flat.linear[k].origin for group in aliases.contradictions for k in group]
-    incidence = _incidence(system)
-    check_solvable(system, incidence, contradictions)
-    counts = Pantelides(system, incidence).counts
-    prefer(system, groups, following)
-    states = select_states(system, counts, _top_slopes(system, counts), incidence)
-    return _Chosen(system, counts, states, holds, flags, following)
-
-
-def _check_input_rates(system: System) -> None:
-    """Refuse a motion prescribed by an input if its derivative is needed, because that is not known."""
+    # A motion prescribed by an input has no known derivative.
     for level in system.inputs:
         rate = system.derivative(level)
         if rate is not None and rate not in system.inputs:
@@ -209,14 +198,16 @@ def _check_input_rates(system: System) -> None:
                 "which is not known.",
                 advice="Give the derivative as a separate input, or filter the input before it prescribes a motion.",
             )
-
-
-def _incidence(system: System) -> list[list[int]]:
-    """Level numbers in each residual."""
-    rows: list[list[int]] = [[] for _ in range(system.residual.numel())]
+    prefer_relative_states(system)
+    contradictions = [flat.linear[k].origin for group in aliases.contradictions for k in group]
+    incidence: list[list[int]] = [[] for _ in range(system.residual.numel())]
     for row, column in zip(*ca.jacobian_sparsity(system.residual, system.everything).get_triplet(), strict=True):
-        rows[row].append(column)
-    return rows
+        incidence[row].append(column)
+    check_solvable(system, incidence, contradictions)
+    counts = Pantelides(system, incidence).counts
+    prefer(system, groups, following)
+    states = select_states(system, counts, _top_slopes(system, counts), incidence)
+    return _Chosen(system, counts, states, holds, flags, following)
 
 
 def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:
@@ -265,11 +256,6 @@ def _check_inputs(system: System, equations: Any, rows: list[int]) -> None:
             )
 
 
-def _unknowns(system: System, states: list[int]) -> list[int]:
-    known = {*states, *system.inputs}
-    return [n for n in range(len(system.levels)) if n not in known]
-
-
 def _assemble(
     system: System, counts: list[int], states: list[int], unknowns: list[int], origins: list[Origin], solved: Solved
 ) -> ReducedDae:
@@ -288,11 +274,12 @@ def _assemble(
     place = ca.Function("nodes", [system.everything, model.p], [system.node_values])
     z_levels = [unknowns[k] for k in solved.z]
     rates = [level_values[n] for s in states if (n := system.derivative(s)) is not None]
-    told = [
+    blocks = [
         (tuple(levels[unknowns[k]].name for k in block.unknowns), tuple(origins[k] for k in block.equations))
         for block in solved.blocks
     ]
     numbers = [number for number, _ in solved.determinants]
+    position = {level: k for k, level in enumerate(states)}
     return ReducedDae(
         flat=model,
         states=tuple(levels[s].name for s in states),
@@ -303,16 +290,18 @@ def _assemble(
         ode=ca.vertcat(*rates) if rates else ca.SX(0, 1),
         alg=ca.vertcat(*alg) if alg else ca.SX(0, 1),
         values=place(level_values, model.p),
-        node_states=_node_states(system, states),
+        node_states=tuple(
+            (position[p[0]], p[1]) if p is not None and p[0] in position else None for p in system.node_level
+        ),
         guesses=tuple(levels[s].guess for s in states),
         nominals=tuple(levels[s].nominal for s in states),
         z_guesses=tuple(levels[n].guess for n in z_levels),
         blocks=tuple(solved.blocks),
-        determinants=tuple((*told[number], one) for number, one in zip(numbers, determinants, strict=True)),
+        determinants=tuple((*blocks[number], d) for number, d in zip(numbers, determinants, strict=True)),
         index=max(counts, default=0) + 1,
         differentiated=tuple(system.origins[k] for k, count in enumerate(counts) if count),
         system=system,
-        implicit_blocks=tuple(pair for pair, one in zip(told, solved.blocks, strict=True) if one.kind == "implicit"),
+        implicit_blocks=tuple(pair for pair, b in zip(blocks, solved.blocks, strict=True) if b.kind == "implicit"),
         level_values=level_values,
         explicit=tuple((unknowns[k], expression) for k, expression in solved.order),
     )
@@ -326,8 +315,3 @@ def _written_out(system: System, unknowns: list[int], solved: Solved) -> tuple[A
         _, results = ca.substitute_inplace(symbols, expressions, results, False)
     end = 1 + len(solved.alg)
     return results[0], results[1:end], results[end:]
-
-
-def _node_states(system: System, states: list[int]) -> tuple[tuple[int, float] | None, ...]:
-    position = {level: k for k, level in enumerate(states)}
-    return tuple((position[p[0]], p[1]) if p is not None and p[0] in position else None for p in system.node_level)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from modelica_like.errors import Overdetermined
 from modelica_like.structure.alias import PREFERRED
 from modelica_like.structure.diagnose import doubly_fixed
 from modelica_like.structure.matching import Elimination
@@ -32,23 +31,35 @@ def select_states(
 
     Source: Mattsson and Söderlind, SIAM J. Sci. Comput. 14 (1993) 677-692.
     """
-    known = set(system.inputs)
+    inputs = set(system.inputs)
     dummies: set[int] = set()
     stage = 1
-    candidates = {c for c, chain in enumerate(system.chains) if chain[0] not in known}
+    candidates = {c for c, chain in enumerate(system.chains) if chain[0] not in inputs}
     while rows := [e for e, count in enumerate(counts) if count >= stage]:
         # As a rule a position is a state if its speed is one. A relative angle between two shafts with friction, whose
         # speeds are wanted more than the relative one, is a state all the same: absolute angles grow without bound.
-        ranked = [c for c in _ranked(system, counts, slopes, incidence, stage) if system.chains[c][0] not in known]
+        ranked = [c for c in _ranked(system, counts, slopes, incidence, stage) if system.chains[c][0] not in inputs]
         choices = [_independent(rows, some, slopes) for some in ([c for c in ranked if c in candidates], ranked)]
-        chosen = min(choices, key=lambda one: (-len(one), sum(_preference(system, c, stage) for c in one)))
+        chosen = min(
+            choices,
+            key=lambda choice: (
+                -len(choice),
+                sum(system.levels[system.chains[c][-1 - stage]].preference for c in choice),
+            ),
+        )
         if len(chosen) < len(rows):
-            raise _dependent(system, [e for e in rows if e not in chosen.values()])
+            equations = [e for e in rows if e not in chosen.values()]
+            origins = [system.origins[row] for row in equations]
+            places = ", ".join(dict.fromkeys(o.path or o.kind for o in origins))
+            what = f"The motion is constrained twice: the constraint of {places} follows from others."
+            raise doubly_fixed(
+                system.model, origins, what, "Rigid parts form a loop, or two parts fix the same {potential}."
+            )
         dummies.update(system.chains[c][-1 - stage] for c in chosen)
         candidates = set(chosen)
         stage += 1
     highest = {chain[-1] for chain in system.chains}
-    return [n for n in range(len(system.levels)) if n not in dummies and n not in highest and n not in known]
+    return [n for n in range(len(system.levels)) if n not in dummies and n not in highest and n not in inputs]
 
 
 def _ranked(
@@ -70,15 +81,11 @@ def _ranked(
 
     def rank(chain: int) -> tuple[float, ...]:
         base, level = (system.levels[system.chains[chain][k]] for k in (0, -1 - stage))
-        wanted, relative = (one.preference >= PREFERRED for one in (level, base))
+        wanted, relative = (number.preference >= PREFERRED for number in (level, base))
         length = shortest.get(chain, 0) if wanted or relative else _ABSOLUTE
         return level.preference, system.chains[chain][0] in read if wanted else level.own, length, -chain
 
     return sorted((c for c, chain in enumerate(system.chains) if len(chain) > stage), key=rank)
-
-
-def _preference(system: System, chain: int, stage: int) -> int:
-    return system.levels[system.chains[chain][-1 - stage]].preference
 
 
 def _independent(rows: list[int], columns: list[int], slopes: list[dict[int, float]]) -> dict[int, int]:
@@ -88,15 +95,8 @@ def _independent(rows: list[int], columns: list[int], slopes: list[dict[int, flo
         for column, slope in slopes[row].items():
             if column in entries:
                 entries[column][row] = slope
-    found, chosen = Elimination(len(rows)), dict[int, int]()
+    elimination, chosen = Elimination(len(rows)), dict[int, int]()
     for column in columns:
-        if found.add(entries[column]):
-            chosen[column] = found.pivot
+        if elimination.add(entries[column]):
+            chosen[column] = elimination.pivot
     return chosen
-
-
-def _dependent(system: System, equations: list[int]) -> Overdetermined:
-    origins = [system.origins[e] for e in equations]
-    places = ", ".join(dict.fromkeys(o.path or o.kind for o in origins))
-    what = f"The motion is constrained twice: the constraint of {places} follows from others."
-    return doubly_fixed(system.model, origins, what, "Rigid parts form a loop, or two parts fix the same {potential}.")

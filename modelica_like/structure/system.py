@@ -79,10 +79,10 @@ class System:
     def constants(self) -> tuple[list[float], Any]:
         """Values of parameters, and of modes and discrete values at the start; those that are no numbers are zero."""
         starts = np.zeros(self.model.d.numel())
-        for k, one in enumerate(self.model.discretes):
-            if isinstance(one.start, int | float):
-                starts[k] = one.start
-        return [one.value for one in self.model.parameters], starts
+        for k, discrete in enumerate(self.model.discretes):
+            if isinstance(discrete.start, int | float):
+                starts[k] = discrete.start
+        return [parameter.value for parameter in self.model.parameters], starts
 
     def generic(self, expressions: Any) -> ca.DM:
         """Return numbers at a point that is not special; parameters have their values, modes their starts."""
@@ -103,22 +103,29 @@ class System:
 
     def derivative(self, level: int) -> int | None:
         """Return the next level of the chain, if there is one."""
-        one = self.levels[level]
-        chain = self.chains[one.chain]
-        return chain[one.order + 1] if one.order + 1 < len(chain) else None
+        entry = self.levels[level]
+        chain = self.chains[entry.chain]
+        return chain[entry.order + 1] if entry.order + 1 < len(chain) else None
 
 
 def build_system(model: FlatModel, aliases: Aliases) -> System:
     """Replace every node by its class, and collect the equations that remain."""
     chains, place = _chains(aliases)
-    node_level = _node_levels(aliases, place)
+    # Level and factor of every node, None where its value is known.
+    pairs = ((place.get(root), factor) for root, factor in zip(aliases.root, aliases.factor, strict=True))
+    node_level = [level and (level[0], factor * level[1]) for level, factor in pairs]
     # A state equals the variable after which its chain is named, with sign.
     ranked = _ranked(model, node_level)
     scale = {level: ranked[chain[0]][0][-1] for chain in chains for level in chain}
     node_level = [pair and (pair[0], pair[1] / scale[pair[0]]) for pair in node_level]
     levels = _levels(model, chains, _ranked(model, node_level))
     symbols = [ca.SX.sym(level.name) for level in levels]
-    node_values = _node_values(aliases, node_level, symbols)
+    vector = ca.vertcat(ca.SX(0, 1), *symbols, *aliases.known.values())
+    position = {root: len(symbols) + k for k, root in enumerate(aliases.known)}
+    nodes = zip(node_level, aliases.root, aliases.factor, strict=True)
+    placed = [pair or (position[root], factor) for pair, root, factor in nodes]
+    # A vector of one entry, indexed by a list, gives a row.
+    node_values = ca.vec(vector[[level for level, _ in placed]]) * ca.SX(ca.DM([factor for _, factor in placed]))
     system = System(model, levels, chains, symbols, None, [], node_level, node_values)
     system.inputs = [place[aliases.root[node]][0] for node in model.inputs]
     _collect_residuals(system, aliases)
@@ -146,28 +153,22 @@ def _chains(aliases: Aliases) -> tuple[list[list[int]], dict[int, tuple[int, flo
     return chains, place
 
 
-def _node_levels(aliases: Aliases, place: dict[int, tuple[int, float]]) -> list[tuple[int, float] | None]:
-    """Level and factor of every node, None where its value is known."""
-    pairs = ((place.get(root), factor) for root, factor in zip(aliases.root, aliases.factor, strict=True))
-    return [found and (found[0], factor * found[1]) for found, factor in pairs]
-
-
 _Named = tuple[tuple[Any, ...], int, FlatVariable, float]
 """Rank of a node as the name of its level, the node, its variable, and its factor."""
 
 
 def _ranked(model: FlatModel, node_level: list[tuple[int, float] | None]) -> dict[int, list[_Named]]:
     """Nodes of each level; what should name it comes first."""
-    found: dict[int, list[_Named]] = {}
+    nodes_of: dict[int, list[_Named]] = {}
     for node, placed in enumerate(node_level):
         if placed is not None:
             level, factor = placed
             variable, order = model.nodes[node]
-            one = model.variables[variable]
-            connected, preference = one.kind in ("potential", "flow"), PREFERENCES.index(one.state)
-            rank = (order, connected, factor != 1.0, -preference, one.path.count("."))
-            found.setdefault(level, []).append((rank, node, one, factor))
-    return {level: sorted(nodes) for level, nodes in found.items()}
+            variable_of = model.variables[variable]
+            connected, preference = variable_of.kind in ("potential", "flow"), PREFERENCES.index(variable_of.state)
+            rank = (order, connected, factor != 1.0, -preference, variable_of.path.count("."))
+            nodes_of.setdefault(level, []).append((rank, node, variable_of, factor))
+    return {level: sorted(nodes) for level, nodes in nodes_of.items()}
 
 
 def _levels(model: FlatModel, chains: list[list[int]], ranked: dict[int, list[_Named]]) -> list[Level]:
@@ -176,27 +177,18 @@ def _levels(model: FlatModel, chains: list[list[int]], ranked: dict[int, list[_N
         (_, connected, *_), *_ = ranked[numbers[0]][0]
         for order, number in enumerate(numbers):
             (_, node, named, _), *_ = nodes = ranked[number]
-            own = [(one, factor) for rank, _, one, factor in nodes if rank[0] == 0]
-            preference = max((PREFERENCES.index(one.state) for one, _ in own), default=0)
+            base = [(variable, factor) for rank, _, variable, factor in nodes if rank[0] == 0]
+            preference = max((PREFERENCES.index(variable.state) for variable, _ in base), default=0)
             # The name says nothing about the guess: any of them that has one knows more than zero.
-            guess = next((one.guess / factor for one, factor in own if one.guess), 0.0)
+            guess = next((variable.guess / factor for variable, factor in base if variable.guess), 0.0)
             levels.append(Level(chain, order, model.node_name(node), preference, named.nominal, guess, not connected))
     return levels
-
-
-def _node_values(aliases: Aliases, node_level: list[tuple[int, float] | None], symbols: list[Any]) -> Any:
-    vector = ca.vertcat(ca.SX(0, 1), *symbols, *aliases.known.values())
-    known = {root: len(symbols) + k for k, root in enumerate(aliases.known)}
-    nodes = zip(node_level, aliases.root, aliases.factor, strict=True)
-    placed = [pair or (known[root], factor) for pair, root, factor in nodes]
-    # A vector of one entry, indexed by a list, gives a row.
-    return ca.vec(vector[[level for level, _ in placed]]) * ca.SX(ca.DM([factor for _, factor in placed]))
 
 
 def _collect_residuals(system: System, aliases: Aliases) -> None:
     model = system.model
     columns = evaluate(model, "residual", system.node_values)
-    *starts, count = accumulate((one.numel() for one in columns.values()), initial=0)
+    *starts, count = accumulate((column.numel() for column in columns.values()), initial=0)
     first = dict(zip(columns, starts, strict=True))
     sums: list[Any] = []
     # Positions in all columns, then the sums; together this is cheaper than one by one.
@@ -204,7 +196,8 @@ def _collect_residuals(system: System, aliases: Aliases) -> None:
     system.origins += [model.origin(instance, row) for instance, row in model.general]
     for number in aliases.remaining:
         equation = model.linear[number]
-        system.linear_rows.append(_levels_of(system, equation.terms))
+        placed = (system.node_level[node] for node, _ in equation.terms)
+        system.linear_rows.append(list(dict.fromkeys(pair[0] for pair in placed if pair is not None)))
         if equation.row is not None:
             places.append(first[equation.row[0]] + equation.row[1])
         else:
@@ -217,9 +210,3 @@ def _collect_residuals(system: System, aliases: Aliases) -> None:
     stacked = ca.vertcat(ca.SX(0, 1), *columns.values(), *sums)
     # A vector of one entry, indexed by a list, gives a row.
     system.residual = ca.vec(stacked[places])
-
-
-def _levels_of(system: System, terms: tuple[tuple[int, Any], ...]) -> list[int]:
-    """Levels of the unknown nodes in an equation, each once."""
-    placed = (system.node_level[node] for node, _ in terms)
-    return list(dict.fromkeys(pair[0] for pair in placed if pair is not None))

@@ -11,8 +11,8 @@ import pytest
 from calls import called
 
 from modelica_like import __version__, cli
-from modelica_like.cli.declare import Option
 from modelica_like.cli.overview import complete
+from modelica_like.cli.reader import Option
 
 DIFFERENT = {
     "--output": {"FILE", "FOLDER"},

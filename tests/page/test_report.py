@@ -27,7 +27,7 @@ from modelica_like.language import (
 )
 from modelica_like.show.report.files import write_solution
 from modelica_like.show.report.page import report, save_report
-from modelica_like.show.report.page.curves import curves
+from modelica_like.show.report.page.page import curves
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SPEED, INERTIA = 200 * np.pi, 0.02 + 500 * (0.0075 / np.pi) ** 2

@@ -30,9 +30,8 @@ from modelica_like.language import (
 from modelica_like.language import rows as table_rows
 from modelica_like.netlist import library_types, loads
 from modelica_like.show.report.component_pages import latex_names
-from modelica_like.show.report.component_pages.index import domain
 from modelica_like.show.report.component_pages.latex import Path, Unwritable
-from modelica_like.show.report.component_pages.library import component_pages, examples_by_type
+from modelica_like.show.report.component_pages.library import component_pages, domain, examples_by_type
 from modelica_like.show.report.component_pages.page import page
 from modelica_like.show.report.component_pages.source import Event, Source, Term, _reader
 

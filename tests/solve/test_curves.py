@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from modelica_like.errors import Source, UnknownName, ValueOutOfRange
-from modelica_like.runs.curves import compare_solutions
-from modelica_like.runs.ranges import ranges
+from modelica_like.runs.curves import compare_solutions, ranges
 from modelica_like.runs.recorded import RecordedModel, RecordedSolution, RecordedVariable
 from modelica_like.solve.recorder import Event
 

@@ -48,11 +48,11 @@ class OrderResponse:
         Raises:
             ValueOutOfRange: the speed is not one of the response.
         """
-        found = np.flatnonzero(np.isclose(self.speeds, speed))
-        if not len(found):
+        rows = np.flatnonzero(np.isclose(self.speeds, speed))
+        if not len(rows):
             raise ValueOutOfRange(f"{speed:g} rad/s is not one of the speeds of the response.")
         waves = np.exp(1j * np.outer(self.orders, np.asarray(angles, float)))
-        return np.real(self.response[self.linear.outputs.index(output), :, found[0]] @ waves)
+        return np.real(self.response[self.linear.outputs.index(output), :, rows[0]] @ waves)
 
     def resonances(self) -> dict[float, list[float]]:
         """Return the speeds in rad/s at which each order meets an eigenfrequency, within those of the response."""
@@ -95,8 +95,8 @@ def order_response(linear: LinearModel, excitation: Mapping[float, complex], spe
     if not excitation or min(excitation) <= 0:
         raise ValueOutOfRange("Orders of an excitation must be above zero.")
     speeds = np.atleast_1d(np.asarray(speeds, float))
-    made = [size * linear.response(n * speeds / (2 * np.pi))[:, 0] for n, size in excitation.items()]
-    return OrderResponse(linear, tuple(map(float, excitation)), speeds, np.stack(made, axis=1))
+    responses = [size * linear.response(n * speeds / (2 * np.pi))[:, 0] for n, size in excitation.items()]
+    return OrderResponse(linear, tuple(map(float, excitation)), speeds, np.stack(responses, axis=1))
 
 
 @dataclass(frozen=True, eq=False)

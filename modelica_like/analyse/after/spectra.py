@@ -115,8 +115,8 @@ def load_spectrum(run: Trajectories, load: str) -> LoadSpectrum:
     """
     rainflow = extra_module("rainflow", "analyse")
     curve, unit = along(run, run.path(load))
-    found = sorted(rainflow.extract_cycles(curve.turning(0).tolist()), key=lambda cycle: -cycle[0])
-    table = np.array([cycle[:3] for cycle in found], float).reshape(-1, 3)
+    cycles = sorted(rainflow.extract_cycles(curve.turning(0).tolist()), key=lambda cycle: -cycle[0])
+    table = np.array([cycle[:3] for cycle in cycles], float).reshape(-1, 3)
     return LoadSpectrum(run.path(load), unit, table[:, 0] / 2, table[:, 1], table[:, 2])
 
 
@@ -188,9 +188,9 @@ def duty(run: Trajectories, torque: str, speed: str, gear: str = "", classes: in
     gears, row = np.unique(engaged, return_inverse=True)
 
     def sorted_by(amounts: Vector) -> Vector:
-        made = np.zeros((len(gears), classes))
-        np.add.at(made, (row, which), amounts * weights)
-        return made
+        table = np.zeros((len(gears), classes))
+        np.add.at(table, (row, which), amounts * weights)
+        return table
 
     torques = top * np.arange(1, classes + 1) / classes
     return Duty(run.path(torque), _gears(run, gear, gears), torques, sorted_by(np.ones(len(weights))),
@@ -198,5 +198,7 @@ def duty(run: Trajectories, torque: str, speed: str, gear: str = "", classes: in
 
 
 def _gears(run: Trajectories, gear: str, values: Vector) -> tuple[str, ...]:
-    names = {one.path: one.names for one in run.model.flat_discretes}.get(run.path(gear), ()) if gear else ()
+    names = (
+        {discrete.path: discrete.names for discrete in run.model.flat_discretes}.get(run.path(gear), ()) if gear else ()
+    )
     return tuple(names[int(value)] if names else f"gear {value:g}" if gear else "all" for value in values)

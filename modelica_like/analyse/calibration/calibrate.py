@@ -132,29 +132,29 @@ def calibrate(
     measured = [data] if isinstance(data, Measurement | str | Path) else list(data)
     if not measured or not parameters:
         raise ValueOutOfRange("A calibration needs data and at least one parameter.")
-    for one in measured:
-        if not isinstance(one, Measurement):
+    for item in measured:
+        if not isinstance(item, Measurement):
             raise ValueOutOfRange(
-                f"{one!r} is no measurement.",
+                f"{item!r} is no measurement.",
                 advice='Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the '
                 "uncertainties.",
             )
     problem = _Problem(model, measured, parameters)
     begins = problem.starts(guess or {}, starts, seed)
-    found: list[Any] = []
+    results: list[Any] = []
     failures: list[InitializationError | SolveError] = []
     for begin in begins:
         try:
-            found.append(problem.solve(begin))
+            results.append(problem.solve(begin))
         except (InitializationError, SolveError) as error:
             failures.append(error)
-    if not found:
+    if not results:
         raise CalibrationFailed(
             f"{model.name} could not be calibrated: {failures[-1].what}", where=failures[-1].where,
             advice="Give a guess for which the model can be solved, or narrower bounds.",
         )  # fmt: skip
-    best = min(found, key=lambda one: one.cost)
-    return problem.result(best, tuple(2 * one.cost for one in found))
+    best = min(results, key=lambda r: r.cost)
+    return problem.result(best, tuple(2 * result.cost for result in results))
 
 
 class _Problem:
@@ -200,7 +200,9 @@ class _Problem:
         key = q.tobytes()
         if self._at is None or self._at[0] != key:
             model = self.at(q)
-            residuals, slopes, labels = zip(*(one.residuals(model, self.names) for one in self.data), strict=True)
+            residuals, slopes, labels = zip(
+                *(measured.residuals(model, self.names) for measured in self.data), strict=True
+            )
             self.labels = tuple(chain(*labels))
             self._at = key, np.concatenate(residuals), np.concatenate(slopes) * self.span
         return self._at[1], self._at[2]
@@ -209,31 +211,32 @@ class _Problem:
         values = self.low + self.span * q
         return self.model.with_parameters(dict(zip(self.names, map(float, values), strict=True)))
 
-    def result(self, found: Any, costs: tuple[float, ...]) -> Calibration:
+    def result(self, fit: Any, costs: tuple[float, ...]) -> Calibration:
         """Compute covariance and rank at the solution."""
-        residuals, slopes = self.evaluate(found.x)
-        values = self.low + self.span * found.x
+        residuals, slopes = self.evaluate(fit.x)
+        values = self.low + self.span * fit.x
         sizes = np.where(values == 0.0, self.span, np.abs(values))
         relative = slopes / self.span * sizes
         _, singular, right = np.linalg.svd(relative, full_matrices=True)
         padded = np.concatenate([singular, np.zeros(len(self.names) - len(singular))])
-        known = padded > _RANK * padded.max(initial=1e-300)
-        covariance = self._covariance(right, padded, known, residuals, sizes)
+        determined = padded > _RANK * padded.max(initial=1e-300)
+        covariance = self._covariance(right, padded, determined, residuals, sizes)
         lost = tuple(
-            {name: float(w) for name, w in zip(self.names, row, strict=True) if abs(w) > 1e-3} for row in right[~known]
+            {name: float(w) for name, w in zip(self.names, row, strict=True) if abs(w) > 1e-3}
+            for row in right[~determined]
         )
-        edges = tuple(name for name, q in zip(self.names, found.x, strict=True) if q <= 1e-9 or q >= 1 - 1e-9)
+        edges = tuple(name for name, q in zip(self.names, fit.x, strict=True) if q <= 1e-9 or q >= 1 - 1e-9)
         return Calibration(
-            self.at(found.x), self.names, values, self.units, residuals, self.labels, covariance,
-            int(known.sum()), lost, edges, costs,
+            self.at(fit.x), self.names, values, self.units, residuals, self.labels, covariance,
+            int(determined.sum()), lost, edges, costs,
         )  # fmt: skip
 
-    def _covariance(self, right: Matrix, singular: Matrix, known: Any, residuals: Matrix, sizes: Matrix) -> Matrix:
-        rank = int(known.sum())
+    def _covariance(self, right: Matrix, singular: Matrix, determined: Any, residuals: Matrix, sizes: Matrix) -> Matrix:
+        rank = int(determined.sum())
         freedom = len(residuals) - rank
         # As many numbers as parameters: there is no scatter, only the stated uncertainties.
         scatter = float(residuals @ residuals) / freedom if freedom > 0 else 1.0
-        covariance = (right[known].T / singular[known] ** 2) @ right[known] * scatter
-        touched = np.any(np.abs(right[~known]) > 1e-3, axis=0)
+        covariance = (right[determined].T / singular[determined] ** 2) @ right[determined] * scatter
+        touched = np.any(np.abs(right[~determined]) > 1e-3, axis=0)
         covariance[touched, :] = covariance[:, touched] = np.nan
         return covariance * np.outer(sizes, sizes)

@@ -56,11 +56,13 @@ class Numbers(Measurement):
         outputs = [read_output(model, name) for name in self.values]
         wanted = np.array([to_si(v, o.unit, o.name) for v, o in zip(self.values.values(), outputs, strict=True)])
         pairs = zip(outputs, wanted, strict=True)
-        sizes = np.array([_uncertainty(self.uncertainty, one.name, one.unit, value) for one, value in pairs])
+        sizes = np.array(
+            [_uncertainty(self.uncertainty, quantity.name, quantity.unit, value) for quantity, value in pairs]
+        )
         run = quick_run(model, until=self.until, parameters=self.parameters, readings=[*self.values])
-        found = sensitivities(run, list(self.values), names)
-        now = np.array([one.value for one in found.outputs])
-        return (now - wanted) / sizes, found.derivatives / sizes[:, None], list(self.values)
+        sensitivity = sensitivities(run, list(self.values), names)
+        now = np.array([output.value for output in sensitivity.outputs])
+        return (now - wanted) / sizes, sensitivity.derivatives / sizes[:, None], list(self.values)
 
 
 @dataclass(frozen=True)
@@ -119,12 +121,12 @@ class Trajectories(Measurement):
         sizes = [_of_column(model, self.uncertainty, name, columns[name]) for name in columns]
         run = quick_run(model, until=float(times.max()), parameters=self.parameters)
         wanted = [f"at({name}, {float(t)!r})" for name in columns for t in times]
-        found = sensitivities(run, wanted, names, method="forward")
+        sensitivity = sensitivities(run, wanted, names, method="forward")
         scale = np.repeat(sizes, len(times))
-        deviations = np.array([one.value for one in found.outputs]) - np.concatenate(list(columns.values()))
+        deviations = np.array([output.value for output in sensitivity.outputs]) - np.concatenate(list(columns.values()))
         shown, unit = table["time"]
         labels = [f"{name} at {t:g} {unit or 's'}" for name in columns for t in shown]
-        return deviations / scale, found.derivatives / scale[:, None], labels
+        return deviations / scale, sensitivity.derivatives / scale[:, None], labels
 
 
 Columns = dict[str, tuple[Any, str]]
@@ -154,8 +156,10 @@ def read_table(table: Any) -> Columns:
 def _in_si(model: CompiledDae, columns: Columns) -> dict[str, Matrix]:
     values: dict[str, Matrix] = {}
     for name, (numbers, unit) in columns.items():
-        own = _SECOND if name == "time" else _unit(model, name)
-        values[name] = np.array([to_si(f"{n!r} {unit}" if unit else float(n), own, name) for n in map(float, numbers)])
+        si_unit = _SECOND if name == "time" else _unit(model, name)
+        values[name] = np.array(
+            [to_si(f"{n!r} {unit}" if unit else float(n), si_unit, name) for n in map(float, numbers)]
+        )
     return values
 
 

@@ -76,7 +76,7 @@ class Campbell:
 
     def crossings(self) -> tuple[Crossing, ...]:
         """Return the critical speeds, interpolated between the points."""
-        found: list[Crossing] = []
+        crossings: list[Crossing] = []
         for order in self.orders:
             line = order * self.speeds / (2 * np.pi)
             for mode, curve in enumerate(self.frequencies):
@@ -85,16 +85,16 @@ class Campbell:
                     share = gap[k] / (gap[k] - gap[k + 1]) if gap[k] != gap[k + 1] else 0.0
                     speed = float(self.speeds[k] + share * (self.speeds[k + 1] - self.speeds[k]))
                     name = self.modes[mode] if self.modes else ""
-                    found.append(Crossing(order, mode, speed, order * speed / (2 * np.pi), name))
-        return tuple(found)
+                    crossings.append(Crossing(order, mode, speed, order * speed / (2 * np.pi), name))
+        return tuple(crossings)
 
     def plot(self) -> Figure:
         """Draw frequencies over speed with the lines of the orders; crossings have numbers, with their text below."""
         rpm, top = self.speeds * _RPM, 1.1 * float(np.nanmax(self.frequencies, initial=1.0))
-        met = sorted(self.crossings(), key=lambda one: one.speed)
+        met = sorted(self.crossings(), key=lambda c: c.speed)
         labels = [f"{k}: {name}" for k, name in enumerate(self.modes or [""] * len(self.frequencies), 1)]
         legend = 0.5 + max((text_width(label, 8.0) for label in labels), default=0.0)
-        width, below = max(8.0, 5.0 + legend), [[f"{k}  {one}" for k, one in enumerate(met, 1)]]
+        width, below = max(8.0, 5.0 + legend), [[f"{k}  {c}" for k, c in enumerate(met, 1)]]
         with picture(f"Campbell diagram of {self.name}", 1, 4.2, width=width, below=below) as (figure, (axes,)):
             for mode, curve in enumerate(self.frequencies):
                 axes.plot(rpm, curve, color=COLOURS[mode % len(COLOURS)], label=labels[mode])
@@ -103,18 +103,20 @@ class Campbell:
                 place = 0.97 * min(rpm[-1], 60 * top / order)
                 at = {"xytext": (-4, 2), "textcoords": "offset points", "fontsize": 8, "ha": "right"}
                 axes.annotate(f"{order:g}\u00d7", (place, order * place / 60), **at)
-            for one in met:
-                axes.plot(one.speed * _RPM, one.frequency, "o", color="#000000", markersize=4)
-                axes.vlines(one.speed * _RPM, one.frequency, top, color="#999999", linewidth=0.7, linestyle=":")
+            for crossing in met:
+                axes.plot(crossing.speed * _RPM, crossing.frequency, "o", color="#000000", markersize=4)
+                axes.vlines(
+                    crossing.speed * _RPM, crossing.frequency, top, color="#999999", linewidth=0.7, linestyle=":"
+                )
             axes.set(xlabel=f"{self.speed} in rpm", ylabel="frequency in Hz", ylim=(0, top), xlim=(rpm[0], rpm[-1]))
             axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title="modes", title_fontsize=8)
-            numbered(axes, [(one.speed * _RPM - rpm[0]) / (rpm[-1] - rpm[0]) for one in met], width - 1.0 - legend)
+            numbered(axes, [(c.speed * _RPM - rpm[0]) / (rpm[-1] - rpm[0]) for c in met], width - 1.0 - legend)
         return figure
 
     def __str__(self) -> str:
         over = f"{self.speed} = {self.speeds[0] * _RPM:.4g} … {self.speeds[-1] * _RPM:.4g} rpm"
         head = f"Campbell diagram of {self.name}: {len(self.eigenvalues)} modes, {over}"
-        return "\n".join([head, *(f"  {one}" for one in self.crossings())])
+        return "\n".join([head, *(f"  {crossing}" for crossing in self.crossings())])
 
 
 def campbell(
@@ -142,15 +144,15 @@ def campbell(
     if len(linear) < 2:
         raise ValueOutOfRange(f"A Campbell diagram needs at least two values of {path}.")
     row = model.position[speed]
-    speeds = np.array([call(one.model, one.model.variables, one.point)[row] for one in linear])
+    speeds = np.array([call(m.model, m.model.variables, m.point)[row] for m in linear])
     order = np.argsort(speeds, kind="stable")
     ahead = [(values := linear[k].eigenvalues())[values.imag > 0] for k in order]
     # Each mode continues as the nearest one.
     curves = [ahead[0][np.argsort(ahead[0].imag, kind="stable")]]
     for values in ahead[1:]:
         curves.append(_nearest(curves[-1], values))
-    known = {one.eigenvalue: mode_name(one) for one in linear[order[0]].modes() if one.oscillates}
-    names = tuple(known[min(known, key=lambda value, mode=mode: abs(value - mode))] for mode in curves[0])
+    name_of = {mode.eigenvalue: mode_name(mode) for mode in linear[order[0]].modes() if mode.oscillates}
+    names = tuple(name_of[min(name_of, key=lambda value, mode=mode: abs(value - mode))] for mode in curves[0])
     return Campbell(model.name, speed, speeds[order], np.array(curves).T, tuple(map(float, orders)), names)
 
 

@@ -55,7 +55,13 @@ def free_motions(model: CompiledDae, point: Point) -> Motions:
     """
     count = len(model.states)
     motions = Motions(list(range(count)), np.eye(count))
-    speeds = _independent(list(_held_speeds(model, point)))
+    # Combinations that follow from those before are dropped.
+    slopes = list(_held_speeds(model, point))
+    kept: list[Vector] = []
+    for slope in slopes:
+        if np.linalg.matrix_rank(np.array([*kept, slope]), tol=_ZERO) > len(kept):
+            kept.append(slope)
+    speeds = np.array(kept)
     if not len(speeds):
         return motions
     motions = motions.without(speeds)
@@ -69,13 +75,13 @@ def _held_speeds(model: CompiledDae, point: Point) -> Iterator[Vector]:
     if not held:
         return
     free = point.copy()
-    for one in held:
-        free.d[one.mode] = free.d[one.mode] if one.loose < 0 else one.loose
+    for hold in held:
+        free.d[hold.mode] = free.d[hold.mode] if hold.loose < 0 else hold.loose
     share(model, free)
     rates = _rate_slopes(model, point), _rate_slopes(model, free)
-    for slope in variable_slopes(model, point, [one.motion for one in held]):
+    for slope in variable_slopes(model, point, [h.motion for h in held]):
         # A creep speed follows its torque: its rate depends on something; compare it with the rate of a free motion.
-        present, let_go = (np.abs(slope @ one).max() for one in rates)
+        present, let_go = (np.abs(slope @ rate).max() for rate in rates)
         if np.any(slope) and not present > _ZERO * let_go:
             yield slope / np.linalg.norm(slope)
 
@@ -106,15 +112,6 @@ def _null(matrix: Matrix) -> Matrix:
     _, sizes, right = np.linalg.svd(matrix)
     rank = int(np.sum(sizes > _ZERO * sizes.max(initial=1e-300)))
     return right[rank:].T
-
-
-def _independent(slopes: list[Vector]) -> Matrix:
-    """Drop combinations that follow from those before."""
-    kept: list[Vector] = []
-    for slope in slopes:
-        if np.linalg.matrix_rank(np.array([*kept, slope]), tol=_ZERO) > len(kept):
-            kept.append(slope)
-    return np.array(kept)
 
 
 def _rate_slopes(model: CompiledDae, point: Point) -> Matrix:

@@ -82,13 +82,13 @@ def linearize(
     model, point = point_of(drive, at)
     model.refuse_delays(LanguageError, f"{model.name} cannot be linearized")
     u_names = tuple(model.flat_variables[k].path for k in model.inputs) if inputs is None else tuple(inputs)
-    top = (one.path for one in model.flat_variables if one.kind == "output" and "." not in one.path)
+    top = (variable.path for variable in model.flat_variables if variable.kind == "output" and "." not in variable.path)
     # A state such as der(spring.phi_rel) is the rate of a variable, and no variable itself.
     states = tuple(name for name in model.states if name in model.position)
     y_names = (tuple(top) or states) if outputs is None else tuple(outputs)
     columns, nodes = columns_of(model, u_names), nodes_of(model, y_names)
-    rates, found = slopes(model, point, "ode"), slopes(model, point, "variables", nodes)
-    a, b, c, d = rates.x, rates.theta[:, columns], found.x, found.theta[:, columns]
+    rates, of_outputs = slopes(model, point, "ode"), slopes(model, point, "variables", nodes)
+    a, b, c, d = rates.x, rates.theta[:, columns], of_outputs.x, of_outputs.theta[:, columns]
     motions = free_motions(model, point)
     keep, shape = motions.keep, motions.shape
     if len(keep) < len(a):

@@ -45,11 +45,11 @@ class Margins:
 
     def lines(self) -> list[str]:
         """Return a line for each margin."""
-        found = [f"gain margin {20 * np.log10(factor):.3g} dB at {f:.4g} Hz" for f, factor in self.gain]
-        found += [f"phase margin {lag:.3g}\u00b0 at {f:.4g} Hz" for f, lag in self.phase]
-        found.append(f"nearest to -1 at {self.distance[0]:.4g} Hz, by {self.distance[1]:.3g}")
-        found.append("The closed loop is stable." if self.stable else "The closed loop is not stable.")
-        return [line.replace("-", "\u2212") for line in found]
+        lines = [f"gain margin {20 * np.log10(factor):.3g} dB at {f:.4g} Hz" for f, factor in self.gain]
+        lines += [f"phase margin {lag:.3g}\u00b0 at {f:.4g} Hz" for f, lag in self.phase]
+        lines.append(f"nearest to -1 at {self.distance[0]:.4g} Hz, by {self.distance[1]:.3g}")
+        lines.append("The closed loop is stable." if self.stable else "The closed loop is not stable.")
+        return [line.replace("-", "\u2212") for line in lines]
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
@@ -67,9 +67,9 @@ class Loop(LinearModel):
             return complex(self.response(frequency)[0, 0, 0])
 
         real = _crossings(f, gains.imag, lambda g: at(g).imag)
-        turned = [(one, 1 / abs(at(one))) for one in real if at(one).real < 0]
+        turned = [(phase, 1 / abs(at(phase))) for phase in real if at(phase).real < 0]
         unity = _crossings(f, np.abs(gains) - 1, lambda g: abs(at(g)) - 1)
-        phases = [(one, (np.degrees(np.angle(at(one))) + 360) % 360 - 180) for one in unity]
+        phases = [(gain, (np.degrees(np.angle(at(gain))) + 360) % 360 - 180) for gain in unity]
         k = int(np.argmin(np.abs(1 + gains)))
         closed = self.A - self.B @ self.C / (1 + self.D)
         values = np.linalg.eigvals(closed) if len(closed) else np.zeros(0)
@@ -79,14 +79,14 @@ class Loop(LinearModel):
 
 def _crossings(f: Any, values: Any, at: Callable[[float], float]) -> list[float]:
     """Return where a function of the frequency changes its sign, by bisection between the points of a grid."""
-    found: list[float] = []
+    crossings: list[float] = []
     for k in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
         low, high = np.log(f[k]), np.log(f[k + 1])
         for _ in range(_ROUNDS):
             middle = (low + high) / 2
             low, high = (middle, high) if at(np.exp(middle)) * values[k] > 0 else (low, middle)
-        found.append(float(np.exp((low + high) / 2)))
-    return found
+        crossings.append(float(np.exp((low + high) / 2)))
+    return crossings
 
 
 def open_loop(drive: Component | str | Path, signal: str, at: At = None) -> Loop:
@@ -107,7 +107,7 @@ def open_loop(drive: Component | str | Path, signal: str, at: At = None) -> Loop
         raise LanguageError("A compiled drive has no loop to open.", advice="Give the component or the netlist.")
     flat = flatten(drive if isinstance(drive, Component) else load(drive), disturbed=signal)
     added = flat.inputs[-1]
-    sends = any(flat.variables[one.terms[0][0]].path == signal for one in flat.linear if added in dict(one.terms))
+    sends = any(flat.variables[e.terms[0][0]].path == signal for e in flat.linear if added in dict(e.terms))
     name = flat.variables[added].path
     closed = linearize(compile(reduce(flat)), at, inputs=[name], outputs=[signal])
     # What arrives at an input is what comes back, and what is added.

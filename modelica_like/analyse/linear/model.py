@@ -114,9 +114,9 @@ class LinearModel(Shown):
             points: number of those that are evenly spread.
         """
         values = self.eigenvalues()
-        found = np.abs(values) / (2 * np.pi)
-        found = found[found > _STILL * found.max(initial=1.0)]
-        low, high = (found.min(), found.max()) if len(found) else (0.1, 10.0)
+        sizes = np.abs(values) / (2 * np.pi)
+        sizes = sizes[sizes > _STILL * sizes.max(initial=1.0)]
+        low, high = (sizes.min(), sizes.max()) if len(sizes) else (0.1, 10.0)
         low, high = low / 10**decades, high * 10**decades
         swings = values[values.imag > 0] / (2 * np.pi)
         near = (swings.imag[:, None] + swings.real[:, None] * np.linspace(-4, 4, 33)).ravel()

@@ -40,13 +40,11 @@ def bode(linear: LinearModel, f: Any = None) -> Figure:
         f = np.unique([*f, *(np.geomspace(min(limits) / 3, max(limits) * 3, 300) if limits else ())])
     gains = linear.response(f)
     curves = _curves(linear, gains)
-    modes = [one for one in linear.modes() if one.oscillates and f[0] <= one.frequency <= f[-1]]
-    told = [
-        f"{k}  {one.frequency:.4g} Hz, damping {one.damping:.3g}: {mode_name(one)}" for k, one in enumerate(modes, 1)
-    ]
+    modes = [m for m in linear.modes() if m.oscillates and f[0] <= m.frequency <= f[-1]]
+    texts = [f"{k}  {m.frequency:.4g} Hz, damping {m.damping:.3g}: {mode_name(m)}" for k, m in enumerate(modes, 1)]
     labels = max((text_width(label, 8.0) for label in curves), default=0.0) + 0.5
     width = max(8.0, 5.0 + labels)
-    below = [margins.lines() if margins else [], told]
+    below = [margins.lines() if margins else [], texts]
     with picture(_title(linear), 2, 4.8, width=width, below=below) as (figure, (size, phase)):
         for (label, (o, i)), colour in zip(curves.items(), cycle(COLOURS), strict=False):
             size.semilogx(f, 20 * np.log10(np.maximum(np.abs(gains[o, i]), 1e-300)), color=colour, label=label)
@@ -57,13 +55,15 @@ def bode(linear: LinearModel, f: Any = None) -> Figure:
         if len(curves) > 1 or not margins:
             size.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
         phase.set(ylabel="phase in \u00b0", xlabel="frequency in Hz")
-        _degrees(phase)
+        from matplotlib.ticker import MultipleLocator
+
+        low, high = phase.get_ylim()
+        step = next((degrees for degrees in (45, 90, 180, 360) if (high - low) / degrees <= 6), 720)
+        phase.yaxis.set_major_locator(MultipleLocator(step))
         for axes in (size, phase):
-            for one in modes:
-                axes.axvline(one.frequency, color="#999999", linewidth=0.7, linestyle=":", zorder=0.5)
-        numbered(
-            size, [float(np.log(one.frequency / f[0]) / np.log(f[-1] / f[0])) for one in modes], width - 1.2 - labels
-        )
+            for mode in modes:
+                axes.axvline(mode.frequency, color="#999999", linewidth=0.7, linestyle=":", zorder=0.5)
+        numbered(size, [float(np.log(m.frequency / f[0]) / np.log(f[-1] / f[0])) for m in modes], width - 1.2 - labels)
         if margins:
             _mark_margins(size, phase, margins, gains[0, 0], f)
         figure.align_ylabels([size, phase])
@@ -125,15 +125,6 @@ def _angles(gains: Any) -> Any:
     """Return continuous phases in degrees that end between -360 and 0, as many poles more than zeros have it."""
     angles = np.degrees(np.unwrap(np.angle(gains)))
     return angles - 360 * np.ceil(angles[-1] / 360 - 1e-6)
-
-
-def _degrees(axes: Any) -> None:
-    """Put marks at multiples of 45, 90 or 180 degrees."""
-    from matplotlib.ticker import MultipleLocator
-
-    low, high = axes.get_ylim()
-    step = next((one for one in (45, 90, 180, 360) if (high - low) / one <= 6), 720)
-    axes.yaxis.set_major_locator(MultipleLocator(step))
 
 
 def _mark_margins(size: Any, phase: Any, margins: Any, gains: Any, f: Any) -> None:

@@ -35,10 +35,10 @@ class Curves(Shown):
     def __getitem__(self, path: str) -> Any:
         """Return a column, shape (points,); `efficiency` and `loss` are those of the drive, in 1 and W."""
         if path == "efficiency":
-            return np.array([one.efficiency for one in self.points])
+            return np.array([point.efficiency for point in self.points])
         if path == "loss":
-            return np.array([sum(one.losses.values()) for one in self.points])
-        return np.array([one[path] for one in self.points])
+            return np.array([sum(point.losses.values()) for point in self.points])
+        return np.array([point[path] for point in self.points])
 
     def plot(self, *paths: str, over: str = "", display: Mapping[str, str] | None = None) -> Figure:
         """Draw columns, one panel each.
@@ -55,9 +55,9 @@ class Curves(Shown):
         over, number, shown = over or self.over, max(len(paths), 1), Display(self.points[0].model, display)
 
         def column(path: str) -> tuple[Any, str]:
-            own = self.unit(path)
-            unit = shown.of(path) if path in shown else shown.of_quantity(own)
-            return shown.converted(self[path], own, unit), with_unit(path, unit)
+            si_unit = self.unit(path)
+            unit = shown.of(path) if path in shown else shown.of_quantity(si_unit)
+            return shown.converted(self[path], si_unit, unit), with_unit(path, unit)
 
         along, label = column(over)
         with picture(self.points[0].model.name, number, 0.8 + 1.7 * number) as (figure, rows):
@@ -77,9 +77,9 @@ class Curves(Shown):
         """
         if path in ("efficiency", "loss"):
             return "1" if path == "efficiency" else "W"
-        if path not in (known := self.points[0].model.units):
-            raise UnknownName(f"There is no '{path}' in these curves{did_you_mean(path, known) or '.'}")
-        return str(known[path])
+        if path not in (units := self.points[0].model.units):
+            raise UnknownName(f"There is no '{path}' in these curves{did_you_mean(path, units) or '.'}")
+        return str(units[path])
 
     def __len__(self) -> int:
         return len(self.points)

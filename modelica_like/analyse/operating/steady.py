@@ -58,8 +58,8 @@ class OperatingPoint(Shown, Mapping[str, float]):
     @property
     def losses(self) -> dict[str, float]:
         """Lost power of every component that loses any, in W, the largest first."""
-        found = {path: loss for path, (_, loss) in self.powers.items() if loss}
-        return dict(sorted(found.items(), key=lambda item: -item[1]))
+        losses = {path: loss for path, (_, loss) in self.powers.items() if loss}
+        return dict(sorted(losses.items(), key=lambda item: -item[1]))
 
     @property
     def efficiency(self) -> float:
@@ -68,8 +68,8 @@ class OperatingPoint(Shown, Mapping[str, float]):
         A load that turns its power into heat, such as a brake, takes nothing away.
         """
         sources = [source for source, _ in self.powers.values()]
-        brought = sum(one for one in sources if one > 0)
-        return -sum(one for one in sources if one < 0) / brought if brought else float("nan")
+        brought = sum(source for source in sources if source > 0)
+        return -sum(source for source in sources if source < 0) / brought if brought else float("nan")
 
     @property
     def stuck(self) -> tuple[str, ...]:
@@ -121,7 +121,11 @@ def steady(
     point = _settle(model, begin)
     if free:
         model, point = target.reach(model, point)
-    return _operating_point(model, point)
+    values = dict(zip(model.position, map(float, call(model, model.variables, point)), strict=True))
+    values.update(zip(model.discrete_position, map(float, point.d), strict=False))
+    values.update(zip(model.parameter_position, map(float, model.p), strict=True))
+    values.update(zip(model.derived_position, map(float, model.derived(model.p).full().ravel()), strict=True))
+    return OperatingPoint(model, point, values)
 
 
 def _settle(model: CompiledDae, near: Point | None) -> Point:
@@ -147,9 +151,9 @@ class _Target:
 
     def __init__(self, model: CompiledDae, hold: Mapping[str, Any], free: Sequence[str]) -> None:
         if len(hold) != len(free):
-            held, found = ", ".join(hold) or "nothing", ", ".join(free) or "nothing"
+            held, freed = ", ".join(hold) or "nothing", ", ".join(free) or "nothing"
             raise ValueOutOfRange(
-                f"{model.name}: {held} cannot be held by {found}: each held variable needs one parameter.",
+                f"{model.name}: {held} cannot be held by {freed}: each held variable needs one parameter.",
                 advice='Write for example steady(drive, {"motor.w": "3000 rpm"}, by="load.tau_constant").',
             )
         self.paths, self.free = list(hold), list(free)
@@ -213,11 +217,3 @@ def steady_slopes(model: CompiledDae, point: Point, paths: Sequence[str], free: 
     variables = slopes(model, point, "variables", nodes_of(model, paths))
     theta = np.eye(Sizes.of(model).theta)[:, columns_of(model, free)]
     return variables.x @ steady_change(model, point, theta) + variables.theta @ theta
-
-
-def _operating_point(model: CompiledDae, point: Point) -> OperatingPoint:
-    values = dict(zip(model.position, map(float, call(model, model.variables, point)), strict=True))
-    values.update(zip(model.discrete_position, map(float, point.d), strict=False))
-    values.update(zip(model.parameter_position, map(float, model.p), strict=True))
-    values.update(zip(model.derived_position, map(float, model.derived(model.p).full().ravel()), strict=True))
-    return OperatingPoint(model, point, values)

@@ -105,10 +105,10 @@ class Replay:
         k = max(k for k, node in enumerate(self.nodes) if node.t <= t)
         if self.nodes[k].t == t:
             return self.nodes[k]
-        made, _ = try_step(self.functions, self.nodes[k], t - self.nodes[k].t, None)
-        if made is None:
+        step, _ = try_step(self.functions, self.nodes[k], t - self.nodes[k].t, None)
+        if step is None:
             raise stuck(self.nodes[k])
-        return self.split(k, made)
+        return self.split(k, step)
 
     def split(self, k: int, first: Step) -> Point:
         """Split step k, with a given first part; return the node between the parts.
@@ -177,7 +177,7 @@ class Replay:
         size = Sizes.of(self.model)
         whole = np.zeros((size.x + size.theta, len(readings)))
         none = np.zeros(self.functions.nq)
-        Q = np.array([one.quadratures if one.quadratures.size else none for one in readings]).T
+        Q = np.array([reading.quadratures if reading.quadratures.size else none for reading in readings]).T
         at_node = _by_node(readings)
         for k in range(len(self.nodes) - 1, -1, -1):
             if k < len(self.moves):
@@ -192,11 +192,11 @@ class Replay:
 
 def _by_node(readings: Sequence[Reading]) -> dict[int, list[tuple[int, Vector]]]:
     """Numbers of the readings at each node, by its identity, and their derivatives there."""
-    found: dict[int, list[tuple[int, Vector]]] = {}
+    seeds: dict[int, list[tuple[int, Vector]]] = {}
     for number, reading in enumerate(readings):
         for node, row in reading.parts:
-            found.setdefault(id(node), []).append((number, row))
-    return found
+            seeds.setdefault(id(node), []).append((number, row))
+    return seeds
 
 
 def replay(
@@ -291,7 +291,7 @@ class _Maker:
             whole = np.concatenate([start_x, np.eye(size.fixed), start_d])
             start_x, start_d, point = jump.x @ whole, jump.d @ whole, jump.after
         self.chain.start_x, self.chain.start_d = start_x, start_d
-        self.chain.chances += [replace(one, by=np.pad(one.by @ whole, (size.x, size.d))) for one in chances]
+        self.chain.chances += [replace(chance, by=np.pad(chance.by @ whole, (size.x, size.d))) for chance in chances]
         self.chain.nodes.append(point)
 
     def jump(self, number: int) -> None:
@@ -302,8 +302,8 @@ class _Maker:
             when = event_time(self.model, self.chain.nodes[-1], events, begin)
             if when.trigger is None or not self._relocate(when.trigger.shift):
                 break
-        made = make_jump(self.model, self.chain.nodes[-1], events, begin, self.chain.functions.integrands, first=False)
-        self.chain.append(made)
+        jump = make_jump(self.model, self.chain.nodes[-1], events, begin, self.chain.functions.integrands, first=False)
+        self.chain.append(jump)
         self.h = _FIRST * min(self.h, self.span)
 
     def _relocate(self, late: float) -> bool:
@@ -315,15 +315,15 @@ class _Maker:
         if late == 0.0 or 0.0 < late <= 2.0 * small or not isinstance(last, Step):
             return False
         h = last.h + late - small
-        made = None
+        step = None
         if h > 0.0:
-            made, _ = try_step(self.chain.functions, last.before, h, last)
-            if made is None:
+            step, _ = try_step(self.chain.functions, last.before, h, last)
+            if step is None:
                 return False
         self.chain.nodes.pop()
         self.chain.moves.pop()
-        if made is not None:
-            self.chain.append(made)
+        if step is not None:
+            self.chain.append(step)
         return True
 
     def smooth(self, segment: Segment) -> None:
@@ -341,17 +341,18 @@ class _Maker:
             h = left if self.h >= 0.999 * left else min(self.h, 0.5 * left) if self.h > 0.5 * left else self.h
             if h < _SMALLEST * max(1.0, abs(here.t)) and h < left:
                 raise stuck(here)
-            made, error = try_step(self.chain.functions, here, h, before)
-            factor = max(_SHRINK, min(_GROW, _SAFETY * (error + 1e-16) ** self._exponent))
-            if made is not None and error <= 1.0:
+            step, error = try_step(self.chain.functions, here, h, before)
+            order = len(self.chain.functions.tableau.nodes) + 1
+            factor = max(_SHRINK, min(_GROW, _SAFETY * (error + 1e-16) ** (-1.0 / order)))
+            if step is not None and error <= 1.0:
                 if h == left:
-                    made.after.t = end
+                    step.after.t = end
                 self.h = max(self.h, h * factor) if h == left else h * factor
-                before = self._up_to_kink(made)
+                before = self._up_to_kink(step)
                 self.chain.append(before)
             else:
                 self.h = h * min(factor, 0.7)
-                before = None if made is None else before
+                before = None if step is None else before
 
     def _up_to_kink(self, step: Step) -> Step:
         """Shorten a step so that it ends just before the first kink of the equations within it."""
@@ -376,7 +377,3 @@ class _Maker:
             if passed.size:
                 return int(passed[0]), (point.t - step.before.t, float(values[passed[0]]))
         return None
-
-    @property
-    def _exponent(self) -> float:
-        return -1.0 / (len(self.chain.functions.tableau.nodes) + 1)

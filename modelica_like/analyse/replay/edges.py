@@ -58,13 +58,13 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
         chain: the run.
         readings: the requested ones, which may depend on the times of jumps.
     """
-    timed = {id(node) for one in readings for node, _ in one.parts}
-    chances = [(chain.nodes[0], one) for one in chain.chances]
+    timed = {id(node) for reading in readings for node, _ in reading.parts}
+    chances = [(chain.nodes[0], chance) for chance in chain.chances]
     for _, jump in chain.jumps:
         apart = jump.when.apart if jump.matters or id(jump.before) in timed else ()
-        chances += [(jump.before, one) for one in (*apart, *jump.chances)]
-    found = [Edge(Reading(0.0, ((node, one.by),)), one.size, one.reason) for node, one in chances]
-    return found + _ties(_Later(chain, readings))
+        chances += [(jump.before, chance) for chance in (*apart, *jump.chances)]
+    result = [Edge(Reading(0.0, ((node, chance.by),)), chance.size, chance.reason) for node, chance in chances]
+    return result + _ties(_Later(chain, readings))
 
 
 @dataclass(frozen=True)
@@ -77,17 +77,17 @@ class _Later:
     @cached_property
     def multipliers(self) -> dict[int, Vector]:
         """Derivatives of the readings by (x, theta) at the nodes after jumps; shapes (nx + ntheta, readings)."""
-        found = {k + 1: np.zeros(0) for k, _ in self.chain.jumps}
-        self.chain.adjoint(self.readings, found)
-        return found
+        multipliers = {k + 1: np.zeros(0) for k, _ in self.chain.jumps}
+        self.chain.adjoint(self.readings, multipliers)
+        return multipliers
 
 
 def _ties(later: _Later) -> list[Edge]:
     """Guards that are zero all along a segment without firing: a torque that equals the friction limit."""
     chain, model = later.chain, later.chain.model
-    guards, found = Guards(model), list[Edge]()
+    guards, result = Guards(model), list[Edge]()
     if not guards.count:
-        return found
+        return result
     # Guards that cannot fire are -1.
     values, rates = np.array([guards.at(node)[:2] for node in chain.nodes]).transpose(1, 0, 2)
     near = _STILL * np.maximum(1.0, np.abs(values).max(axis=0))
@@ -97,40 +97,41 @@ def _ties(later: _Later) -> list[Edge]:
         still = np.all(still_at[first : last + 1], axis=0)
         if isinstance(move := chain.moves[last] if last < len(chain.moves) else None, Jump):
             # A guard that fires at the end of the segment was approaching zero.
-            fired = [model.transitions[one.transition] for one in move.events if one.transition >= 0 and not one.round]
-            still[[guards.positions[id(one)] for one in fired if not one.timed]] = False
+            fired = [model.transitions[e.transition] for e in move.events if e.transition >= 0 and not e.round]
+            still[[guards.positions[id(transition)] for transition in fired if not transition.timed]] = False
         if chain.nodes[last].t > chain.nodes[first].t:
             segments.append((first, last, still))
         first = last + 1
     for k, event in enumerate(guards.state_events):
-        for still, group in groupby(segments, lambda one, k=k: bool(one[2][k])):
+        for still, group in groupby(segments, lambda tie, k=k: bool(tie[2][k])):
             if still and (those := list(group)):
-                found.append(_tie(later, event, those[0][0], those[-1][1]))
+                result.append(_tie(later, event, those[0][0], those[-1][1]))
     # A guard that fires exactly at the end of the run fires on one side only.
     last = len(chain.nodes) - 1
     fires = (np.abs(values[last]) <= near) & ~still_at[last] & (rates[last] > 0.0)
-    return found + [_tie(later, guards.state_events[k], last, last) for k in np.flatnonzero(fires)]
+    return result + [_tie(later, guards.state_events[k], last, last) for k in np.flatnonzero(fires)]
 
 
-def _tie(later: _Later, one: CompiledTransition, first: int, last: int) -> Edge:
+def _tie(later: _Later, transition: CompiledTransition, first: int, last: int) -> Edge:
     chain, model, point = later.chain, later.chain.model, later.chain.nodes[last]
-    mode = model.flat_discretes[one.mode]
-    part = slopes(model, point, "guards", [one.index])
+    mode = model.flat_discretes[transition.mode]
+    part = slopes(model, point, "guards", [transition.index])
     x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.nominals
     terms = np.abs(part.by[0]) @ np.abs(np.concatenate([x, model.p, model.u, point.d]))
     # The slope of an acceleration that the others hold at zero is nothing but rounding, and so are its terms.
     begins = [chain.nodes[0], *(jump.after for _, jump in chain.jumps)]
-    largest = max(abs(float(call(model, model.guards, node)[one.index])) for node in begins)
+    largest = max(abs(float(call(model, model.guards, node)[transition.index])) for node in begins)
     error = NoGradient(
-        f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays {mode.names[int(point.d[one.mode])]} "
-        f"exactly at the limit where it becomes {mode.names[one.target]}.",
-        where=one.source,
+        f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays "
+        f"{mode.names[int(point.d[transition.mode])]} exactly at the limit where it becomes "
+        f"{mode.names[transition.target]}.",
+        where=transition.source,
         why="A small change of a parameter decides whether it changes, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",
     )
     return Edge(
         Reading(float(part.value[0]), ((point, part.by[0]),)), _ROUNDING * max(float(terms), largest), error,
-        lambda: _felt(later, first, last, one.mode),
+        lambda: _felt(later, first, last, transition.mode),
     )  # fmt: skip
 
 
@@ -142,12 +143,12 @@ def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
     """
     chain, readings, model = later.chain, later.readings, later.chain.model
     size, end = Sizes.of(model), len(chain.moves)
-    own = [k for k, one in enumerate(model.holds) if one.mode == mode]
+    held = [k for k, h in enumerate(model.holds) if h.mode == mode]
     until = min(last + 1, end)
-    for hold, begin in product(own, dict.fromkeys((last, first))):
+    for hold, begin in product(held, dict.fromkeys((last, first))):
         change = _sliding(model, chain.nodes[begin], hold)
         nominals = model.nominals * np.max(np.abs(change) / model.nominals)
-        sizes = [sum(float(np.abs(row[: size.x]) @ nominals) for _, row in one.parts) for one in readings]
+        sizes = [sum(float(np.abs(row[: size.x]) @ nominals) for _, row in reading.parts) for reading in readings]
         read, whole = chain.carried(readings, np.pad(change, (0, size.theta))[:, None], begin, until)
         if until > last and hold in holding(model, chain.nodes[until]):
             stop = slopes(model, chain.nodes[until], f"impact {[hold]}", None, lambda hold=hold: impact(model, [hold]))
@@ -155,7 +156,7 @@ def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
         behind = later.multipliers[until].T @ whole if until > last else 0.0
         if np.any(np.maximum(np.abs(read), np.abs(behind))[:, 0] > _ROUNDING * np.array(sizes)):
             return True
-    return not own
+    return not held
 
 
 def _sliding(model: CompiledDae, point: Point, hold: int) -> Vector:

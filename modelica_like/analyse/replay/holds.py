@@ -32,12 +32,12 @@ def impact(model: CompiledDae, struck: Sequence[int]) -> ca.Function:
     given = model.arguments
     arguments = list(given.values())
     holds = [model.holds[k] for k in struck]
-    motions = model.variables(*arguments)[[one.motion for one in holds]]
+    motions = model.variables(*arguments)[[hold.motion for hold in holds]]
     restitution = ca.reshape(model.hold_terms(*arguments), TERMS, -1)[_RESTITUTION, list(struck)].T
-    approaches = given["d"][[one.approach for one in holds]]
+    approaches = given["d"][[hold.approach for hold in holds]]
     by = [ca.jtimes(f(*arguments), approaches, -(1 + restitution) * motions) for f in (model.ode, model.alg)]
     by += [ca.jacobian(f(*arguments), given["z"]) for f in (model.ode, model.alg)]
-    parts = ca.Function("response", arguments, [ca.densify(one) for one in by])
+    parts = ca.Function("response", arguments, [ca.densify(slope) for slope in by])
     symbols = parts.mx_in()
     change, residual, ode_z, alg_z = parts(*symbols)
     if model.implicit:
@@ -73,7 +73,7 @@ def share_slopes(model: CompiledDae, point: Point, circuit: Circuit, columns: in
     A share is the part of an element in a dependence of the motions, over its capacity; a common factor is free.
     """
     count = len(circuit.members)
-    found = np.zeros((count * (1 + count), columns))
+    by_share = np.zeros((count * (1 + count), columns))
     entries = point.d[circuit.first : circuit.first + count * (1 + count)]
     pivots = [k for k in range(count) if entries[k]]
     for pivot in pivots:
@@ -83,10 +83,10 @@ def share_slopes(model: CompiledDae, point: Point, circuit: Circuit, columns: in
         members = [circuit.members[k] for k in places]
         free = [n for n, k in enumerate(places) if k not in pivots and abs(shares[k]) > _ROUNDING]
         slopes = -shares[places, None] * _relative(model, point, members, total)
-        own = places.index(pivot)
-        slopes[free] += shares[[places[n] for n in free], None] * _turned(model, point, members, own, free, total)
-        found[[first + k for k in places]] = slopes
-    return found
+        row = places.index(pivot)
+        slopes[free] += shares[[places[n] for n in free], None] * _turned(model, point, members, row, free, total)
+        by_share[[first + k for k in places]] = slopes
+    return by_share
 
 
 def _relative(model: CompiledDae, point: Point, members: list[int], total: Total) -> Vector:
@@ -98,12 +98,12 @@ def _relative(model: CompiledDae, point: Point, members: list[int], total: Total
     return np.divide(slopes, values[:, None], out=np.zeros_like(slopes), where=limited[:, None])
 
 
-def _turned(model: CompiledDae, point: Point, members: list[int], own: int, free: list[int], total: Total) -> Vector:
+def _turned(model: CompiledDae, point: Point, members: list[int], row: int, free: list[int], total: Total) -> Vector:
     """Derivatives of a dependence of motions over its parts; one part is 1, and all but the `free` ones are 0."""
     nodes = [model.holds[k].motion for k in members]
     motions, parts = variable_slopes(model, point, nodes), np.zeros(len(nodes))
-    parts[own] = 1.0
-    parts[free] = -np.linalg.lstsq(motions[free].T, motions[own], rcond=None)[0]
+    parts[row] = 1.0
+    parts[free] = -np.linalg.lstsq(motions[free].T, motions[row], rcond=None)[0]
 
     def make() -> ca.Function:
         slopes, symbols = _following(model, nodes)

@@ -235,9 +235,9 @@ class Work:
         share(model, self.point)
         solve_implicit(model, self.point)
         for circuit in model.circuits:
-            own = circuit.entries
-            self.d[own] = 0.0
-            self.d[own] = share_slopes(model, self.point, circuit, columns, self._total)
+            entries = circuit.entries
+            self.d[entries] = 0.0
+            self.d[entries] = share_slopes(model, self.point, circuit, columns, self._total)
 
     def _stop_motions(self, before: Vector, *, later: bool) -> None:
         """Stop what modes have begun to hold since `before`, also where it stands still already.
@@ -271,7 +271,10 @@ class Work:
     def chances(self) -> tuple[Coincidence, ...]:
         """Tell what is zero just at these parameters: motions that rest, and those that stop and go on at once."""
         held = holding(self.model, self.point)
-        return (*map(self._at_rest, sorted(self.resting)), *(one for k, one in self.passing.items() if k not in held))
+        return (
+            *map(self._at_rest, sorted(self.resting)),
+            *(value for k, value in self.passing.items() if k not in held),
+        )
 
     def _at_rest(self, hold: int) -> Coincidence:
         by = self._total("variables", [self.model.holds[hold].motion])[1][0]
@@ -304,4 +307,4 @@ class Work:
         missing = np.array([value for value, _ in values]) - present
         change, turn = self._total(f"projection {nodes}", None, lambda: projection(model, nodes), missing)
         self.point = replace(self.point, x=self.point.x + change)
-        self.x = self.x + turn + back @ (np.array([one for _, one in values]) - slope)
+        self.x = self.x + turn + back @ (np.array([value for _, value in values]) - slope)

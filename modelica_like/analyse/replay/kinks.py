@@ -35,7 +35,7 @@ class Kinks:
         self.model = model
         self._function: ca.Function = model.once("kinks", lambda: _switches(model))
         self.count = int(self._function.size1_out(0))
-        self._along = [(one.times, self._over(one)) for one in segments if self.count]
+        self._along = [(segment.times, self._over(segment)) for segment in segments if self.count]
         largest = [np.abs(values).max(axis=1) for _, values in self._along]
         self._zero = np.maximum(_AT_IT * np.max(largest, axis=0), _NOISE) if largest else np.full(self.count, _NOISE)
 
@@ -57,13 +57,13 @@ class Kinks:
 
     def seen(self) -> Vector:
         """Times of the first results of the run behind each kink, in s."""
-        found = [times[1:][self.passed(values[:, :-1], values[:, 1:]).any(axis=0)] for times, values in self._along]
-        return np.concatenate([np.zeros(0), *found])
+        times = [times[1:][self.passed(values[:, :-1], values[:, 1:]).any(axis=0)] for times, values in self._along]
+        return np.concatenate([np.zeros(0), *times])
 
     def _over(self, segment: Segment) -> Vector:
         """Values at the results of a segment, shape (count, n)."""
         model, times = self.model, segment.times
-        fixed = (np.repeat(one[:, None], len(times), axis=1) for one in (model.p, model.u, segment.d))
+        fixed = (np.repeat(values[:, None], len(times), axis=1) for values in (model.p, model.u, segment.d))
         return np.asarray(self._function(times[None, :], segment.x, segment.z, *fixed).full())
 
 
@@ -71,21 +71,21 @@ def _switches(model: CompiledDae) -> ca.Function:
     """Arguments of operations with a kink, if they change during a segment, and edges of smooth functions."""
     given = list(model.arguments.values())
     equations = ca.Function("equations", given, [model.ode(*given), model.alg(*given)])
-    found: dict[str, Any] = {}
+    places: dict[str, Any] = {}
     if any(equations.instruction_id(k) in (*_DIFFERENCES, *_ZEROS) for k in range(equations.n_instructions())):
         moving = ca.vertcat(*(model.arguments[name] for name in "txz"))
         for one in arguments_of_kinks(equations, given):
             if ca.depends_on(one, moving):
-                found.setdefault(str(one), one)
+                places.setdefault(str(one), one)
     edges = model.edges
     smooth = edges.function(*given)[edges.kinks : edges.slopes] if edges.kinks < edges.slopes else ca.SX(0, 1)
-    return ca.Function("kinks", given, [ca.densify(ca.vertcat(ca.SX(0, 1), *found.values(), smooth))])
+    return ca.Function("kinks", given, [ca.densify(ca.vertcat(ca.SX(0, 1), *places.values(), smooth))])
 
 
 def arguments_of_kinks(function: ca.Function, given: list[Any]) -> list[Any]:
     """Return the arguments of the operations with a kink in a function: it is evaluated by its instructions."""
     work: dict[int, Any] = {}
-    found: list[Any] = []
+    arguments: list[Any] = []
     for k in range(function.n_instructions()):
         operation, inputs = function.instruction_id(k), function.instruction_input(k)
         if operation == ca.OP_OUTPUT:
@@ -96,9 +96,9 @@ def arguments_of_kinks(function: ca.Function, given: list[Any]) -> list[Any]:
             value = ca.SX(function.instruction_constant(k))
         elif len(inputs) == 1:
             value = ca.SX.unary(operation, work[inputs[0]])
-            found += [work[inputs[0]]] if operation in _ZEROS else []
+            arguments += [work[inputs[0]]] if operation in _ZEROS else []
         else:
             value = ca.SX.binary(operation, work[inputs[0]], work[inputs[1]])
-            found += [work[inputs[0]] - work[inputs[1]]] if operation in _DIFFERENCES else []
+            arguments += [work[inputs[0]] - work[inputs[1]]] if operation in _DIFFERENCES else []
         work[function.instruction_output(k)[0]] = value
-    return found
+    return arguments

@@ -38,8 +38,8 @@ def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vec
     system = () if kind == "steady" else _start_system(model, plan, point)
     # Few of many parameters influence the start: only their columns are computed.
     parts = [*jacobians, *system[1:2]]
-    moved = sorted({column for one in parts for column in _columns(one)}) if system else list(range(size.fixed))
-    starts, values = (np.asarray(one[:, moved].full()) for one in jacobians)
+    moved = sorted({column for part in parts for column in _columns(part)}) if system else list(range(size.fixed))
+    starts, values = (np.asarray(jacobian[:, moved].full()) for jacobian in jacobians)
     states = np.zeros((size.x, len(moved)))
     if kind == "steady":
         # States that equilibrium does not determine keep their start values or defaults.
@@ -60,14 +60,14 @@ def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vec
 
 def _determined(model: CompiledDae, point: Point, x: Vector, d: Vector) -> Vector:
     """Derivatives of discrete values, those with an equation by it; see initialize.started."""
-    places = [(k, one.reset.index) for k, one in enumerate(model.update_rows) if one.at_start]
+    places = [(k, row.reset.index) for k, row in enumerate(model.update_rows) if row.at_start]
     if not places:
         return d
-    (rows, own), before = map(list, zip(*places, strict=True)), point.copy()
-    before.d[own] = call(model, model.discrete_starts, point)[own]
+    (rows, variables), before = map(list, zip(*places, strict=True)), point.copy()
+    before.d[variables] = call(model, model.discrete_starts, point)[variables]
     part, fixed = slopes(model, before, "updates"), x.shape[1]
     total = part.x @ x + part.theta[:, :fixed] + part.theta[:, fixed:] @ d
-    d[own] = total[rows]
+    d[variables] = total[rows]
     return d
 
 
@@ -82,9 +82,9 @@ def _follow(
     plan: StartPlan, system: tuple[Any, ...], moved: list[int], states: Vector, starts: Vector, values: Vector
 ) -> None:
     """Add the derivatives of the other states: the implicit function theorem on the start system."""
-    by_unknowns, by_fixed, by_d = (one[list(plan.wanted), :] for one in system)
-    known = np.asarray(by_d.full()) @ starts + np.asarray(ca.mtimes(by_unknowns[:, : len(states)], ca.DM(states)))
-    right = plan.targets(values) - np.asarray(by_fixed[:, moved].full()) - known
+    by_unknowns, by_fixed, by_d = (matrix[list(plan.wanted), :] for matrix in system)
+    derivatives = np.asarray(by_d.full()) @ starts + np.asarray(ca.mtimes(by_unknowns[:, : len(states)], ca.DM(states)))
+    right = plan.targets(values) - np.asarray(by_fixed[:, moved].full()) - derivatives
     if right.size:
         solved = np.asarray(ca.solve(by_unknowns[:, list(plan.columns)], ca.DM(right)).full())
         of_states = [(row, column) for row, column in enumerate(plan.columns) if column < len(states)]
@@ -100,7 +100,7 @@ def _start_system(model: CompiledDae, plan: StartPlan, point: Point) -> tuple[An
         arguments = [ca.SX.sym(name, system.size1_in(k)) for k, name in enumerate(system.name_in())]
         _, jacobian, values = system(*arguments)
         by = ca.vertcat(arguments[4], arguments[5]), arguments[6]
-        return ca.Function("start_slopes", arguments, [jacobian, *(ca.jacobian(values, one) for one in by)])
+        return ca.Function("start_slopes", arguments, [jacobian, *(ca.jacobian(values, slope) for slope in by)])
 
     def at(function: ca.Function, y: Vector) -> tuple[Any, ...]:
         return function(point.t, point.x, y, point.z, model.p, model.u, point.d)

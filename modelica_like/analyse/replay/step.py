@@ -128,23 +128,23 @@ def shortened(
         The step, or None if it would have no length or does not converge.
     """
     (a, f_a), (b, f_b) = low, high
-    found: Step | None = None
+    last: Step | None = None
     side: bool | None = None
     small, enough = CLOSE * max(1.0, abs(step.before.t)), zero * (abs(f_a) + abs(f_b))
     for _ in range(_TRIALS):
         if b - a <= small:
             break
         h = min(max(b - f_b * (b - a) / (f_b - f_a), a + 0.5 * small), b - 0.5 * small)
-        made, _ = try_step(step.functions, step.before, h, step)
-        if made is None:
+        candidate, _ = try_step(step.functions, step.before, h, step)
+        if candidate is None:
             break
-        f = value(made.after)
+        f = value(candidate.after)
         if abs(f) < enough:
-            return made
+            return candidate
         # A bound that stays twice gets half the weight.
         if near := f * f_a > 0.0:
-            a, f_a, found, f_b = h, f, made, f_b * (0.5 if side == near else 1.0)
+            a, f_a, last, f_b = h, f, candidate, f_b * (0.5 if side == near else 1.0)
         else:
             b, f_b, f_a = h, f, f_a * (0.5 if side == near else 1.0)
         side = near
-    return found
+    return last

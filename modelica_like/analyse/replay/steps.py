@@ -84,19 +84,21 @@ class StepFunctions:
     @cached_property
     def _symbols(self) -> list[Any]:
         """The same as SX."""
-        return [ca.SX.sym(name, one.shape[0]) for name, one in zip("thxWpud", self._names, strict=True)]
+        return [ca.SX.sym(name, symbol.shape[0]) for name, symbol in zip("thxWpud", self._names, strict=True)]
 
     def _at_stages(self, function: ca.Function) -> list[Any]:
         """Results of a function at all stages, one list for each."""
-        (t, h, _, W, p, u, d), own = self._symbols, self.nx + self.nz
-        begins = zip(self.tableau.nodes, range(0, self.size, own), strict=True)
-        given = ([t + c * h, W[k : k + self.nx], W[k + self.nx : k + own], p, u, d] for c, k in begins)
-        return list(zip(*(function.call(one) for one in given), strict=True))
+        (t, h, _, W, p, u, d), size = self._symbols, self.nx + self.nz
+        begins = zip(self.tableau.nodes, range(0, self.size, size), strict=True)
+        given = ([t + c * h, W[k : k + self.nx], W[k + self.nx : k + size], p, u, d] for c, k in begins)
+        return list(zip(*(function.call(value) for value in given), strict=True))
 
     def _weighted(self, weights: Vector, values: Sequence[Any]) -> Any:
         """Sum over the stages, times the length of the step."""
         h = self._symbols[1]
-        return sum((h * w * one for w, one in zip(weights[1:], values[1:], strict=True)), h * weights[0] * values[0])
+        return sum(
+            (h * w * value for w, value in zip(weights[1:], values[1:], strict=True)), h * weights[0] * values[0]
+        )
 
     @cached_property
     def _of_states(self) -> ca.DM:
@@ -125,14 +127,14 @@ class StepFunctions:
         """Jacobians of the residual by (p, u, d); of the quadratures by W and by (p, u, d)."""
         by_theta, q_w, q_theta = self._at_stages(self._parameters)
         h, weights = self._symbols[1], self.tableau.weights
-        by_w = ca.horzcat(*(h * b * one for b, one in zip(weights, q_w, strict=True)))
+        by_w = ca.horzcat(*(h * b * quadrature for b, quadrature in zip(weights, q_w, strict=True)))
         outputs = [self._collocated(ca.vertcat(*by_theta)), by_w, self._weighted(weights, q_theta)]
         return ca.Function("sources", self._symbols, outputs)
 
     @cached_property
     def _ending(self) -> ca.Function:
         """Weighted rates of the error estimate, and quadratures."""
-        rates, powers = (self._at_stages(one)[0] for one in (self._equations, self._integrands))
+        rates, powers = (self._at_stages(function)[0] for function in (self._equations, self._integrands))
         outputs = [
             self._weighted(self.tableau.estimate, rates)[: self.nx],
             self._weighted(self.tableau.weights, powers),
@@ -247,7 +249,7 @@ class StepFunctions:
         slopes = self._equations(t, x, z, p, u, d)[1]
         rate = ca.mtimes(of_x, slopes)
         shifted = [
-            ca.kron(ca.SX.eye(len(one)), of_x + slopes - rate) - h * ca.kron(ca.SX(ca.DM(one)), rate) for one in blocks
+            ca.kron(ca.SX.eye(len(b)), of_x + slopes - rate) - h * ca.kron(ca.SX(ca.DM(b)), rate) for b in blocks
         ]
         return ca.Function(name, [t, h, x, z, p, u, d], shifted)
 
@@ -259,19 +261,19 @@ class StepFunctions:
         if not self._constant:
             by_w = self._residual(*self._names)[1]
             return _solve(by_w, right, self._order, transposed=transposed)
-        own = self.nx + self.nz
+        size = self.nx + self.nz
         basis, blocks = self.tableau.real_form
         back, there = (np.linalg.inv(basis).T, basis.T) if transposed else (basis, np.linalg.inv(basis))
-        mixed = ca.mtimes(ca.kron(ca.DM(there), ca.DM.eye(own)), ca.densify(right))
+        mixed = ca.mtimes(ca.kron(ca.DM(there), ca.DM.eye(size)), ca.densify(right))
         t, h, x, _, p, u, d = self._names
         shifted = self._shifted("shifted", *blocks)(t, h, x, ca.MX(self.nz, 1), p, u, d)
         solved, begin = [], 0
         for block, matrix in zip(blocks, shifted, strict=True):
-            end = begin + own * len(block)
-            order = [k * own + node for node in self._node_order for k in range(len(block))]
+            end = begin + size * len(block)
+            order = [k * size + node for node in self._node_order for k in range(len(block))]
             solved.append(_solve(matrix, mixed[begin:end, :], order, transposed=transposed))
             begin = end
-        return ca.mtimes(ca.kron(ca.DM(back), ca.DM.eye(own)), ca.vertcat(*solved))
+        return ca.mtimes(ca.kron(ca.DM(back), ca.DM.eye(size)), ca.vertcat(*solved))
 
     def forward(self, columns: int) -> Any:
         """Return the function of (t, h, x, W, p, u, d, S, P): S at the end, change of the quadratures.
@@ -304,7 +306,7 @@ class StepFunctions:
         seed = ca.vertcat(ca.MX(before, columns), L, ca.MX(self.nz, columns)) + ca.mtimes(q_w.T, Q)
         multiplier = self._solve_stages(seed, transposed=True)
         stages = ca.vertsplit(multiplier, self.nx + self.nz)
-        begin = sum((one[: self.nx, :] for one in stages[1:]), stages[0][: self.nx, :])
+        begin = sum((stage[: self.nx, :] for stage in stages[1:]), stages[0][: self.nx, :])
         gradient = ca.mtimes(q_theta.T, Q) - ca.mtimes(by_theta.T, multiplier)
         return ca.Function("adjoint", [*self._names, L, Q], [ca.densify(begin), ca.densify(gradient)])
 

@@ -76,6 +76,6 @@ def radau(stages: int) -> Tableau:
     powers = np.arange(1, stages + 1)
     vandermonde = nodes[:, None] ** (powers - 1)
     matrix = np.asarray(np.linalg.solve(vandermonde.T, (nodes[:, None] ** powers / powers).T).T, np.float64)
-    gamma = next(float(one.real) for one in np.linalg.eigvals(matrix) if abs(one.imag) < _REAL)
+    gamma = next(float(eigenvalue.real) for eigenvalue in np.linalg.eigvals(matrix) if abs(eigenvalue.imag) < _REAL)
     estimate = np.linalg.solve(vandermonde.T, np.append(-gamma, np.zeros(stages - 1)))
     return Tableau(nodes, matrix, gamma, estimate)

@@ -67,24 +67,32 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
         return When()
     # A step leaves the implicit unknowns as precise as its states need them; rates of guards need them better.
     solve_implicit(model, before)
-    found: list[tuple[Event, Trigger]] = []
+    triggers: list[tuple[Event, Trigger]] = []
     for event in events:
         if event.round or event.transition < 0:
             continue
-        one = model.transitions[event.transition]
-        trigger = _moment(model, before, one) if one.timed else _crossing(model, before, one, begin)
+        transition = model.transitions[event.transition]
+        trigger = (
+            _moment(model, before, transition) if transition.timed else _crossing(model, before, transition, begin)
+        )
         if trigger is None:
-            return When(None, _grazing(event))
-        found.append((event, trigger))
-    found = _give_way_together(model, before, found)
-    first, trigger = found[0]
+            return When(None, NoGradient(
+                f"No gradient at t = {event.time:.9g} s: {event.mode} changes from {event.before} to {event.after} "
+                "where its condition only grazes zero.",
+                where=event.source,
+                why="A small change of a parameter moves the event far, or removes it.",
+                advice="Move the parameters away from this limit.",
+            ))  # fmt: skip
+        triggers.append((event, trigger))
+    triggers = _give_way_together(model, before, triggers)
+    first, trigger = triggers[0]
     theta = np.concatenate([model.p, model.u, before.d])
     weights = np.concatenate([np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)])
     nx = len(before.x)
-    spans = [float(np.max(np.abs(one.by[:nx]) * weights[:nx])) for _, one in found]
+    spans = [float(np.max(np.abs(t.by[:nx]) * weights[:nx])) for _, t in triggers]
     size = SAME * max(before.t - begin.t, abs(before.t), *spans)
     apart: list[Coincidence] = []
-    for other, second in found[1:]:
+    for other, second in triggers[1:]:
         by = _difference(model, before, trigger.by - second.by)
         if np.any(np.abs(by) * weights > size):
             apart.append(Coincidence(by, size, _together(first, other)))
@@ -92,7 +100,7 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
 
 
 def _give_way_together(
-    model: CompiledDae, before: Point, found: list[tuple[Event, Trigger]]
+    model: CompiledDae, before: Point, triggers: list[tuple[Event, Trigger]]
 ) -> list[tuple[Event, Trigger]]:
     """Give elements that share a reaction one time at which all of them give way: when no split can be borne.
 
@@ -100,13 +108,13 @@ def _give_way_together(
     """
     for circuit in model.circuits:
         modes = {model.holds[k].mode for k in circuit.members if before.d[model.holds[k].mode] == model.holds[k].number}
-        fired = [model.transitions[one.transition] for one, _ in found]
-        those = [k for k, one in enumerate(fired) if not one.timed and one.mode in modes]
+        fired = [model.transitions[event.transition] for event, _ in triggers]
+        those = [k for k, transition in enumerate(fired) if not transition.timed and transition.mode in modes]
         shared = circuit.shares(before.d).any(axis=1)
         if len(those) < 2 or not shared.any():
             continue
         part = slopes(model, before, "guards", [fired[k].index for k in those])
-        by_split = np.array([circuit.shares(one)[shared].ravel() for one in part.theta[:, -len(before.d) :]])
+        by_split = np.array([circuit.shares(column)[shared].ravel() for column in part.theta[:, -len(before.d) :]])
         left, sizes, _ = np.linalg.svd(by_split)
         weights, rank = left[:, -1], int(np.sum(sizes > SAME * sizes.max(initial=0.0)))
         if rank != len(those) - 1 or not (np.all(weights > 0.0) or np.all(weights < 0.0)):
@@ -114,8 +122,8 @@ def _give_way_together(
         rate = float(weights @ part.rate)
         together = Trigger(-float(weights @ part.value) / rate, -(weights @ part.by) / rate)
         for k in those:
-            found[k] = found[k][0], together
-    return found
+            triggers[k] = triggers[k][0], together
+    return triggers
 
 
 def _difference(model: CompiledDae, before: Point, by: Vector) -> Vector:
@@ -133,9 +141,9 @@ def either_first(model: CompiledDae, before: Point, events: tuple[Event, ...], a
     What the later one does in between is undone by what it then holds. The one that comes first must hold alone, and
     the other one must still come.
     """
-    pair = [model.transitions[one.transition] for one in events if not one.round and one.transition >= 0]
+    pair = [model.transitions[event.transition] for event in events if not event.round and event.transition >= 0]
     held = {(model.holds[k].mode, model.holds[k].number) for k in holding(model, after)}
-    if len(pair) != 2 or any(one.timed or (one.mode, one.target) not in held for one in pair):
+    if len(pair) != 2 or any(t.timed or (t.mode, t.target) not in held for t in pair):
         return False
     for first, second in (pair, pair[::-1]):
         alone = before.copy()
@@ -143,7 +151,7 @@ def either_first(model: CompiledDae, before: Point, events: tuple[Event, ...], a
         share(model, alone)
         solve_implicit(model, alone)
         rates = [float(slopes(model, at, "guards", [second.index]).rate[0]) for at in (before, alone)]
-        leaves = any(one.mode == first.mode for one in Guards(model).wanting(alone))
+        leaves = any(transition.mode == first.mode for transition in Guards(model).wanting(alone))
         if leaves or not rates[1] > _GRAZING * rates[0]:
             return False
     return True
@@ -165,21 +173,11 @@ def _crossing(model: CompiledDae, before: Point, transition: CompiledTransition,
     return Trigger(-float(part.value[0]) / rate, -part.by[0] / rate)
 
 
-def _grazing(event: Event) -> NoGradient:
+def _together(event: Event, other: Event) -> NoGradient:
     return NoGradient(
-        f"No gradient at t = {event.time:.9g} s: {event.mode} changes from {event.before} to {event.after} "
-        "where its condition only grazes zero.",
-        where=event.source,
-        why="A small change of a parameter moves the event far, or removes it.",
-        advice="Move the parameters away from this limit.",
-    )
-
-
-def _together(one: Event, other: Event) -> NoGradient:
-    return NoGradient(
-        f"No gradient at t = {one.time:.9g} s: '{one.mode}: {one.before} → {one.after}' and "
+        f"No gradient at t = {event.time:.9g} s: '{event.mode}: {event.before} → {event.after}' and "
         f"'{other.mode}: {other.before} → {other.after}' happen at the same instant but for different reasons.",
-        where=[one.source, other.source],
+        where=[event.source, other.source],
         why="A small change of a parameter decides which comes first, so the derivatives on both sides differ.",
         advice="Choose parameter values that separate the two events.",
     )
@@ -197,8 +195,8 @@ def at_rest(model: CompiledDae, point: Point, hold: int, by: Vector) -> Coincide
     one = model.holds[hold]
     mode, motion = model.flat_discretes[one.mode], model.flat_variables[one.motion].path
     held = f"{mode.path} becomes {mode.names[one.number]}"
-    own = slopes(model, point, "variables", [one.motion])
-    size = SAME * float(np.abs(own.x[0]) @ (np.abs(point.x) + model.nominals))
+    speed = slopes(model, point, "variables", [one.motion])
+    size = SAME * float(np.abs(speed.x[0]) @ (np.abs(point.x) + model.nominals))
     error = NoGradient(
         f"No gradient at t = {point.t:.9g} s: {held}, because {motion} is zero.",
         why="A small change of a parameter decides which way it moves first, so the derivatives on both sides differ.",

@@ -54,8 +54,8 @@ class _Change:
     @classmethod
     def between(cls, chain: Replay, before: Point, after: Point) -> _Change:
         """Compare the points before and after."""
-        rates = [slopes(chain.model, one, "ode").value for one in (before, after)]
-        integrands = [chain.functions.integrands(one).copy() for one in (before, after)]
+        rates = [slopes(chain.model, point, "ode").value for point in (before, after)]
+        integrands = [chain.functions.integrands(point).copy() for point in (before, after)]
         x = np.abs(before.x) + chain.model.nominals
         sizes = x, np.sum(np.abs(rates), axis=0), np.sum(np.abs(integrands), axis=0)
         return cls(after.x - before.x, rates[1] - rates[0], integrands[1] - integrands[0], sizes)
@@ -71,13 +71,13 @@ class _Change:
 def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
     """Timed events that would come a moment after the start; the start has passed over them."""
     model, start = chain.model, chain.nodes[0]
-    for one in (t for t in model.transitions if t.timed and start.d[t.mode] == t.target):
-        part = slopes(model, start, "moments", [one.index])
+    for transition in (t for t in model.transitions if t.timed and start.d[t.mode] == t.target):
+        part = slopes(model, start, "moments", [transition.index])
         if not _same(chain, float(part.value[0]), start.t):
             continue
-        mode = model.flat_discretes[one.mode]
+        mode = model.flat_discretes[transition.mode]
 
-        def matters(one: CompiledTransition = one) -> bool:
+        def matters(one: CompiledTransition = transition) -> bool:
             multipliers = {0: np.zeros(0)}
             chain.adjoint(readings, multipliers)
             for source in one.sources:
@@ -86,7 +86,7 @@ def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
                 share(model, before)
                 solve_implicit(model, before)
                 change = _Change.between(chain, before, start)
-                if any(change.felt(multipliers[0][:, k], one.quadratures) for k, one in enumerate(readings)):
+                if any(change.felt(multipliers[0][:, k], reading.quadratures) for k, reading in enumerate(readings)):
                     return True
             return False
 
@@ -94,7 +94,7 @@ def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
         yield Edge(
             reading,
             0.0,
-            _error(start.t, mode.path, mode.names[one.target], "at the start of the run", one.source),
+            _error(start.t, mode.path, mode.names[transition.target], "at the start of the run", transition.source),
             matters,
         )
 

@@ -52,9 +52,9 @@ def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
 
     def make() -> ca.Function:
         values = [_equations(model, texts), model.guards(*given)]
-        found = {str(one): one for one in arguments_of_kinks(ca.Function("equations", given, values), given)}
+        arguments = {str(kink): kink for kink in arguments_of_kinks(ca.Function("equations", given, values), given)}
         # A guard at zero decides about the modes on one side, which edges judge by accelerations only.
-        return ca.Function("arguments", given, [ca.densify(ca.SX(ca.vertcat(*found.values(), values[1])))])
+        return ca.Function("arguments", given, [ca.densify(ca.SX(ca.vertcat(*arguments.values(), values[1])))])
 
     key = f"arguments of kinks {texts}"
     function = model.once(key, make)
@@ -68,7 +68,7 @@ def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
     still = np.abs(values) <= np.maximum(_STILL * np.abs(values).max(axis=0), _DIGITS * terms)
     ends = [*(k for k, _ in chain.jumps), len(chain.nodes) - 1]
     begins = [0, *(k + 1 for k in ends[:-1])]
-    found: list[Edge] = []
+    result: list[Edge] = []
     for row in np.flatnonzero(still.any(axis=0)):
         pairs = zip(begins, ends, strict=True)
         for at_kink, group in groupby(pairs, lambda pair, row=row: bool(still[pair[0] : pair[1] + 1, row].all())):
@@ -79,8 +79,8 @@ def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
                 sizes = np.abs(np.concatenate([node.x, model.p, model.u, node.d]))
                 least = _ROUNDING * float(np.abs(part.by[0]) @ sizes)
                 reading = Reading(float(part.value[0]), ((node, part.by[0]),))
-                found.append(Edge(reading, least, NoGradient(f"{model.name} is at a kink.")))
-    return found
+                result.append(Edge(reading, least, NoGradient(f"{model.name} is at a kink.")))
+    return result
 
 
 def natural_size(chain: Replay, outputs: Sequence[Output], position: int) -> float:
@@ -95,8 +95,8 @@ def natural_size(chain: Replay, outputs: Sequence[Output], position: int) -> flo
     given = [*model.arguments.values()]
     fast = model.fast(f"equations and {texts}", lambda: ca.Function("sizes", given, [_equations(model, texts)]))
     span = chain.nodes[-1].t - chain.nodes[0].t
-    x = np.max([np.abs(one.x) for one in chain.nodes], axis=0) + model.nominals
-    z = np.max([np.abs(one.z) for one in chain.nodes], axis=0)
+    x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.nominals
+    z = np.max([np.abs(node.z) for node in chain.nodes], axis=0)
     values, least, seen = np.concatenate([model.p, model.u]), np.inf, False
 
     def at(point: Point, dx: Vector | float = 0.0, dz: Vector | float = 0.0) -> Vector:
@@ -126,7 +126,7 @@ def _in_other_modes(chain: Replay, position: int) -> Iterator[Point]:
     for node in (chain.nodes[0], chain.nodes[-1]):
         yield node
         by = slopes(model, node, "guards").theta[:, position]
-        for mode in {one.mode for one in model.transitions if not one.timed and by[one.index]}:
+        for mode in {t.mode for t in model.transitions if not t.timed and by[t.index]}:
             for number in range(len(model.flat_discretes[mode].names)):
                 other = node.copy()
                 other.d[mode] = number
@@ -134,13 +134,13 @@ def _in_other_modes(chain: Replay, position: int) -> Iterator[Point]:
 
 
 def _texts(outputs: Sequence[Output]) -> list[str]:
-    return [one.path for one in outputs if one.kind not in ("time", "duration")]
+    return [output.path for output in outputs if output.kind not in ("time", "duration")]
 
 
 def _equations(model: CompiledDae, texts: Sequence[str]) -> Any:
     """Derivatives of the states, residuals and what is asked for, as a column."""
     given = [*model.arguments.values()]
-    read = (expression_of(model, one)[0]() for one in texts)
+    read = (expression_of(model, text)[0]() for text in texts)
     return ca.densify(ca.SX(ca.vertcat(model.ode(*given), model.alg(*given), *read)))
 
 
@@ -180,9 +180,9 @@ class Sides:
 
         At a kink the derivative along a random direction is another one to at least one side.
         """
-        order = sorted(candidates, key=lambda one: float(np.max(np.abs(one.derivatives)) * one.size))
-        both = [one for one in order if self._has_both_sides(one)]
-        yield from (one for one in order if one not in both)
+        order = sorted(candidates, key=lambda candidate: float(np.max(np.abs(candidate.derivatives)) * candidate.size))
+        both = [candidate for candidate in order if self._has_both_sides(candidate)]
+        yield from (candidate for candidate in order if candidate not in both)
         for first in range(0, len(both), _TOGETHER):
             yield from self._among(both[first : first + _TOGETHER])
 
@@ -190,7 +190,7 @@ class Sides:
         """Say of which candidates nothing is known, because the run with tight tolerances that tells has failed."""
         if not candidates or self._here(1.0) is not None:
             return []
-        names = ", ".join(one.by.name for one in candidates)
+        names = ", ".join(candidate.by.name for candidate in candidates)
         return [f"Whether {names} {'is' if len(candidates) == 1 else 'are'} at a kink is not known: a run with rtol = "
                 f"{self._options(1.0).rtol:g}, which would tell, did not succeed."]  # fmt: skip
 
@@ -202,10 +202,10 @@ class Sides:
             yield from self._among(group[:middle])
             yield from self._among(group[middle:])
 
-    def _has_both_sides(self, one: Candidate) -> bool:
+    def _has_both_sides(self, candidate: Candidate) -> bool:
         try:
             for change in (_STEP, -_STEP):
-                self.solution.model.with_parameters({one.by.name: one.by.value + change * one.size})
+                self.solution.model.with_parameters({candidate.by.name: candidate.by.value + change * candidate.size})
         except ModelicaLikeError:
             return False
         return True
@@ -214,13 +214,15 @@ class Sides:
         if (here := self._here(1.0)) is None:
             return True
         chance = Random(len(group))
-        ways = np.array([one.size * chance.choice((-1.0, 1.0)) * chance.uniform(0.5, 1.0) for one in group])
-        parts = np.array([one.derivatives for one in group]).T * ways
+        ways = np.array([candidate.size * chance.choice((-1.0, 1.0)) * chance.uniform(0.5, 1.0) for candidate in group])
+        parts = np.array([candidate.derivatives for candidate in group]).T * ways
         allowed = _SUM_ALIKE * np.abs(parts).sum(axis=1) + self._noise(here) / _STEP
         total = parts.sum(axis=1)
 
         def slope(step: float) -> Vector | None:
-            there = self._read({one.by.name: one.by.value + step * way for one, way in zip(group, ways, strict=True)})
+            there = self._read(
+                {candidate.by.name: candidate.by.value + step * way for candidate, way in zip(group, ways, strict=True)}
+            )
             return None if there is None else (there - here) / step
 
         for step in (_STEP, -_STEP):
@@ -236,7 +238,9 @@ class Sides:
     def _noise(self, here: Vector) -> Vector:
         """Errors of what is read."""
         looser = self._here(_LOOSER)
-        return self._errors() + (np.abs(here) if looser is None else np.abs(looser - here))
+        tolerances = _SAFE * self._options(1.0).atol * self.solution.model.nominals
+        rest = [sum(float(np.abs(row[: len(tolerances)]) @ tolerances) for _, row in r.parts) for r in self.readings]
+        return np.array(rest) + (np.abs(here) if looser is None else np.abs(looser - here))
 
     def error(self, candidate: Candidate) -> NoGradient | None:
         """Return the error if the derivatives by a parameter are other ones on a side; None if they are not."""
@@ -268,13 +272,6 @@ class Sides:
         there = self._read({by.name: by.value + change})
         return np.full(len(here), np.nan) if there is None else (there - here) / change
 
-    def _errors(self) -> Vector:
-        """Errors of what is read of states at rest, which are known to the absolute tolerance, shape (outputs,)."""
-        known = _SAFE * self._options(1.0).atol * self.solution.model.nominals
-        return np.array(
-            [sum(float(np.abs(row[: len(known)]) @ known) for _, row in one.parts) for one in self.readings]
-        )
-
     def _options(self, looser: float) -> Options:
         options = self.solution.options
         rtol, atol = min(options.rtol, _TIGHT), min(options.atol, _TIGHT / 100)
@@ -287,15 +284,15 @@ class Sides:
 
     def _read(self, parameters: dict[str, float], looser: float = 1.0) -> Vector | None:
         run, options = self.solution, self._options(looser)
-        names = [one.path if one.kind == "series" else one.name for one in self.outputs]
+        names = [output.path if output.kind == "series" else output.name for output in self.outputs]
         try:
-            found = quick_run(
+            readings = quick_run(
                 run.model, float(run.time[-1]), t0=float(run.time[0]), start=run.start, options=options,
                 parameters=parameters, readings=names, rtol=options.rtol, atol=options.atol,
             )  # fmt: skip
         except ModelicaLikeError:
             return None
-        return np.array(found.read(*names), float)
+        return np.array(readings.read(*names), float)
 
 
 def _differ(sides: Vector, derivatives: Vector, noise: Vector | float) -> NDArray[np.bool_]:

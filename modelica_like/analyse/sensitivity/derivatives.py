@@ -72,14 +72,14 @@ def sensitivities(
         start = start or drive.start
     else:
         freed = free_formulas(drive, to, parameters)
-        asked = {"parameters": freed.values, "start": start, "options": options}
-        solution = quick_run(freed.model, until, **asked, readings=[name for name in of if not is_series(name)])
+        settings = {"parameters": freed.values, "start": start, "options": options}
+        solution = quick_run(freed.model, until, **settings, readings=[name for name in of if not is_series(name)])
     model = solution.model
     outputs = [read_output(model, name) for name in of]
     chosen = _chosen(model, to)
     column, name = quadratures(model, outputs)
-    moments = [one.moment for one in outputs if one.kind == "at"]
-    stops = [*moments, *solution.time] if any(one.kind == "series" for one in outputs) else moments
+    moments = [output.moment for output in outputs if output.kind == "at"]
+    stops = [*moments, *solution.time] if any(output.kind == "series" for output in outputs) else moments
     chain = replay(solution, column, name, start=start, stops=stops, tolerances=Tolerances(precision))
     return _differentiate(solution, chain, outputs, chosen, method, freed, named=bool(to))
 
@@ -87,37 +87,37 @@ def sensitivities(
 def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantity]]:
     """Positions in (p, u) of parameters and inputs."""
     values = np.concatenate([model.p, model.u])
-    known = model.fixed_position
-    fixed = {one.path for one in model.flat_parameters if not one.tunable}
-    found: list[tuple[int, Quantity]] = []
-    for name in names or [name for name in known if name not in fixed]:
+    position = model.fixed_position
+    fixed = {parameter.path for parameter in model.flat_parameters if not parameter.tunable}
+    quantities: list[tuple[int, Quantity]] = []
+    for name in names or [name for name in position if name not in fixed]:
         if name in model.derived_position:
             equal = equal_to(model, name)
             if equal is None:
                 raise bound_by_formula(model, name)
             name = equal
-        if name not in known:
-            near = did_you_mean(name, [*known, *model.derived_position])
+        if name not in position:
+            near = did_you_mean(name, [*position, *model.derived_position])
             raise UnknownName(f"{model.name} has no parameter '{name}'{near or '.'}")
         if name in fixed:
             raise LanguageError(
                 f"{name} cannot change after compilation, so there are no derivatives with respect to it.",
                 advice="Compare runs of models that were built with other values.",
             )
-        k = known[name]
-        found.append((k, Quantity(name, float(values[k]), model.units[name])))
-    return found
+        k = position[name]
+        quantities.append((k, Quantity(name, float(values[k]), model.units[name])))
+    return quantities
 
 
 def _differentiate(
     solution: Solution, chain: Replay, outputs: list[Output], chosen: list[tuple[int, Quantity]], method: Method,
     freed: Freed, *, named: bool,
 ) -> Sensitivities:  # fmt: skip
-    plain = [one for one in outputs if one.kind != "series"]
-    series = [one for one in outputs if one.kind == "series"]
+    plain = [output for output in outputs if output.kind != "series"]
+    series = [output for output in outputs if output.kind == "series"]
     nodes = [*chain.nodes] if series else []
     readings = read_off(solution, chain, plain)
-    over_time = [value_at(chain, one.path, node) for one in series for node in nodes]
+    over_time = [value_at(chain, output.path, node) for output in series for node in nodes]
     on_edge = [*edges(chain, readings), *at_instants(chain, readings, plain)]
     at_kink = kinks(chain, outputs)
     total = [*readings, *over_time, *(edge.reading for edge in (*on_edge, *at_kink))]
@@ -133,7 +133,7 @@ def _differentiate(
         # Somewhere along the run everything is felt.
         on_edge = [replace(edge, matters=lambda: True) for edge in on_edge]
     of_outputs, of_edges, of_kinks = np.split(derivatives, np.cumsum([len(readings) + len(over_time), len(on_edge)]))
-    kept, left_out = _by_existence(on_edge, of_edges, [one for _, one in chosen], named)
+    kept, left_out = _by_existence(on_edge, of_edges, [quantity for _, quantity in chosen], named)
     ends = [*range(len(plain)), *(len(plain) - 1 + len(nodes) * k for k in range(1, len(series) + 1))]
     sides = Sides(solution, [*plain, *series], [total[k] for k in ends])
     candidates = dict[Candidate, int]()
@@ -141,55 +141,64 @@ def _differentiate(
         size = abs(chosen[k][1].value) or natural_size(chain, outputs, positions[k])
         if np.isfinite(size) and _at_a_kink(at_kink, of_kinks[:, k] * size):
             candidates[Candidate(chosen[k][1], size, of_outputs[ends, k])] = k
-    for one in sides.suspects([*candidates]):
-        error = sides.error(one)
-        if error is not None and (named or len(kept) == 1):
-            raise error
-        if error is not None:
-            kept = [k for k in kept if k != candidates[one]]
-            left_out[one.by.name] = f"{error.what} {error.why}"
+    kept, left_at_kinks = _by_sides(sides, candidates, kept, named)
     derivatives, chosen = of_outputs[:, kept], [chosen[k] for k in kept]
     if freed.slopes:
         derivatives = derivatives @ freed.taken_along([quantity.name for _, quantity in chosen])
     # The same name has the same number everywhere, though the replay is more precise.
-    values = solution.read(*(one.name for one in plain))
-    count = len(plain)
-    rows = derivatives[count:].reshape(len(series), len(nodes), len(chosen))
+    values = solution.read(*(output.name for output in plain))
+    rows = derivatives[len(plain) :].reshape(len(series), len(nodes), len(chosen))
     return Sensitivities(
         chain.model.name,
-        tuple(Quantity(one.name, float(value), one.unit) for one, value in zip(plain, values, strict=True)),
+        tuple(Quantity(output.name, float(value), output.unit) for output, value in zip(plain, values, strict=True)),
         tuple(quantity for _, quantity in chosen),
-        derivatives[:count],
+        derivatives[: len(plain)],
         way,
         np.array([node.t for node in nodes]),
-        {one.name: table for one, table in zip(series, rows, strict=True)},
-        left_out,
+        {output.name: table for output, table in zip(series, rows, strict=True)},
+        left_out | left_at_kinks,
         (*_of_rounding(solution, plain, values), *sides.remark([*candidates])),
     )
 
 
+def _by_sides(
+    sides: Sides, candidates: dict[Candidate, int], kept: list[int], named: bool
+) -> tuple[list[int], dict[str, str]]:
+    """Positions of the parameters whose derivatives are the same on both sides; names and reasons of the others."""
+    left_out: dict[str, str] = {}
+    for candidate in sides.suspects([*candidates]):
+        error = sides.error(candidate)
+        if error is not None and (named or len(kept) == 1):
+            raise error
+        if error is not None:
+            kept = [k for k in kept if k != candidates[candidate]]
+            left_out[candidate.by.name] = f"{error.what} {error.why}"
+    return kept, left_out
+
+
 def _of_rounding(solution: Solution, outputs: Sequence[Output], values: Sequence[float]) -> Iterator[str]:
     """Tell which extremes are rounding beside those of the other sign, and so are their derivatives."""
-    for one, value in zip(outputs, values, strict=True):
-        if one.kind in ("max", "min") and solution.dense is not None:
-            (largest,) = solution.read(f"peak({one.path})")
+    for output, value in zip(outputs, values, strict=True):
+        if output.kind in ("max", "min") and solution.dense is not None:
+            (largest,) = solution.read(f"peak({output.path})")
             if abs(value) <= _NOTHING * largest:
                 yield (
-                    f"{one.name} is zero up to rounding, and so are its derivatives: {one.path} has the other sign, up "
-                    f"to {largest * largest.sign:.6g} {largest.unit}. Ask for peak({one.path}), the largest amount."
+                    f"{output.name} is zero up to rounding, and so are its derivatives: {output.path} has the other "
+                    f"sign, up to {largest * largest.sign:.6g} {largest.unit}. Ask for peak({output.path}), the "
+                    "largest amount."
                 )
 
 
 def _at_a_kink(at_kink: list[Edge], changes: Vector) -> bool:
     """Whether changes of what is zero lead off a kink."""
-    return any(one.moved_by(np.abs(change)) for one, change in zip(at_kink, changes, strict=True))
+    return any(edge.moved_by(np.abs(change)) for edge, change in zip(at_kink, changes, strict=True))
 
 
 def _by_existence(
     on_edge: list[Edge], derivatives: Vector, chosen: list[Quantity], named: bool
 ) -> tuple[list[int], dict[str, str]]:
     """Positions of the parameters with derivatives; names and reasons of the others."""
-    weights = [abs(one.value) or 1.0 for one in chosen]
+    weights = [abs(quantity.value) or 1.0 for quantity in chosen]
     reasons: dict[str, str] = {}
     for edge, row in zip(on_edge, derivatives, strict=True):
         moving = [chosen[k].name for k in np.flatnonzero(edge.moved_by(np.abs(row) * weights))]
@@ -202,4 +211,4 @@ def _by_existence(
                 advice=f"Leave out {' and '.join(moving[:_NAMED])}, or {error.advice[0].lower()}{error.advice[1:]}",
             )  # fmt: skip
         reasons |= dict.fromkeys(moving, error.what)
-    return [k for k, one in enumerate(chosen) if one.name not in reasons], reasons
+    return [k for k, quantity in enumerate(chosen) if quantity.name not in reasons], reasons

@@ -62,10 +62,10 @@ def free_formulas(drive: Model, names: Sequence[str], values: Mapping[str, Any] 
     rows = [model.derived_position[name] for name in bound]
     symbols = model.arguments["p"]
     formulas = ca.Function("formulas", [symbols], [(f := model.derived(symbols)[rows]), ca.jacobian(f, symbols)])
-    found, slopes = (np.asarray(one.full()) for one in formulas(p))
+    results, slopes = (np.asarray(formula.full()) for formula in formulas(p))
     return Freed(
         build(drive, free=bound),
-        {**given, **{name: float(value) for name, value in zip(bound, found[:, 0], strict=True)}},
+        {**given, **{name: float(value) for name, value in zip(bound, results[:, 0], strict=True)}},
         {(bound[i], model.flat_parameters[j].path): float(slopes[i, j]) for i, j in np.argwhere(slopes)},
     )
 

@@ -93,7 +93,7 @@ class SimulationFunction(_Callback):
         self._tight = {"until": end, "rtol": rtol, "atol": min(chosen.atol, rtol / 100)}
         solution = quick_run(self._model, **{**self._run, **self._tight}, readings=outputs)
         first = self._differentiate(solution)
-        self.start_values = np.array([one.value for one in first.parameters])
+        self.start_values = np.array([parameter.value for parameter in first.parameters])
         self._sequence = None if any_sequence else mode_sequence(solution.events)
         self._jacobian = _Jacobian(self)
         dense = ca.Sparsity.dense
@@ -156,8 +156,8 @@ class SimulationFunction(_Callback):
 
     def eval(self, arg: Any) -> list[Any]:
         """Simulate."""
-        made = self.attempt(self.values_at, arg[0])
-        return [ca.DM([np.nan] * len(self.outputs) if made is None else made)]
+        values = self.attempt(self.values_at, arg[0])
+        return [ca.DM([np.nan] * len(self.outputs) if values is None else values)]
 
     def has_jacobian(self) -> bool:
         """Tell CasADi that the derivatives are known."""
@@ -188,8 +188,8 @@ class _Jacobian(_Callback):
         return self._second
 
     def eval(self, arg: Any) -> list[Any]:
-        made = self._simulation.attempt(self._simulation.at, arg[0])
-        return [ca.DM(np.full(self._size, np.nan) if made is None else made.derivatives)]
+        values = self._simulation.attempt(self._simulation.at, arg[0])
+        return [ca.DM(np.full(self._size, np.nan) if values is None else values.derivatives)]
 
 
 class _Second(_Callback):
@@ -205,14 +205,14 @@ class _Second(_Callback):
 
     def eval(self, arg: Any) -> list[Any]:
         p = np.array(arg[0], float).ravel()
-        found = np.full((self._size[0] * self._size[1], self._size[1]), np.nan)
+        derivatives = np.full((self._size[0] * self._size[1], self._size[1]), np.nan)
         for k, step in enumerate(_CHANGE * np.where(p == 0, 1.0, np.abs(p))):
             moved = (p + sign * step * (np.arange(len(p)) == k) for sign in (1, -1))
-            sides = [self._simulation.attempt(self._simulation.at, one) for one in moved]
+            sides = [self._simulation.attempt(self._simulation.at, result) for result in moved]
             if None not in sides:
                 above, below = (side.derivatives for side in sides if side is not None)
-                found[:, k] = ((above - below) / (2 * step)).ravel("F")
-        return [ca.DM(found), ca.DM(self._size[0] * self._size[1], self._size[0])]
+                derivatives[:, k] = ((above - below) / (2 * step)).ravel("F")
+        return [ca.DM(derivatives), ca.DM(self._size[0] * self._size[1], self._size[0])]
 
 
 def simulation_function(
@@ -262,14 +262,14 @@ def mode_sequence(events: Sequence[Event]) -> list[tuple[str, str, str]]:
         if not groups or event.time - groups[-1][0].time > _TOGETHER * max(1.0, abs(event.time)):
             groups.append([])
         groups[-1].append(event)
-    ordered = (event for group in groups for event in sorted(group, key=lambda one: one.mode))
+    ordered = (event for group in groups for event in sorted(group, key=lambda transition: transition.mode))
     return [(event.mode, event.before, event.after) for event in ordered]
 
 
-def _changed(expected: Sequence[Any], found: Sequence[Any], solution: Solution) -> NoGradient:
-    pairs = zip_longest(expected, found)
+def _changed(expected: Sequence[Any], results: Sequence[Any], solution: Solution) -> NoGradient:
+    pairs = zip_longest(expected, results)
     same, (before, now) = next((k, pair) for k, pair in enumerate(pairs) if pair[0] != pair[1])
-    before, now = (f"'{one[0]}: {one[1]} → {one[2]}'" if one else "" for one in (before, now))
+    before, now = (f"'{result[0]}: {result[1]} → {result[2]}'" if result else "" for result in (before, now))
     what = f"{now} happens additionally" if now else f"{before} is missing"
     if now and before:
         what = f"{now} happens instead of {before}"

@@ -33,26 +33,30 @@ def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> l
     """
     _check_impacts(solution, outputs)
     span, integrals = replay.nodes[-1].t - replay.nodes[0].t, 0
-    found: list[Reading] = []
-    for one in outputs:
-        if one.kind in INTEGRATED:
-            found.append(_integrated(replay, one, integrals, span))
+    readings: list[Reading] = []
+    for output in outputs:
+        if output.kind in INTEGRATED:
+            readings.append(_integrated(replay, output, integrals, span))
             integrals += 1
-        elif one.kind == "time":
-            found.append(_event_time(solution, replay, one))
-        elif one.kind == "first":
-            found.append(_first(replay, one))
-        elif one.kind in ("max", "min", "peak"):
-            signs = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}[one.kind]
-            largest = max((_scaled(_peak(replay, one.path, sign), sign) for sign in signs), key=lambda peak: peak.value)
-            found.append(_scaled(largest, -1.0 if one.kind == "min" else 1.0))
+        elif output.kind == "time":
+            readings.append(_event_time(solution, replay, output))
+        elif output.kind == "first":
+            readings.append(_first(replay, output))
+        elif output.kind in ("max", "min", "peak"):
+            signs = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}[output.kind]
+            largest = max(
+                (_scaled(_peak(replay, output.path, sign), sign) for sign in signs), key=lambda peak: peak.value
+            )
+            readings.append(_scaled(largest, -1.0 if output.kind == "min" else 1.0))
         else:
-            found.append(value_at(replay, one.path, _node_of(replay, one)))
-    return found
+            readings.append(value_at(replay, output.path, _node_of(replay, output)))
+    return readings
 
 
-def _scaled(one: Reading, by: float) -> Reading:
-    return Reading(by * one.value, tuple((node, by * part) for node, part in one.parts), by * one.quadratures)
+def _scaled(reading: Reading, by: float) -> Reading:
+    return Reading(
+        by * reading.value, tuple((node, by * part) for node, part in reading.parts), by * reading.quadratures
+    )
 
 
 def _integrated(replay: Replay, output: Output, number: int, span: float) -> Reading:
@@ -115,11 +119,11 @@ def _check_impacts(solution: Solution, outputs: Sequence[Output]) -> None:
     for output in outputs:
         owner, _, last = output.path.rpartition(".")
         lost = output.kind == "integral" and last == "loss_energy"
-        found = [one for one in solution.impacts if owner in ("", one.component)] if lost else []
-        if found:
+        impacts = [impact for impact in solution.impacts if owner in ("", impact.component)] if lost else []
+        if impacts:
             raise NoGradient(
-                f"No gradient of {output.name}: {found[0].component} loses {found[0].energy:.6g} J in an impact at "
-                f"t = {found[0].time:.9g} s.",
+                f"No gradient of {output.name}: {impacts[0].component} loses {impacts[0].energy:.6g} J in an impact at "
+                f"t = {impacts[0].time:.9g} s.",
                 why="Only losses over time are differentiated, not the energy of an impact.",
                 advice=f"Ask for integral({output.path.removesuffix('energy')}power), which leaves impacts out, or for "
                 "speeds after the impact.",
@@ -127,16 +131,16 @@ def _check_impacts(solution: Solution, outputs: Sequence[Output]) -> None:
 
 
 def _event_time(solution: Solution, replay: Replay, output: Output) -> Reading:
-    found = [jump for _, jump in replay.jumps for event in jump.events if output.is_change(event)]
+    jumps = [jump for _, jump in replay.jumps for event in jump.events if output.is_change(event)]
     number = output.change[2]
-    if len(found) < number:
+    if len(jumps) < number:
         changes = [f"{e.before} → {e.after} at {e.time:.6g} s" for e in solution.events if e.mode == output.path]
-        told = f"{', '.join(changes[:6])}{', …' if len(changes) > 6 else ''}"
+        listed = f"{', '.join(changes[:6])}{', …' if len(changes) > 6 else ''}"
         raise UnknownName(
             f"'{output.name}' does not happen after the start of the run.",
-            why=f"{output.path} changes: {told}." if changes else f"{output.path} does not change in this run.",
+            why=f"{output.path} changes: {listed}." if changes else f"{output.path} does not change in this run.",
         )
-    return _at_jump(found[number - 1])
+    return _at_jump(jumps[number - 1])
 
 
 def _node_of(replay: Replay, output: Output) -> Point:
@@ -159,15 +163,15 @@ def _peak(replay: Replay, path: str, sign: float) -> Reading:
     inside = [values(move.inside()) if isinstance(move, Step) else np.zeros(0) for move in replay.moves]
     everything = np.concatenate([at_nodes, *inside])
     level = float(np.max(everything) - _NEAR * np.ptp(everything))
-    best, top, found = int(np.argmax(at_nodes)), float(np.max(at_nodes)), None
+    best, top, top_step = int(np.argmax(at_nodes)), float(np.max(at_nodes)), None
     for k, (move, between) in enumerate(zip(replay.moves, inside, strict=True)):
         if isinstance(move, Step) and max(at_nodes[k], at_nodes[k + 1], *between) >= level:
             for step in _tops(move, rate):
                 value = float(values([step.after])[0])
                 if value > top + _FLAT * abs(top):
-                    best, top, found = k, value, step
-    if found is not None:
-        return value_at(replay, path, replay.split(best, found))
+                    best, top, top_step = k, value, step
+    if top_step is not None:
+        return value_at(replay, path, replay.split(best, top_step))
     # Beside a jump, the event may move.
     beside = (replay.moves[k] for k in (best, best - 1) if 0 <= k < len(replay.moves))
     jump = next((move for move in beside if isinstance(move, Jump)), None)
@@ -185,9 +189,9 @@ def _tops(step: Step, rate: Callable[[Point], float]) -> list[Step]:
     """Shorten a step to where a rate passes zero from above."""
     points = [step.before, *step.inside(), step.after]
     rates = [(point.t - step.before.t, rate(point)) for point in points]
-    found = [
+    steps = [
         shortened(step, rate, low, high, _STILL)
         for low, high in pairwise(rates)
         if low[1] > 0.0 >= high[1] or low[1] >= 0.0 > high[1]
     ]
-    return [one for one in found if one is not None]
+    return [s for s in steps if s is not None]

@@ -76,7 +76,7 @@ class Sensitivities(Shown):
     @property
     def normalised(self) -> Vector:
         """Relative change of each output per relative change of each parameter; nan where the output is zero."""
-        values, weights = (np.array([one.value for one in side]) for side in (self.outputs, self.parameters))
+        values, weights = (np.array([quantity.value for quantity in side]) for side in (self.outputs, self.parameters))
         nothing = np.full(self.derivatives.shape, np.nan)
         return np.divide(self.derivatives * weights, values[:, None], out=nothing, where=values[:, None] != 0)
 
@@ -87,14 +87,14 @@ class Sensitivities(Shown):
         """
         row = _position(self.outputs, output, "output")
         rows = zip(self.parameters, map(float, self.derivatives[row]), map(float, self.normalised[row]), strict=True)
-        return tuple(sorted(rows, key=lambda one: -float(f"{abs(one[0].value * one[1]):.9e}")))
+        return tuple(sorted(rows, key=lambda item: -float(f"{abs(item[0].value * item[1]):.9e}")))
 
     def table(self, output: str) -> tuple[str, list[tuple[str, ...]]]:
         """Return title and rows of the ranking of an output as text, in the order of `COLUMNS`."""
         rows = [
-            (one.name, f"{one.value:.6g}", one.unit_text, f"{derivative:.6g}",
+            (parameter.name, f"{parameter.value:.6g}", parameter.unit_text, f"{derivative:.6g}",
              "–" if np.isnan(relative) else f"{relative + 0.0:.4f}")
-            for one, derivative, relative in self.ranking(output)
+            for parameter, derivative, relative in self.ranking(output)
         ]  # fmt: skip
         quantity = self.outputs[_position(self.outputs, output, "output")]
         return f"{output} = {quantity.value:.9g} {quantity.unit_text}".rstrip(), rows
@@ -112,7 +112,7 @@ class Sensitivities(Shown):
             most: largest number of parameters.
         """
         quantity = self.outputs[_position(self.outputs, output, "output")]
-        ranking = [(one, derivative) for one, derivative, _ in self.ranking(output) if one.value * derivative]
+        ranking = [(p, derivative) for p, derivative, _ in self.ranking(output) if p.value * derivative]
         rest = f"Not drawn: {len(ranking) - most} parameters with less effect." if len(ranking) > most else ""
         ranking = ranking[:most]
         places, unit = np.arange(len(ranking))[::-1], quantity.unit_text
@@ -137,11 +137,11 @@ class Sensitivities(Shown):
         Raises:
             MissingExtra: pandas is not installed.
         """
-        rows, columns = ([one.name for one in side] for side in (self.outputs, self.parameters))
+        rows, columns = ([quantity.name for quantity in side] for side in (self.outputs, self.parameters))
         return extra_module("pandas", "data").DataFrame(self.derivatives, index=rows, columns=columns)
 
     def __str__(self) -> str:
-        width = max([len("parameter"), *(len(one.name) for one in self.parameters)])
+        width = max([len("parameter"), *(len(parameter.name) for parameter in self.parameters)])
         blocks: list[str] = []
         for output in self.outputs:
             title, rows = self.table(output.name)
@@ -154,8 +154,8 @@ class Sensitivities(Shown):
         return "\n\n".join([*blocks, *self.notes()])
 
 
-def _position(known: tuple[Quantity, ...], name: str, what: str) -> int:
-    names = [one.name for one in known]
+def _position(quantities: tuple[Quantity, ...], name: str, what: str) -> int:
+    names = [quantity.name for quantity in quantities]
     if name not in names:
         raise UnknownName(f"There is no {what} '{name}' in these sensitivities{did_you_mean(name, names) or '.'}")
     return names.index(name)

@@ -50,11 +50,11 @@ def _checks_of(entry: EntryPoint) -> Iterator[tuple[str, Check]]:
 
 def find_check(name: str) -> Check:
     """Return the design check of an `is` in a sizing file."""
-    known = design_checks()
-    if name not in known:
-        hint = did_you_mean(name, known) or "."
+    checks = design_checks()
+    if name not in checks:
+        hint = did_you_mean(name, checks) or "."
         raise UnknownName(f"There is no design check '{name}'{hint}", advice="`modelica-like size` lists all checks.")
-    return known[name]
+    return checks[name]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,16 +72,17 @@ def arguments_of(check: Any) -> dict[str, Argument]:
     kinds = hints(check)
     if dataclasses.is_dataclass(check):
         return {
-            field.name: Argument(field.name, kinds[field.name], _required(field)) for field in dataclasses.fields(check)
+            field.name: Argument(
+                field.name,
+                kinds[field.name],
+                field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING,
+            )
+            for field in dataclasses.fields(check)
         }
     return {
         name: Argument(name, kinds[name], parameter.default is parameter.empty, parameter.default)
         for name, parameter in inspect.signature(check).parameters.items()
     }
-
-
-def _required(field: dataclasses.Field[Any]) -> bool:
-    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
 def is_result(kind: Any) -> bool:
@@ -91,8 +92,8 @@ def is_result(kind: Any) -> bool:
 
 def unit_of_kind(kind: Any) -> Unit | None:
     """Return the unit of a number's annotation, or None for other annotations."""
-    found = quantity(kind)
-    return None if found is None else parse_unit(found.unit)
+    declared = quantity(kind)
+    return None if declared is None else parse_unit(declared.unit)
 
 
 def unit_of_line(result: Any, name: str) -> Unit:

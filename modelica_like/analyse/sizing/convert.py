@@ -45,21 +45,21 @@ class Converter:
             where: path of the table, for messages.
             place: returns the place of an argument in the file.
         """
-        known = arguments_of(target)
+        expected = arguments_of(target)
         for name in table:
-            if name not in known:
-                hint = did_you_mean(name, known) or "."
-                raise UnknownName(f"{where} has no argument '{name}'{hint} It has {', '.join(known)}.")
-        missing = [argument.name for argument in known.values() if argument.required and argument.name not in table]
+            if name not in expected:
+                hint = did_you_mean(name, expected) or "."
+                raise UnknownName(f"{where} has no argument '{name}'{hint} It has {', '.join(expected)}.")
+        missing = [argument.name for argument in expected.values() if argument.required and argument.name not in table]
         if missing:
             raise MissingValue(f"{where} needs {' and '.join(missing)}.")
-        made: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for name, value in table.items():
             try:
-                made[name] = self._value(without_none(known[name].kind), value, f"{where}.{name}")
+                values[name] = self._value(without_none(expected[name].kind), value, f"{where}.{name}")
             except ModelicaLikeError as error:
                 raise placed(error, place(name)) if place else error from None
-        return made
+        return values
 
     def _value(self, kind: Any, value: Any, where: str) -> Any:
         unit = unit_of_kind(kind)
@@ -71,22 +71,18 @@ class Converter:
             inner = get_args(kind)[0]
             return tuple(self._value(inner, item, f"{where}[{k}]") for k, item in enumerate(value))
         if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-            return self._structure(kind, value, where)
+            if isinstance(value, dict):
+                return kind(**self.arguments(kind, value, where))
+            result = self.result(value) if isinstance(value, str) else None
+            if not isinstance(result, kind):
+                raise NetlistError(
+                    f"{where} must be a table: {{ {_example(kind)} }}.",
+                    advice=f"Or name a check whose result is a {kind.__name__}." if is_result(kind) else "",
+                )
+            return result
         if kind in _TEXTS and type(value) is not _TEXTS[kind]:
             raise NetlistError(f"{where} must be {_article(kind)}, not {value!r}.")
         return value
-
-    def _structure(self, kind: type, value: Any, where: str) -> Any:
-        """Return a dataclass from a table of its fields, or from the name of a check with this result."""
-        if isinstance(value, dict):
-            return kind(**self.arguments(kind, value, where))
-        result = self.result(value) if isinstance(value, str) else None
-        if not isinstance(result, kind):
-            raise NetlistError(
-                f"{where} must be a table: {{ {_example(kind)} }}.",
-                advice=f"Or name a check whose result is a {kind.__name__}." if is_result(kind) else "",
-            )
-        return result
 
     def quantity(self, unit: Unit, value: Any, where: str) -> Any:
         """Return a number, or an array from a list, in SI units."""

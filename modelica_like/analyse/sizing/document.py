@@ -62,6 +62,6 @@ _READERS: Mapping[str, Reader] = {
 
 def placed(error: ModelicaLikeError, source: Source) -> ModelicaLikeError:
     """Return an error with a place in the sizing file, if it has none there."""
-    if all(known.file != source.file for known in error.where):
+    if all(place.file != source.file for place in error.where):
         error.where = (*error.where, source)
     return error

@@ -26,10 +26,10 @@ _TEXT = {"type": "string"}
 def schema() -> dict[str, Any]:
     """Return the JSON schema (draft 7) of a sizing file with all installed design checks."""
     checks = design_checks()
-    arguments = [one for check in checks.values() for one in arguments_of(check).values()]
-    units = {str(unit) for one in arguments if (unit := unit_of_kind(without_none(one.kind)))}
+    arguments = [argument for check in checks.values() for argument in arguments_of(check).values()]
+    units = {str(unit) for argument in arguments if (unit := unit_of_kind(without_none(argument.kind)))}
     quantities = Quantities(units)
-    known = {name: _check(check, quantities) for name, check in checks.items()}
+    schemas = {name: _check(check, quantities) for name, check in checks.items()}
     return {
         "$schema": DRAFT,
         "title": "modelica-like sizing file",
@@ -49,19 +49,17 @@ def schema() -> dict[str, Any]:
                 "additionalProperties": {"type": "array", "items": _TEXT},
             },
         },
-        "definitions": {"check": chosen(known), **known, **quantities.definitions()},
+        "definitions": {"check": chosen(schemas), **schemas, **quantities.definitions()},
     }  # fmt: skip
 
 
 def _check(check: Check, quantities: Quantities) -> dict[str, Any]:
     text = inspect.cleandoc(check.__doc__ or "")
     described = dict(meanings(text))
-    properties = {
-        name: _argument(one, described.get(name, ""), quantities) for name, one in arguments_of(check).items()
-    }
+    properties = {name: _argument(a, described.get(name, ""), quantities) for name, a in arguments_of(check).items()}
     result = hints(check)["return"]
-    lines = [one.name for one in dataclasses.fields(result)] if dataclasses.is_dataclass(result) else []
-    own = {
+    lines = [field.name for field in dataclasses.fields(result)] if dataclasses.is_dataclass(result) else []
+    common = {
         "is": {"const": check.__name__},
         "note": {**_TEXT, "description": "a remark that is printed"},
         "limits": {"type": "object", "description": f"min and max of {', '.join(lines)}", "additionalProperties": True},
@@ -69,17 +67,17 @@ def _check(check: Check, quantities: Quantities) -> dict[str, Any]:
     }
     return {
         "type": "object", "required": ["is"], "description": text.partition("\n")[0],
-        "properties": {**own, **properties}, "additionalProperties": False,
+        "properties": {**common, **properties}, "additionalProperties": False,
     }  # fmt: skip
 
 
-def _argument(one: Argument, meaning: str, quantities: Quantities) -> dict[str, Any]:
-    kind = without_none(one.kind)
+def _argument(argument: Argument, meaning: str, quantities: Quantities) -> dict[str, Any]:
+    kind = without_none(argument.kind)
     unit = unit_of_kind(kind)
-    made: dict[str, Any] = {"description": meaning + (f" [{unit}]" if unit and unit.atoms else "")}
+    result: dict[str, Any] = {"description": meaning + (f" [{unit}]" if unit and unit.atoms else "")}
     if unit is not None:
         value = {"anyOf": [{"type": "number"}, quantities.text(unit), _RUN]}
-        made |= {"anyOf": [*value["anyOf"], {"type": "array", "items": value}]}
-    if isinstance(one.default, bool | int | float | str):
-        made["default"] = one.default
-    return made
+        result |= {"anyOf": [*value["anyOf"], {"type": "array", "items": value}]}
+    if isinstance(argument.default, bool | int | float | str):
+        result["default"] = argument.default
+    return result

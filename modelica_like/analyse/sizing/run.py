@@ -103,18 +103,14 @@ def size(path: str | Path, runs: Mapping[Path, Solution] | None = None) -> Sizin
     run = _Run(document, Simulations(Path(path).parent, runs))
     checks = tuple(run.checked(name) for name in document.checks)
     for heading, names in document.compare.items():
-        _comparable(heading, names, run, document)
+        place = document.lines.source("compare", heading)
+        for check in names:
+            if check not in run.done:
+                hint = did_you_mean(check, run.done) or "."
+                raise UnknownName(f"compare.{heading}: there is no check '{check}'{hint}", where=place)
+        if len({type(run.done[check].result) for check in names}) != 1:
+            raise NetlistError(f"compare.{heading} must name checks of one kind.", where=place)
     return Sizing(document.name, document.description, checks, document.compare)
-
-
-def _comparable(heading: str, names: list[str], run: _Run, document: SizingDocument) -> None:
-    place = document.lines.source("compare", heading)
-    for name in names:
-        if name not in run.done:
-            hint = did_you_mean(name, run.done) or "."
-            raise UnknownName(f"compare.{heading}: there is no check '{name}'{hint}", where=place)
-    if len({type(run.done[name].result) for name in names}) != 1:
-        raise NetlistError(f"compare.{heading} must name checks of one kind.", where=place)
 
 
 class _Run:
@@ -134,8 +130,8 @@ class _Run:
             return self._parameter(name)
         if dot and name in self.document.checks:
             return _line(self.checked(name).result, rest, path)
-        known = [*self.document.parameters, *self.document.checks]
-        raise UnknownName(f"There is no parameter or check '{name}'{did_you_mean(name, known) or '.'}")
+        names = [*self.document.parameters, *self.document.checks]
+        raise UnknownName(f"There is no parameter or check '{name}'{did_you_mean(name, names) or '.'}")
 
     def result(self, name: str) -> Any:
         """Return the result of a check, None if there is no such check."""
@@ -202,15 +198,15 @@ class _Run:
 
     def _each(self, name: str, key: str, read: Callable[[str, Any], Any]) -> dict[str, Any]:
         """Read a table of a check with entries for some lines of its result."""
-        table, made = self.document.checks[name].get(key, {}), {}
+        table, values = self.document.checks[name].get(key, {}), {}
         try:
             if not isinstance(table, dict):
                 raise NetlistError(f"checks.{name}.{key} must be a table by line of the result.")
             for line, value in table.items():
-                made[line] = read(line, value)
+                values[line] = read(line, value)
         except ModelicaLikeError as error:
             raise placed(error, self._source(name, key)) from None
-        return made
+        return values
 
     def _source(self, name: str, key: str) -> Source:
         return self.document.lines.source("checks", name, key)
@@ -228,9 +224,9 @@ class _Run:
 
     def _on_line(self, result: Any, name: str, value: Any, where: str) -> Any:
         """Return a value in SI units to compare with a line of a result."""
-        known = [line.name for line in result.lines()]
-        if name not in known:
-            raise UnknownName(f"{where}: the result has no line '{name}'{did_you_mean(name, known) or '.'}")
+        names = [line.name for line in result.lines()]
+        if name not in names:
+            raise UnknownName(f"{where}: the result has no line '{name}'{did_you_mean(name, names) or '.'}")
         if isinstance(value, list) or isinstance(getattr(result, name), str | bool | tuple):
             raise NetlistError(f"{where}.{name} needs a line with a number, and a number to compare it with.")
         return self.converter.quantity(unit_of_line(result, name), value, f"{where}.{name}")
@@ -242,8 +238,8 @@ def _line(result: Any, rest: str, path: str) -> Value:
     for step in rest.split("."):
         match = _STEP.fullmatch(step)
         if match is None or not hasattr(value, match.group(1)):
-            known = inspect.signature(type(value)).parameters
-            raise UnknownName(f"'{path}': the result has no line '{step}'{did_you_mean(step, known) or '.'}")
+            parameters = inspect.signature(type(value)).parameters
+            raise UnknownName(f"'{path}': the result has no line '{step}'{did_you_mean(step, parameters) or '.'}")
         owner, last = value, match.group(1)
         value = getattr(value, last)
         if match.group(2):

@@ -48,9 +48,9 @@ def _name(path: str, what: str) -> str:
 class Simulations:
     """Runs of netlists with paths relative to a folder; every run is made once, but for those that are known."""
 
-    def __init__(self, folder: Path, known: Mapping[Path, Solution] | None = None) -> None:
+    def __init__(self, folder: Path, solutions: Mapping[Path, Solution] | None = None) -> None:
         self.folder = folder
-        self.known = known or {}
+        self.known = solutions or {}
         self.runs: dict[str, Solution] = {}
 
     def load(self, table: Mapping[str, Any], where: str) -> Value:
@@ -74,9 +74,9 @@ class Simulations:
         values = table.get("set", {})
         if not isinstance(values, dict):
             raise NetlistError('`set` of a load must be a table: { "clutch.mu" = 0.3 }.')
-        known = self.known.get((self.folder / table["from"]).resolve())
-        if known is not None and not values and "until" not in table:
-            return known
+        solution = self.known.get((self.folder / table["from"]).resolve())
+        if solution is not None and not values and "until" not in table:
+            return solution
         key = f"{table['from']} {table.get('until')} {sorted(values.items())}"
         if key not in self.runs:
             from modelica_like.netlist import load

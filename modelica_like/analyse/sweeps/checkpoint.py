@@ -36,7 +36,10 @@ class Checkpoint:
     def __init__(self, path: str | Path, job: Job, plan: Plan, size: int) -> None:
         zarr = extra_module("zarr", "analyse")
         self.path = Path(path)
-        key = _fingerprint(job, plan, size)
+        text = json.dumps([job.names, job.outputs, sorted(map(str, job.settings.items())), size])
+        key = hashlib.sha256(
+            job.identity.encode() + text.encode() + np.ascontiguousarray(plan.points).tobytes()
+        ).hexdigest()
         if (self.path / "zarr.json").exists():
             self._group = zarr.open_group(self.path, mode="r+")
             if self._group.attrs.get("sweep") != key:
@@ -65,17 +68,17 @@ class Checkpoint:
         """Write the results of a chunk."""
         self._group["values"][done.first : done.first + len(done.values)] = done.values
         number = done.first // self._size
-        told = {name: value for name, value in vars(done).items() if name not in ("first", "values")}
-        write_text(self.path / f"told-{number}.json", json.dumps(told))
+        record = {name: value for name, value in vars(done).items() if name not in ("first", "values")}
+        write_text(self.path / f"told-{number}.json", json.dumps(record))
         self._group["done"][number] = True
 
     def results(self) -> Done:
         """Return all finished results."""
-        found = Done(0, self._group["values"][:])
+        results = Done(0, self._group["values"][:])
         for number in np.flatnonzero(self._group["done"][:]):
-            told = json.loads((self.path / f"told-{number}.json").read_text(encoding="utf-8"))
-            found.add(Done(0, None, **told))
-        return found
+            record = json.loads((self.path / f"told-{number}.json").read_text(encoding="utf-8"))
+            results.add(Done(0, None, **record))
+        return results
 
 
 def _made(folder: Path) -> Path:
@@ -87,10 +90,3 @@ def _begin(group: Any, runs: int, outputs: int, size: int, key: str) -> None:
     group.create_array("values", shape=(runs, outputs), chunks=(size, outputs), dtype="f8", fill_value=np.nan)
     group.create_array("done", shape=(-(-runs // size),), chunks=(1,), dtype="bool", fill_value=False)
     group.attrs["sweep"] = key
-
-
-def _fingerprint(job: Job, plan: Plan, size: int) -> str:
-    text = json.dumps([job.names, job.outputs, sorted(map(str, job.settings.items())), size])
-    return hashlib.sha256(
-        job.identity.encode() + text.encode() + np.ascontiguousarray(plan.points).tobytes()
-    ).hexdigest()

@@ -41,9 +41,9 @@ class Importance:
     def __getitem__(self, key: tuple[str, str, str]) -> float:
         """Return a measure: `importance["S1", "table.s", "gear.ratio"]`."""
         measure, output, parameter = key
-        for name, known in ((measure, self.measures), (output, self.outputs), (parameter, self.parameters)):
-            if name not in known:
-                raise UnknownName(f"There is no '{name}' in this result: {', '.join(known)}.")
+        for name, labels in ((measure, self.measures), (output, self.outputs), (parameter, self.parameters)):
+            if name not in labels:
+                raise UnknownName(f"There is no '{name}' in this result: {', '.join(labels)}.")
         return float(self.measures[measure][self.outputs.index(output), self.parameters.index(parameter)])
 
     def __str__(self) -> str:
@@ -88,7 +88,14 @@ def importance(
     results = sweep(drive, ranges, outputs, sampling=Samples(cube), **settings)
     columns = [results[name].to_numpy() for name in outputs]
     for name, column in zip(outputs, columns, strict=True):
-        _check_complete(name, column, [str(text) for text in results["failure"].to_numpy()])
+        failures = [str(text) for text in results["failure"].to_numpy()]
+        bad = int(np.sum(~np.isfinite(column)))
+        if bad:
+            why = next((failure.splitlines()[0] for failure in failures if failure), "it does not happen there")
+            raise ValueOutOfRange(
+                f"{name} has no value in {bad} of {len(column)} runs: {why}",
+                advice="Narrow the ranges until all runs succeed.",
+            )
     measures: dict[str, list[Any]] = {}
     for column in columns:
         for key, values in _measures(method, analyse, problem, cube, column, seed).items():
@@ -102,20 +109,10 @@ def _measures(method: Kind, analyse: Any, problem: dict[str, Any], cube: Any, co
         # The output depends on nothing: its variance is rounding.
         return {key: np.zeros(problem["num_vars"]) for key in wanted}
     if method == "sobol":
-        found = analyse.analyze(problem, column, calc_second_order=False, seed=seed)
+        measures = analyse.analyze(problem, column, calc_second_order=False, seed=seed)
     else:
-        found = analyse.analyze(problem, cube, column, num_levels=_LEVELS, seed=seed)
-    return {key: np.asarray(found[key], float) for key in wanted}
-
-
-def _check_complete(name: str, column: Any, failures: Sequence[str]) -> None:
-    bad = int(np.sum(~np.isfinite(column)))
-    if bad:
-        why = next((text.splitlines()[0] for text in failures if text), "it does not happen there")
-        raise ValueOutOfRange(
-            f"{name} has no value in {bad} of {len(column)} runs: {why}",
-            advice="Narrow the ranges until all runs succeed.",
-        )
+        measures = analyse.analyze(problem, cube, column, num_levels=_LEVELS, seed=seed)
+    return {key: np.asarray(measures[key], float) for key in wanted}
 
 
 def _salib(method: str) -> tuple[Any, Any]:

@@ -37,16 +37,18 @@ class NativeRuns:
         given = {name: value for name, value in settings.items() if name not in ("start", "solver", "progress")}
         end, options = plan(model, **given)
         span = float(settings.get("t0", 0.0)), end
-        for one in outputs:
-            if one.kind == "at" and not span[0] <= one.moment <= end:
-                raise ValueOutOfRange(f"{one.name} is not within the run, {span[0]:g} s to {end:g} s.")
+        for output in outputs:
+            if output.kind == "at" and not span[0] <= output.moment <= end:
+                raise ValueOutOfRange(f"{output.name} is not within the run, {span[0]:g} s to {end:g} s.")
         self._model, self._names, self._outputs, self._begin = model, names, outputs, span[0]
         # The last reading is the time at the end, where a component may end a run earlier.
-        parts = [*(one.parts(model) for one in outputs), [Part("end", "time")]]
-        known = _with_expressions(model, [part for some in parts for part in some])
-        readings = [[one for part in some for one in _readings(model, known, part)] for some in parts]
+        parts = [*(x.parts(model) for x in outputs), [Part("end", "time")]]
+        extended = _with_expressions(model, [part for some in parts for part in some])
+        readings = [[reading for part in some for reading in _readings(model, extended, part)] for some in parts]
         self._lasts = np.cumsum([len(some) for some in readings])
-        self._batch = Batch(known, [one for some in readings for one in some], options, span, settings.get("start"))
+        self._batch = Batch(
+            extended, [part for some in readings for part in some], options, span, settings.get("start")
+        )
         self._places = [model.fixed_position[name] for name in names]
 
     def run(self, points: Any, stop: ctypes.c_int | None = None) -> tuple[Vector, dict[int, str], list[int]]:
@@ -67,8 +69,8 @@ class NativeRuns:
         numbers, failed = self._batch.run(p[kept], u[kept], stop)
         values = np.full((len(points), len(self._outputs)), np.nan)
         spans = numbers[:, -1] - self._begin
-        for k, (one, some) in enumerate(zip(self._outputs, np.split(numbers, self._lasts, axis=1), strict=False)):
-            values[kept, k] = one.combined(some, spans)
+        for k, (output, some) in enumerate(zip(self._outputs, np.split(numbers, self._lasts, axis=1), strict=False)):
+            values[kept, k] = output.combined(some, spans)
         values[kept[failed]] = np.nan
         return values, refused, kept[failed].tolist()
 
@@ -78,18 +80,18 @@ class NativeRuns:
         fine = np.all(np.isfinite(points), axis=1)
         for column, place in enumerate(self._places):
             if place < len(model.flat_parameters):
-                one = model.flat_parameters[place]
-                fine &= _within(points[:, column], one.min, one.max) & one.tunable
-        if any(one.min is not None or one.max is not None for one in model.flat_derived):
-            for one, values in zip(model.flat_derived, model.derived(p.T).full(), strict=True):
-                fine &= np.isfinite(values) & _within(values, one.min, one.max)
-        told: dict[int, str] = {}
+                parameter = model.flat_parameters[place]
+                fine &= _within(points[:, column], parameter.min, parameter.max) & parameter.tunable
+        if any(f.min is not None or f.max is not None for f in model.flat_derived):
+            for parameter, values in zip(model.flat_derived, model.derived(p.T).full(), strict=True):
+                fine &= np.isfinite(values) & _within(values, parameter.min, parameter.max)
+        refusals: dict[int, str] = {}
         for k in np.flatnonzero(~fine).tolist():
             try:
                 model.with_parameters(dict(zip(self._names, points[k].tolist(), strict=True)))
             except ModelicaLikeError as error:
-                told[k] = str(error)
-        return told
+                refusals[k] = str(error)
+        return refusals
 
 
 def _within(values: Vector, low: float | None, high: float | None) -> Any:
@@ -118,11 +120,11 @@ def _with(model: CompiledDae, more: Mapping[str, Part]) -> CompiledDae:
     return twin
 
 
-def _readings(model: CompiledDae, known: CompiledDae, part: Part) -> list[Reading]:
+def _readings(model: CompiledDae, extended: CompiledDae, part: Part) -> list[Reading]:
     """Return what a part is in the run-time: their sum."""
     if part.kind == "change":
         return [Reading("change", model.discrete_position[part.text], part.change)]
     if part.kind == "impact":
-        places = [k for k, one in enumerate(model.holds) if part.text in ("", one.component)]
+        places = [k for k, hold in enumerate(model.holds) if part.text in ("", hold.component)]
         return [Reading("impact", k) for k in places]
-    return [Reading(part.kind, known.position[_key(part)], moment=part.moment)]
+    return [Reading(part.kind, extended.position[_key(part)], moment=part.moment)]

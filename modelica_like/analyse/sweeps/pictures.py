@@ -30,11 +30,11 @@ def plot_sweep(found: xarray.Dataset, *outputs: str) -> Figure:
         UnknownName: the sweep has no such output.
         ValueOutOfRange: no run has succeeded.
     """
-    known = [str(name) for name in found.data_vars if name != "failure"]
+    plotted = [str(name) for name in found.data_vars if name != "failure"]
     for name in outputs:
-        if name not in known:
-            raise UnknownName(f"The sweep has no output '{name}'{did_you_mean(name, known) or '.'}")
-    names = list(outputs) or known
+        if name not in plotted:
+            raise UnknownName(f"The sweep has no output '{name}'{did_you_mean(name, plotted) or '.'}")
+    names = list(outputs) or plotted
     if not any(np.any(np.isfinite(found[name].to_numpy())) for name in names):
         raise ValueOutOfRange("No run of the sweep has succeeded, so there is nothing to draw.")
     failed = int(np.sum(found["failure"].to_numpy() != ""))
@@ -47,50 +47,50 @@ def plot_sweep(found: xarray.Dataset, *outputs: str) -> Figure:
     return _maps(found, names, dims, notes)
 
 
-def _label(found: xarray.Dataset, name: str) -> str:
-    return with_unit(name, str(found[name].attrs.get("units", "1")))
+def _label(dataset: xarray.Dataset, name: str) -> str:
+    return with_unit(name, str(dataset[name].attrs.get("units", "1")))
 
 
-def _lines(found: xarray.Dataset, names: list[str], dims: list[str], notes: list[str]) -> Figure:
+def _lines(dataset: xarray.Dataset, names: list[str], dims: list[str], notes: list[str]) -> Figure:
     """Draw a panel per output over the first parameter, with a line for each value of the second."""
     along, across = dims[0], dims[1:]
-    family = list(found[across[0]].to_numpy()) if across else [None]
-    unit = with_unit("", str(found[across[0]].attrs.get("units", "1"))).replace(" in", "", 1) if across else ""
-    marker = "o" if found.sizes[along] <= 40 else ""
-    with picture(str(found.attrs["model"]), len(names), 0.8 + 1.9 * len(names), below=[notes]) as (figure, rows):
+    family = list(dataset[across[0]].to_numpy()) if across else [None]
+    unit = with_unit("", str(dataset[across[0]].attrs.get("units", "1"))).replace(" in", "", 1) if across else ""
+    marker = "o" if dataset.sizes[along] <= 40 else ""
+    with picture(str(dataset.attrs["model"]), len(names), 0.8 + 1.9 * len(names), below=[notes]) as (figure, rows):
         for axes, name in zip(rows, names, strict=True):
             for k, value in enumerate(family):
-                some = found[name].sel({across[0]: value}) if across else found[name]
+                some = dataset[name].sel({across[0]: value}) if across else dataset[name]
                 label = f"{across[0]} = {value:.6g}{unit}" if across else name
                 look = {"color": COLOURS[k % len(COLOURS)], "marker": marker, "markersize": 3.0}
-                axes.plot(found[along], some.transpose(along), label=label, **look)
-            axes.set_ylabel(_wrapped(_label(found, name), 1.7))
+                axes.plot(dataset[along], some.transpose(along), label=label, **look)
+            axes.set_ylabel(_wrapped(_label(dataset, name), 1.7))
         if across:
             rows[0].legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-        rows[-1].set_xlabel(_label(found, along))
+        rows[-1].set_xlabel(_label(dataset, along))
         figure.align_ylabels(rows)
     return figure
 
 
-def _maps(found: xarray.Dataset, names: list[str], dims: list[str], notes: list[str]) -> Figure:
+def _maps(dataset: xarray.Dataset, names: list[str], dims: list[str], notes: list[str]) -> Figure:
     """Draw a coloured map per output; runs that failed are white."""
-    with picture(str(found.attrs["model"]), len(names), 0.8 + 2.9 * len(names), below=[notes]) as (figure, rows):
+    with picture(str(dataset.attrs["model"]), len(names), 0.8 + 2.9 * len(names), below=[notes]) as (figure, rows):
         for axes, name in zip(rows, names, strict=True):
-            values = found[name].transpose(dims[1], dims[0]).to_numpy()
-            mesh = axes.pcolormesh(found[dims[0]], found[dims[1]], values, shading="nearest", cmap="viridis")
-            figure.colorbar(mesh, ax=axes, label=_wrapped(_label(found, name), 2.5), pad=0.01)
-            axes.set_ylabel(_label(found, dims[1]))
+            values = dataset[name].transpose(dims[1], dims[0]).to_numpy()
+            mesh = axes.pcolormesh(dataset[dims[0]], dataset[dims[1]], values, shading="nearest", cmap="viridis")
+            figure.colorbar(mesh, ax=axes, label=_wrapped(_label(dataset, name), 2.5), pad=0.01)
+            axes.set_ylabel(_label(dataset, dims[1]))
             axes.grid(visible=False)
-        rows[-1].set_xlabel(_label(found, dims[0]))
+        rows[-1].set_xlabel(_label(dataset, dims[0]))
     return figure
 
 
-def _parallel(found: xarray.Dataset, names: list[str], notes: list[str]) -> Figure:
+def _parallel(dataset: xarray.Dataset, names: list[str], notes: list[str]) -> Figure:
     """Draw each run as a line through its parameters and outputs, in the colour of the last output."""
     from matplotlib.collections import LineCollection
 
-    table = found[names].to_dataframe().reset_index()
-    columns = [*(str(name) for name in found.coords if str(name) != "sample"), *names]
+    table = dataset[names].to_dataframe().reset_index()
+    columns = [*(str(name) for name in dataset.coords if str(name) != "sample"), *names]
     kept = table[columns].dropna()
     if len(kept) > _MOST_LINES:
         notes = [*notes, f"{_MOST_LINES} of {len(kept)} runs are drawn, evenly chosen."]
@@ -98,11 +98,11 @@ def _parallel(found: xarray.Dataset, names: list[str], notes: list[str]) -> Figu
     values: Any = kept.to_numpy(float)
     low, high = values.min(axis=0), values.max(axis=0)
     share = np.where(high > low, (values - low) / np.where(high > low, high - low, 1.0), 0.5)
-    labels = [_label(found, name).replace(" in ", "\nin ") for name in columns]
+    labels = [_label(dataset, name).replace(" in ", "\nin ") for name in columns]
     apart = max(max(text_width(line, 9.0) for label in labels for line in label.split("\n")) + 0.25, 1.0)
     width = min(max(8.0, apart * (len(columns) - 1) + 2.0), _WIDEST)
     order = np.argsort(share[:, -1])
-    with picture(str(found.attrs["model"]), 1, 4.0, width=width, below=[notes]) as (figure, (axes,)):
+    with picture(str(dataset.attrs["model"]), 1, 4.0, width=width, below=[notes]) as (figure, (axes,)):
         paths = [list(zip(range(len(columns)), row, strict=True)) for row in share[order]]
         look: dict[str, Any] = {"linewidth": 1.0, "alpha": max(0.15, min(0.9, 40 / len(paths)))}
         axes.add_collection(LineCollection(paths, array=share[order, -1], cmap="viridis", **look))

@@ -44,10 +44,10 @@ def read_range(text: str) -> tuple[str, list[Any]]:
                 raise too_many(name)
             given = np.linspace(float(first), float(last), int(count)).tolist()
         else:
-            given = [float(one) for one in numbers.split(",")]
+            given = [float(word) for word in numbers.split(",")]
     except ValueError:
         raise ValueOutOfRange(
             f"'{text}': '{values}' is neither FIRST:LAST:COUNT nor a list of numbers.",
             advice="Write for example 'load=0:0.25:26 N.m' or 'load=0,0.1,0.2 N.m'.",
         ) from None
-    return name, [f"{one!r} {unit}" if unit.strip() else one for one in given]
+    return name, [f"{value!r} {unit}" if unit.strip() else value for value in given]

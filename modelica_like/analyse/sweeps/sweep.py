@@ -120,23 +120,10 @@ def _check_extremes(job: Job, plan: Plan, done: Done) -> None:
         return
     wanted: set[int] = set()
     for column in done.values.T:
-        known = np.flatnonzero(np.isfinite(column))
-        if len(known):
-            wanted |= {int(known[np.argmin(column[known])]), int(known[np.argmax(column[known])])}
+        finite = np.flatnonzero(np.isfinite(column))
+        if len(finite):
+            wanted |= {int(finite[np.argmin(column[finite])]), int(finite[np.argmax(column[finite])])}
     Reference(job).compare(done, plan.points, sorted(k for k in wanted if k % ONE_IN))
-
-
-def _notices(done: Done) -> list[str]:
-    """Return the notices about native runs."""
-    told: list[str] = []
-    if done.by_idas:
-        told.append(f"IDAS did {done.by_idas} of {len(done.values)} runs, where the native run-time failed.")
-    if done.differences:
-        listed = [f"  run {k}: {done.differences[k]}" for k in sorted(done.differences)[:_TOLD]]
-        told.append(
-            f"In {len(done.differences)} of {done.checked} repeated runs IDAS has other results:\n" + "\n".join(listed)
-        )
-    return told
 
 
 def _workers(job: Job, processes: int | None, scheduler: str | None, runs: int) -> Callable[..., Generator[Done]]:
@@ -157,14 +144,14 @@ def _collect(
     kept = Checkpoint(checkpoint, job, plan, len(chunks[0][1])) if checkpoint is not None else None
     left = kept.left(chunks) if kept is not None else chunks
     count = total - sum(len(points) for _, points in left)
-    found = Done(0, np.full((total, len(job.outputs)), np.nan))
+    results = Done(0, np.full((total, len(job.outputs)), np.nan))
     try:
         with closing(workers(left)) as working:
             for done in working:
                 if kept is not None:
                     kept.keep(done)
-                found.values[done.first : done.first + len(done.values)] = done.values
-                found.add(done)
+                results.values[done.first : done.first + len(done.values)] = done.values
+                results.add(done)
                 count += len(done.values)
                 if progress is not None:
                     progress(count, total)
@@ -172,24 +159,32 @@ def _collect(
         where = f"in {kept.path}: the same sweep resumes there" if kept is not None else "lost without a checkpoint"
         error.add_note(f"{count} of {total} runs are {where}.")
         raise
-    return kept.results() if kept is not None else found
+    return kept.results() if kept is not None else results
 
 
 def _dataset(model: CompiledDae, plan: Plan, job: Job, done: Done, why: str) -> xarray.Dataset:
     failures, units = done.failures, dict(zip(job.outputs, job.units, strict=True))
     # A fixed-width array would be as wide as the longest message.
-    told = np.full(len(plan), "", object)
-    told[list(failures)] = list(failures.values())
+    reasons = np.full(len(plan), "", object)
+    reasons[list(failures)] = list(failures.values())
     data: dict[str, Any] = {
         name: (plan.dims, done.values[:, k].reshape(plan.shape), {"units": unit})
         for k, (name, unit) in enumerate(units.items())
     }
-    data["failure"] = (plan.dims, told.reshape(plan.shape), {"long_name": "why a run failed"})
+    data["failure"] = (plan.dims, reasons.reshape(plan.shape), {"long_name": "why a run failed"})
     columns = plan.axes if plan.axes is not None else plan.points.T
     coords = {
         name: (name if plan.axes is not None else "sample", column, {"units": unit})
         for name, unit, column in zip(plan.names, plan.units, columns, strict=True)
     }
-    notice = "\n".join(filter(None, [why, *_notices(done)]))
+    notes: list[str] = []
+    if done.by_idas:
+        notes.append(f"IDAS did {done.by_idas} of {len(done.values)} runs, where the native run-time failed.")
+    if done.differences:
+        listed = [f"  run {k}: {done.differences[k]}" for k in sorted(done.differences)[:_TOLD]]
+        notes.append(
+            f"In {len(done.differences)} of {done.checked} repeated runs IDAS has other results:\n" + "\n".join(listed)
+        )
+    notice = "\n".join(filter(None, [why, *notes]))
     attrs = {"model": model.name, "solver": job.settings["solver"], "checked": done.checked, "notice": notice}
     return extra_module("xarray", "data").Dataset(data, coords=coords, attrs=attrs)

@@ -63,7 +63,9 @@ class Job:
         Raises:
             UnknownName: an output is not known.
         """
-        identity = repr([model.summary, [one.path for one in model.flat_variables], model.p.tolist(), model.u.tolist()])
+        identity = repr(
+            [model.summary, [variable.path for variable in model.flat_variables], model.p.tolist(), model.u.tolist()]
+        )
         units = tuple(str(read_output(model, name).unit) for name in outputs)
         return cls(pickle.dumps(model), identity, tuple(names), tuple(outputs), units, settings)
 
@@ -128,8 +130,8 @@ class Reference:
         _, options = plan(self._model, **{k: v for k, v in job.settings.items() if k in _PLANNED})
         # Relative to the largest value, and absolute.
         self._relative = _AGREE * options.rtol
-        nominal = {one.path: abs(one.nominal) for one in self._model.flat_variables}
-        self._absolute = np.array([_AGREE * options.atol * nominal.get(one.path, 1.0) for one in self._outputs])
+        nominal = {variable.path: abs(variable.nominal) for variable in self._model.flat_variables}
+        self._absolute = np.array([_AGREE * options.atol * nominal.get(output.path, 1.0) for output in self._outputs])
 
     def native(self) -> NativeRuns:
         """Return the same runs by the compiled run-time."""
@@ -202,7 +204,7 @@ def in_threads(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Done]
                 if not waiting:
                     return
                 done = wait(waiting, return_when=FIRST_COMPLETED).done
-                for future in [one for one in waiting if one in done]:
+                for future in [f for f in waiting if f in done]:
                     first, points = waiting.pop(future)
                     yield reference.review(points, first, *future.result())
         finally:

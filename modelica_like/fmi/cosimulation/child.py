@@ -66,8 +66,8 @@ def open_slaves(job: Job) -> list[Slave]:
         for n, name in targets:
             check_name(slaves[n], name, "inputs")
             if (causality := slaves[n].all[name].causality) != "input":
-                known = [v for v, about in slaves[n].all.items() if about.causality == "input"]
-                raise Refused(kind="no input", unit=slaves[n].name, name=name, causality=causality, known=known)
+                inputs = [v for v, about in slaves[n].all.items() if about.causality == "input"]
+                raise Refused(kind="no input", unit=slaves[n].name, name=name, causality=causality, known=inputs)
     if job.asked["tolerance"] is not None and (unable := [slave.name for slave in slaves if not slave.can_save]):
         raise Refused(kind="no rollback", unit=unable[0])
     return slaves
@@ -76,20 +76,20 @@ def open_slaves(job: Job) -> list[Slave]:
 def check_name(slave: Slave, name: str, wanted: str) -> None:
     """Refuse a name that an FMU does not have."""
     if name not in slave.all:
-        known = [n for n, v in slave.all.items() if wanted != "inputs" or v.causality == "input"]
-        raise Refused(kind="unknown", unit=slave.name, name=name, known=known)
+        names = [n for n, v in slave.all.items() if wanted != "inputs" or v.causality == "input"]
+        raise Refused(kind="unknown", unit=slave.name, name=name, known=names)
 
 
 def choose(slaves: list[Slave], patterns: list[str] | None, *, own_names: bool) -> list[list[str]]:
     """Return the names of the variables to record, of each FMU."""
     names = [{name: name if own_names else f"{slave.name}.{name}" for name in slave.variables} for slave in slaves]
     if patterns is None:
-        return [list(own) for own in names]
-    full = [name for own in names for name in own.values()]
+        return [list(unique) for unique in names]
+    full = [name for unique in names for name in unique.values()]
     for pattern in patterns:
         if not any(fits(name, pattern) for name in full):
             raise Refused(kind="no output", name=pattern, known=full)
-    return [[name for name, one in own.items() if any(fits(one, p) for p in patterns)] for own in names]
+    return [[name for name, variable in unique.items() if any(fits(variable, p) for p in patterns)] for unique in names]
 
 
 def fits(name: str, pattern: str) -> bool:
@@ -123,27 +123,27 @@ def start(slaves: list[Slave], master: Master, job: dict[str, Any]) -> None:
 
 def run(job: Job) -> None:
     """Run the job of a folder."""
-    asked, slaves, folder = job.asked, open_slaves(job), job.folder
-    outputs = choose(slaves, asked["outputs"], own_names=asked["own_names"])
-    master = connect(slaves, asked)
-    start(slaves, master, asked)
-    recorder = Recorder(slaves, outputs, master, asked["interval"], job, folder / "rows")
-    recorder.keep(recorder.look(asked["start"]))
+    request, slaves, folder = job.asked, open_slaves(job), job.folder
+    outputs = choose(slaves, request["outputs"], own_names=request["own_names"])
+    master = connect(slaves, request)
+    start(slaves, master, request)
+    recorder = Recorder(slaves, outputs, master, request["interval"], job, folder / "rows")
+    recorder.keep(recorder.look(request["start"]))
     width = (folder / "rows").stat().st_size // 8
-    known = {"units": columns_of(slaves, outputs), "open": open_inputs(slaves, asked), "width": width}
-    job.leave(known, "columns.json")
-    span = asked["start"], asked["until"], asked["step"]
+    meta = {"units": columns_of(slaves, outputs), "open": open_inputs(slaves, request), "width": width}
+    job.leave(meta, "columns.json")
+    span = request["start"], request["until"], request["step"]
     try:
-        if asked["tolerance"] is None:
+        if request["tolerance"] is None:
             master.run_fixed(*span, recorder)
         else:
-            master.run_variable(*span, asked["tolerance"], recorder)
-        recorder.close(asked["until"])
+            master.run_variable(*span, request["tolerance"], recorder)
+        recorder.close(request["until"])
     except Terminated as end:  # results are those of the communication points before
-        known["ended"] = end.detail
+        meta["ended"] = end.detail
     for slave in slaves:
         slave.close()
-    job.leave(known)
+    job.leave(meta)
 
 
 def columns_of(slaves: list[Slave], outputs: list[list[str]]) -> list[dict[str, Any]]:
@@ -157,16 +157,16 @@ def columns_of(slaves: list[Slave], outputs: list[list[str]]) -> list[dict[str, 
 def open_inputs(slaves: list[Slave], job: dict[str, Any]) -> list[dict[str, Any]]:
     """Return the unconnected inputs without a value."""
     driven = {(n, name) for link in job["links"] for n, name in link["ends"][1:]}
-    found: list[dict[str, Any]] = []
+    opened: list[dict[str, Any]] = []
     for n, (slave, unit) in enumerate(zip(slaves, job["units"], strict=True)):
         inputs = [name for name, variable in slave.all.items() if variable.causality == "input"]
         names = [name for name in inputs if (n, name) not in driven and name not in unit["parameters"]]
         values = slave.reader(names)()
-        found += [
+        opened += [
             about(slave.all[name]) | {"fmu": slave.name, "value": value}
             for name, value in zip(names, values, strict=True)
         ]
-    return found
+    return opened
 
 
 def constants(slave: Slave) -> dict[str, float]:

@@ -70,10 +70,10 @@ def cut_netlist(assembly: Assembly, at: Sequence[str]) -> CutNetlist:
         cuts.setdefault(wire, cut)
     kept = [wire for wire in wires if wire not in cuts]
     kept += [replace(wire, ends=cut.far) for wire, cut in cuts.items() if len(cut.far) > 1 and not cut.signal]
-    found = CutNetlist(_groups(assembly, kept), tuple(kept), tuple(cuts.values()))
-    for cut in found.cuts:
-        _check_apart(assembly, found, cut)
-    return found
+    result = CutNetlist(_groups(assembly, kept), tuple(kept), tuple(cuts.values()))
+    for cut in result.cuts:
+        _check_apart(assembly, result, cut)
+    return result
 
 
 def _places(assembly: Assembly) -> str:
@@ -92,7 +92,7 @@ def _places(assembly: Assembly) -> str:
 def _wires(assembly: Assembly) -> list[Wire]:
     """Return all connections of the netlist itself, those of series named after their parts."""
     names = {ends: name for name, ends in assembly.wires.items()}
-    found: list[Wire] = []
+    wires: list[Wire] = []
     for statement in assembly.equations():
         if not isinstance(statement, Connection):
             continue
@@ -100,8 +100,8 @@ def _wires(assembly: Assembly) -> list[Wire]:
         if any("." not in end for end in ends):  # the netlist's own outer connector
             continue
         named = names.get(ends, "_".join(part.replace(".", "_") for part in map(_owner, ends)))
-        found.append(Wire(named, ends, not isinstance(statement.ends[0], Connector), statement.source))
-    return found
+        wires.append(Wire(named, ends, not isinstance(statement.ends[0], Connector), statement.source))
+    return wires
 
 
 def _path(end: Connector | Symbol) -> str:
@@ -116,9 +116,9 @@ def _joined(wires: Iterable[Wire]) -> list[Wire]:
     """Join wires that share an end."""
     joined: list[Wire] = []
     for wire in wires:
-        touching = [*(one for one in joined if set(one.ends) & set(wire.ends)), wire]
-        ends = tuple(dict.fromkeys(end for one in touching for end in one.ends))
-        joined = [*(one for one in joined if one not in touching), replace(touching[0], ends=ends)]
+        touching = [*(other for other in joined if set(other.ends) & set(wire.ends)), wire]
+        ends = tuple(dict.fromkeys(end for other in touching for end in other.ends))
+        joined = [*(other for other in joined if other not in touching), replace(touching[0], ends=ends)]
     return joined
 
 
@@ -127,14 +127,20 @@ def _joined(wires: Iterable[Wire]) -> list[Wire]:
 
 def _find(assembly: Assembly, wires: Sequence[Wire], name: str) -> tuple[Wire, Cut]:
     near = _near_end(assembly, wires, name)
-    wire = next((one for one in wires if near in one.ends), None)
+    wire = next((w for w in wires if near in w.ends), None)
     if wire is None:
         raise NetlistError(f"{near} is connected to nothing, so there is nothing to cut.")
     if wire.signal:  # a value goes from an output to inputs
         near = next((end for end in wire.ends if _is_output(assembly, end)), near)
     far = tuple(end for end in wire.ends if end != near)
     if wire.signal:
-        _check_can_open(assembly, far)
+        for opened in far:
+            owner, _, input_name = opened.rpartition(".")
+            if assembly.find(owner).value(input_name) is not None:
+                raise NetlistError(
+                    f"{opened} has a default value, so it does not become an input of an FMU.",
+                    advice="Cut at a shaft, or at a signal whose inputs have no default.",
+                )
     return wire, Cut(as_name(name), near, far, wire.signal, wire.source)
 
 
@@ -179,23 +185,12 @@ def _nowhere(assembly: Assembly, name: str, connected: Sequence[str]) -> Excepti
             f"{name} is inside {part_of(name)}; only connections of the netlist itself can be cut.",
             advice=f"Split {part_of(name)}'s own netlist, or cut at one of its ends.",
         )
-    known = [*assembly.parts, *assembly.wires, *connected]
+    paths = [*assembly.parts, *assembly.wires, *connected]
     return UnknownName(
-        f"{assembly.label} has no shaft '{name}'{did_you_mean(name, known) or '.'}",
+        f"{assembly.label} has no shaft '{name}'{did_you_mean(name, paths) or '.'}",
         why="A name is a part (it is cut behind it), one of its ends (shaft.flange_a), or an entry of [connect].",
         advice=_places(assembly),
     )
-
-
-def _check_can_open(assembly: Assembly, ends: Sequence[str]) -> None:
-    """Refuse inputs with a default value: they would not become inputs of an FMU."""
-    for end in ends:
-        owner, _, name = end.rpartition(".")
-        if assembly.find(owner).value(name) is not None:
-            raise NetlistError(
-                f"{end} has a default value, so it does not become an input of an FMU.",
-                advice="Cut at a shaft, or at a signal whose inputs have no default.",
-            )
 
 
 def _is_output(assembly: Assembly, path: str) -> bool:
@@ -216,34 +211,31 @@ def _groups(assembly: Assembly, wires: Iterable[Wire]) -> tuple[tuple[str, ...],
     groups = [{name} for name in names]
     for wire in wires:
         parts = {part_of(end) for end in wire.ends}
-        groups = [one for one in groups if not one & parts] + [parts.union(*(one for one in groups if one & parts))]
+        groups = [group for group in groups if not group & parts] + [
+            parts.union(*(group for group in groups if group & parts))
+        ]
     return tuple(
-        sorted((tuple(sorted(group, key=names.index)) for group in groups), key=lambda one: names.index(one[0]))
+        sorted((tuple(sorted(group, key=names.index)) for group in groups), key=lambda group: names.index(group[0]))
     )
 
 
-def _check_apart(assembly: Assembly, found: CutNetlist, cut: Cut) -> None:
-    inside = [end for end in cut.far if found.group_of(end) == found.group_of(cut.near)]
+def _check_apart(assembly: Assembly, netlist: CutNetlist, cut: Cut) -> None:
+    inside = [end for end in cut.far if netlist.group_of(end) == netlist.group_of(cut.near)]
     if not inside or (cut.signal and len(inside) < len(cut.far)):
         return
     near, far = part_of(cut.near), part_of(inside[0])
     if near == far:
         raise NetlistError(f"{cut.near} is inside the array {near}, which cannot be cut.", where=cut.source)
-    raise NetlistError(
-        f"{assembly.label} does not separate between {cut.near} and {inside[0]}.", where=cut.source,
-        why=f"{near} and {far} are also joined by {' – '.join(_way(found.wires, near, far))}.",
-        advice="Cut there as well: --at can be given several times.",
-    )  # fmt: skip
-
-
-def _way(wires: Sequence[Wire], start: str, end: str) -> list[str]:
-    """Return the parts along the shortest way from one to the other."""
-    ways = {start: [start]}
-    for part in (queue := [start]):
-        for wire in wires:
-            parts = [part_of(one) for one in wire.ends]
+    ways = {near: [near]}
+    for part in (queue := [near]):
+        for wire in netlist.wires:
+            parts = [part_of(e) for e in wire.ends]
             for other in parts if part in parts else ():
                 if other not in ways:
                     ways[other] = [*ways[part], other]
                     queue.append(other)
-    return ways[end]
+    raise NetlistError(
+        f"{assembly.label} does not separate between {cut.near} and {inside[0]}.", where=cut.source,
+        why=f"{near} and {far} are also joined by {' – '.join(ways[far])}.",
+        advice="Cut there as well: --at can be given several times.",
+    )  # fmt: skip

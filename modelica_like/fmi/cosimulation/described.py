@@ -84,14 +84,18 @@ def described(path: Path) -> DescribedFmu:
         except Exception as error:  # FMPy has no errors of its own
             reason = printable(str(error)).rstrip(".")
             raise FmuRefused(f"The description of {path.name} cannot be read: {reason}.") from error
-    scalars = [one for one in read.modelVariables if not one.shape]
-    variables = {one.name: FmuVariable(one.name, one.type, one.causality or "local", _unit(one)) for one in scalars}
-    units = {one.name: _definition(one) for one in read.unitDefinitions or ()}
+    scalars = [variable for variable in read.modelVariables if not variable.shape]
+    variables = {
+        scalar.name: FmuVariable(
+            scalar.name,
+            scalar.type,
+            scalar.causality or "local",
+            scalar.unit or getattr(scalar.declaredType, "unit", None) or "",
+        )
+        for scalar in scalars
+    }
+    units = {unit.name: _definition(unit) for unit in read.unitDefinitions or ()}
     return DescribedFmu(read.fmiVersion, read.coSimulation is not None, variables, units)
-
-
-def _unit(variable: Any) -> str:
-    return variable.unit or getattr(variable.declaredType, "unit", None) or ""
 
 
 def _definition(unit: Any) -> UnitDefinition:

@@ -35,7 +35,17 @@ def load_system(path: Path, work: Path) -> System:
         from modelica_like.fmi.cosimulation.fmu_parts import system_of_netlist
 
         return system_of_netlist(path, work)
-    return _system(data, lines, path)
+    errors: list[ModelicaLikeError] = []
+    read = toml.read_sections(data, "A system", _READERS, lines, errors)
+    if errors:
+        raise raise_together_or_one(errors)
+    fmus, links, bonds = (tuple(read.get(name, {}).values()) for name in ("fmus", "connect", "bonds"))
+    units = tuple(replace(unit, file=path.parent / unit.file) for unit in fmus)
+    settings = Settings(**read.get("simulate", {}))
+    own_names = read.get("own_names", False)
+    system = System(read.get("name", path.stem), units, links, bonds or find_bonds(links), settings, own_names)
+    check_system(system)
+    return system
 
 
 def describes_system(path: Path) -> bool:
@@ -61,31 +71,17 @@ def _read_toml(path: Path) -> tuple[dict[str, Any], Lines]:
     return toml.parse_toml(text, lines), lines
 
 
-def _system(data: Mapping[str, Any], lines: Lines, path: Path) -> System:
-    errors: list[ModelicaLikeError] = []
-    read = toml.read_sections(data, "A system", _READERS, lines, errors)
-    if errors:
-        raise raise_together_or_one(errors)
-    fmus, links, bonds = (tuple(read.get(name, {}).values()) for name in ("fmus", "connect", "bonds"))
-    units = tuple(replace(unit, file=path.parent / unit.file) for unit in fmus)
-    settings = Settings(**read.get("simulate", {}))
-    own_names = read.get("own_names", False)
-    system = System(read.get("name", path.stem), units, links, bonds or find_bonds(links), settings, own_names)
-    check_system(system)
-    return system
-
-
 def _unit(key: str, entry: Any) -> Unit:
     table, name = {"file": entry} if isinstance(entry, str) else entry, _name(key)
-    known = isinstance(table, dict) and isinstance(table.get("file"), str) and "\0" not in table["file"]
-    if not known or set(table) - {"file", "parameters"}:
+    is_file = isinstance(table, dict) and isinstance(table.get("file"), str) and "\0" not in table["file"]
+    if not is_file or set(table) - {"file", "parameters"}:
         raise NetlistError(f'{key} must be a table: {{ file = "{name}.fmu" }}, optionally with `parameters`.')
     if not name.isidentifier():
         raise NetlistError(f"{key}: the name of an FMU must be a word: letters, digits and _.")
     parameters = table.get("parameters", {})
     if not isinstance(parameters, dict) or not all(isinstance(v, int | float) for v in parameters.values()):
         raise NetlistError(f"{key}.parameters must be a table of numbers, in the FMU's units.")
-    values = {one: to_si(value + 0, ONE, f"{key}.{one}") for one, value in parameters.items()}
+    values = {p: to_si(value + 0, ONE, f"{key}.{p}") for p, value in parameters.items()}
     return Unit(name, Path(table["file"]), values)
 
 
@@ -101,7 +97,7 @@ def _link(key: str, entry: Any) -> Link:
 
 
 def _bond(key: str, entry: Any) -> Bond:
-    if not isinstance(entry, list) or len(entry) != 2 or not all(isinstance(one, str) for one in entry):
+    if not isinstance(entry, list) or len(entry) != 2 or not all(isinstance(name, str) for name in entry):
         raise NetlistError(
             f"{key} must be a list of two connections, whose product is a power.",
             advice="First that of the torque, force or current, then that of the speed, velocity or potential.",
@@ -123,10 +119,10 @@ def _time(key: str, value: Any) -> float:
     return to_si(toml.duration(key, value), parse_unit("s"), key)
 
 
-def _word(known: Sequence[str]) -> toml.Check:
+def _word(words: Sequence[str]) -> toml.Check:
     def check(key: str, value: Any) -> Any:
-        if value not in known:
-            raise UnknownName(f"{key} = {value!r} must be {' or '.join(known)}.")
+        if value not in words:
+            raise UnknownName(f"{key} = {value!r} must be {' or '.join(words)}.")
         return value
 
     return check

@@ -29,17 +29,17 @@ def system_of_netlist(path: Path, work: Path) -> System:
     FMU with the netlist's name.
     """
     document = parse(read_text(path), str(path))
-    fmus = {name: entry for name, entry in document.parts.items() if _is_fmu(entry)}
+    fmus = {
+        name: entry
+        for name, entry in document.parts.items()
+        if any(table["is"] == FMU_PART for table in (entry if isinstance(entry, list) else [entry]))
+    }
     if not fmus:
         raise NetlistError(
             f"{document.name} has no FMU among its parts, so there is nothing to co-simulate.",
             advice="Simulate it, or cut it into FMUs with `modelica-like split`.",
         )
     return _Joiner(document, fmus, path).system(work)
-
-
-def _is_fmu(entry: Any) -> bool:
-    return any(table["is"] == FMU_PART for table in (entry if isinstance(entry, list) else [entry]))
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class _Joiner:
         self._stop()
         rest, crossing = self._rest()
         kept: dict[str, list[str]] = {}
-        made = (self._tried("connect", name, self._link, rest, ends, kept) for name, ends in crossing.items())
-        links = [link for link in made if link is not None]
+        crossings = (self._tried("connect", name, self._link, rest, ends, kept) for name, ends in crossing.items())
+        links = [link for link in crossings if link is not None]
         self._stop()
         if rest is not None:
             outputs = [link.source.variable for link in links if link.source.unit == self.title]
@@ -105,7 +105,7 @@ class _Joiner:
             raise NetlistError(f"{name} names no file.", advice=f'Write {{ is = "FMU", file = "{name}.fmu" }}.')
         file = self.path.parent / entry["file"]
         if not file.is_file():
-            near = [one.name for one in file.parent.glob("*.fmu")] if file.parent.is_dir() else []
+            near = [path.name for path in file.parent.glob("*.fmu")] if file.parent.is_dir() else []
             hint = did_you_mean(file.name, near) or "."
             raise NetlistError(
                 f"{name}: there is no file '{entry['file']}'{hint}", why="Paths are relative to the netlist."
@@ -130,10 +130,10 @@ class _Joiner:
         return (to_si(value, unit, f"{fmu}.{key}") - unit.offset) / unit.factor
 
     def _variable(self, fmu: str, name: str) -> Any:
-        known = self.about[fmu].variables
-        if name not in known:
-            raise UnknownName(f"{fmu} has no variable '{name}'{did_you_mean(name, known) or '.'}")
-        return known[name]
+        variables = self.about[fmu].variables
+        if name not in variables:
+            raise UnknownName(f"{fmu} has no variable '{name}'{did_you_mean(name, variables) or '.'}")
+        return variables[name]
 
     def _refuse_other_mentions(self) -> None:
         """Refuse FMUs in sections that join flanges, or that give start values."""
@@ -170,8 +170,8 @@ class _Joiner:
         return assemble(replace(self.document, parts=parts, connect=connect), self.path)
 
     def _link(self, name: str, rest: Assembly | None, ends: list[str], kept: dict[str, list[str]]) -> Link | None:
-        found = [self._end(end, rest) for end in ends]
-        sources, targets = [e for e in found if not e.takes], [e for e in found if e.takes]
+        ports = [self._end(end, rest) for end in ends]
+        sources, targets = [e for e in ports if not e.takes], [e for e in ports if e.takes]
         if len(sources) != 1:
             names = ", ".join(map(str, sources or targets))
             what = "no output drives it" if not sources else "multiple outputs drive it"
@@ -187,7 +187,7 @@ class _Joiner:
 
     def _give(self, end: str, name: str) -> None:
         if (other := self.given.setdefault(end, name)) != name:
-            where = [self.document.lines.source("connect", one) for one in (other, name)]
+            where = [self.document.lines.source("connect", wire) for wire in (other, name)]
             raise NetlistError(f"{end} is given twice, by {other} and {name}.", where=where, advice="Remove one.")
 
     def _end(self, end: str, rest: Assembly | None) -> _End:

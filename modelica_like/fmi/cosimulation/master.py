@@ -82,9 +82,9 @@ class Balance(Energies):
     def add(self, signals: Sequence[Signal], before: Sequence[float], size: float) -> None:
         """Add a step, by the trapezoidal rule."""
         flow, rate = signals[self.flow], signals[self.rate]
-        told = [_moved(flow.used, size), _moved(rate.used, size)]
-        delivered = (before[self.flow] * rate.used[0] + flow.reached * told[1]) * size / 2
-        received = (flow.used[0] * before[self.rate] + told[0] * rate.reached) * size / 2
+        used = [_moved(flow.used, size), _moved(rate.used, size)]
+        delivered = (before[self.flow] * rate.used[0] + flow.reached * used[1]) * size / 2
+        received = (flow.used[0] * before[self.rate] + used[0] * rate.reached) * size / 2
         self.delivered += delivered
         self.received += received
         self.throughput += (abs(delivered) + abs(received)) / 2
@@ -164,7 +164,11 @@ class Master:
             before = [signal.value for signal in self.signals]
             for n in range(len(self.slaves)):
                 self._outputs(n, time)
-            moved = [signal for old, signal in zip(before, self.signals, strict=True) if _has_moved(old, signal)]
+            moved = [
+                signal
+                for old, signal in zip(before, self.signals, strict=True)
+                if not abs(signal.value - old) <= _SETTLED * max(abs(old), signal.nominal)
+            ]
             if not moved:
                 return
         n, name = moved[0].source
@@ -187,7 +191,11 @@ class Master:
         for signal, moves in zip(self.signals, self._moves, strict=True):
             signal.used = (signal.value, signal.slope if moves else 0.0)
         for n, slave in enumerate(self.slaves):
-            self._inputs(slave, self._taken[n])
+            for k, name in self._taken[n]:
+                slave.set(name, self.signals[k].used[0])
+            moving = [(name, self.signals[k].used[1]) for k, name in self._taken[n] if self._moves[k]]
+            if moving:
+                slave.give_slopes(*zip(*moving, strict=True))
             slave.step(time, size)
             if self.sequential:
                 self._outputs(n, time + size)
@@ -205,13 +213,6 @@ class Master:
         for signal, old in zip(self.signals, before, strict=True):
             signal.slope = (signal.value - old) / size
             signal.largest = max(signal.largest, abs(signal.value))
-
-    def _inputs(self, slave: Slave, taken: list[tuple[int, str]]) -> None:
-        for k, name in taken:
-            slave.set(name, self.signals[k].used[0])
-        moving = [(name, self.signals[k].used[1]) for k, name in taken if self._moves[k]]
-        if moving:
-            slave.give_slopes(*zip(*moving, strict=True))
 
     def _tell_later(self, n: int, before: Sequence[float], size: float) -> None:
         """Pass the results of an FMU to those that step after it."""
@@ -283,25 +284,18 @@ class Master:
             if refusal.detail["kind"] not in (_NOT_FINITE, _UNSTABLE):
                 raise
             return inf, None  # a shorter step may succeed
-        return self._error(once, tolerance), middle
-
-    def _error(self, once: Sequence[float], tolerance: float) -> float:
         pairs = zip(self.signals, once, strict=True)
         errors = [abs(s.value - other) / (tolerance * max(s.largest, _SMALL * s.nominal)) for s, other in pairs]
-        return max(errors, default=0.0)
+        return max(errors, default=0.0), middle
 
     def _memory(self) -> Memory:
-        return [dict(vars(one)) for one in (*self.signals, *self.balances)]
+        return [dict(vars(item)) for item in (*self.signals, *self.balances)]
 
     def _back(self, states: Sequence[Any], memory: Memory) -> None:
         for slave, state in zip(self.slaves, states, strict=True):
             slave.load(state)
-        for one, values in zip((*self.signals, *self.balances), memory, strict=True):
-            vars(one).update(values)
-
-
-def _has_moved(before: float, signal: Signal) -> bool:
-    return not abs(signal.value - before) <= _SETTLED * max(abs(before), signal.nominal)
+        for item, values in zip((*self.signals, *self.balances), memory, strict=True):
+            vars(item).update(values)
 
 
 def _moved(used: tuple[float, float], size: float) -> float:

@@ -43,8 +43,8 @@ def ends_of(cut: Cut, near_takes: Takes) -> tuple[End, End]:
 class Maker:
     """Makes the netlists of the groups of a cut netlist."""
 
-    def __init__(self, assembly: Assembly, found: CutNetlist) -> None:
-        self.assembly, self.found = assembly, found
+    def __init__(self, assembly: Assembly, cut: CutNetlist) -> None:
+        self.assembly, self.found = assembly, cut
         self._tried: dict[tuple[int, tuple[End, ...]], str] = {}
 
     def open_ends(self, group: int, chosen: Mapping[Cut, Takes]) -> list[End]:
@@ -77,12 +77,12 @@ class Maker:
             wires[end.adaptor] = (end.path, f"{end.adaptor}.{inner}")
         free = [end for end in self.assembly.free_ends if part_of(end) in names]
         parameters = self._parameters(group, parts.values())
-        made = Assembly(
+        part = Assembly(
             f"{self.assembly.label}_{names[0]}", parts=parts, connect=wires, free=free, parameters=parameters
         )
         # The part starts with numbers, whatever the kind of start of the drive.
-        made.__dict__["_simulate"] = {**self.assembly.__dict__["_simulate"], "start": "given"}
-        return made
+        part.__dict__["_simulate"] = {**self.assembly.__dict__["_simulate"], "start": "given"}
+        return part
 
     def adaptor(self, end: End) -> tuple[Component, str]:
         """Return an adaptor for an end, without acceleration, and the name of its connector."""
@@ -102,8 +102,8 @@ class Maker:
 
     def started(self, group: int, ends: Sequence[End], values: Mapping[str, float]) -> Assembly:
         """Return a group that starts like the whole drive; `values` are those of the drive, in SI units."""
-        made = self.bare(group, ends)
-        model = compile(reduce(flatten(made, open_inputs=True)))
+        part = self.bare(group, ends)
+        model = compile(reduce(flatten(part, open_inputs=True)))
         given, kept = set[int](), dict[str, float]()
         for entry in model.starts:
             if entry.strength != "fixed":
@@ -115,14 +115,14 @@ class Maker:
             elif entry.state is None and path in values and model.following:
                 kept[path] = values[path]  # states that follow the motion have no start values of their own
             else:  # other variables follow, and two start values of one motion could contradict each other
-                made.find(owner)._starts.pop(name, None)
+                part.find(owner)._starts.pop(name, None)
         for place, path in enumerate(model.states):
             if place not in given and path in values:
-                made.set(path, values[path])
+                part.set(path, values[path])
         moved = (path for some in model.following.values() for path in some if path in values)
         for path, value in ({path: guess(values[path]) for path in moved} | kept).items():
-            made.set(path, value)
-        return made
+            part.set(path, value)
+        return part
 
     def _parameters(self, group: int, parts: Iterable[Component | list[Component]]) -> dict[str, Any]:
         """Return the netlist's own parameters that the parts need."""
@@ -130,26 +130,23 @@ class Maker:
         queue = [name for part in parts for name in _names(part)]
         for name in queue:
             if "." in name:
-                self._check_inside(group, name)
+                if part_of(name) in self.assembly._parts and part_of(name) not in self.found.groups[group]:
+                    raise NetlistError(
+                        f"A formula needs {name}, which the cut puts into another FMU.",
+                        why=f"It is in one of {', '.join(self.found.groups[group])}.",
+                        advice="Give both parts a parameter of the netlist: [parameters].",
+                    )
             elif name in self.assembly.fields and name not in needed:
                 needed[name] = None
                 value = self.assembly.value(name)
                 queue += value.formula.names() if value is not None and value.formula is not None else ()
         return {name: value_text(self.assembly, name) for name in self.assembly.fields if name in needed}
 
-    def _check_inside(self, group: int, path: str) -> None:
-        if part_of(path) in self.assembly._parts and part_of(path) not in self.found.groups[group]:
-            raise NetlistError(
-                f"A formula needs {path}, which the cut puts into another FMU.",
-                why=f"It is in one of {', '.join(self.found.groups[group])}.",
-                advice="Give both parts a parameter of the netlist: [parameters].",
-            )
-
 
 def _names(part: Component | list[Component]) -> list[str]:
     """Return the names in the formulas of a part."""
-    components = [one for item in (part if isinstance(part, list) else [part]) for one in item.walk()]
-    values = [value for one in components for value in (*one._values.values(), *one._starts.values())]
+    components = [node for item in (part if isinstance(part, list) else [part]) for node in item.walk()]
+    values = [value for component in components for value in (*component._values.values(), *component._starts.values())]
     formulas: list[Formula] = [value.formula for value in values if value.formula is not None]
     return [name for formula in formulas for name in formula.names()]
 
@@ -195,10 +192,10 @@ def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
     names = [model.flat_variables[k].path for k in model.inputs]
     for name in outputs:
         follows = {names[k] for k in depends.inputs_of(model.position[f"{end.adaptor}.{name}"])}
-        found = follows & {f"{end.adaptor}.{one}" for one in wrong}
-        if found and end.takes == "potential":
+        causes = follows & {f"{end.adaptor}.{w}" for w in wrong}
+        if causes and end.takes == "potential":
             return f"{end.path} is rigid: its {outputs[0]} would depend on the acceleration"
-        if found:
+        if causes:
             return f"{end.path} stores no energy: its {outputs[0]} would depend directly on {inputs[0]}"
     return ""
 
@@ -207,7 +204,7 @@ def _impossible(maker: Maker, cuts: Sequence[Cut]) -> ModelicaLikeError:
     """Return the error for the first cut that is impossible in both directions."""
     for cut in cuts:
         sides = [maker.found.group_of(cut.near), maker.found.group_of(cut.far[0])]
-        others = [one for one in cuts if one is not cut]
+        others = [c for c in cuts if c is not cut]
         reasons: dict[str, None] = {}
         for chosen in _choices((cut, *others)):
             objections = [maker.objection(side, chosen) for side in sides]

@@ -85,9 +85,9 @@ def cosim(
         OSError: a file cannot be read.
     """
     if not isinstance(system, System):
-        with opened(Path(system)) as known:
+        with opened(Path(system)) as loaded:
             return cosim(
-                known, until, step=step, master=master, inputs=inputs, tolerance=tolerance, parameters=parameters,
+                loaded, until, step=step, master=master, inputs=inputs, tolerance=tolerance, parameters=parameters,
                 fmu_tolerance=fmu_tolerance, outputs=outputs, interval=interval, timeout=timeout, progress=progress,
                 readings=readings,
             )  # fmt: skip

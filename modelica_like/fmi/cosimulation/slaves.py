@@ -42,8 +42,8 @@ class Slave:
             old = self.description.fmiVersion == "1.0"
             raise Refused(kind="too old" if old else "no co-simulation", unit=name)
         second = self.description.fmiVersion == "2.0"
-        known = (v for v in self.description.modelVariables if v.type in _STORED and not v.shape)
-        self.all = {v.name: v for v in known if v.causality != "independent"}
+        variables = (v for v in self.description.modelVariables if v.type in _STORED and not v.shape)
+        self.all = {v.name: v for v in variables if v.causality != "independent"}
         self.variables = {n: v for n, v in self.all.items() if "arameter" not in (v.causality or "")}
         self.slopes = second and bool(about.canInterpolateInputs)
         self.can_save = bool(about.canGetAndSetFMUstate and about.canHandleVariableCommunicationStepSize)

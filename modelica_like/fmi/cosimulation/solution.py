@@ -66,12 +66,12 @@ class CosimSolution(RecordedSolution):
         modes = np.array([column.kind == "discrete" for column in columns], dtype=bool)
         continuous = (*(one for one in columns if one.kind != "discrete"), *bond_columns(system))
         model = RecordedModel(
-            system.name, continuous, tuple(one for one in columns if one.kind == "discrete"), constants
+            system.name, continuous, tuple(column for column in columns if column.kind == "discrete"), constants
         )
         rows, values = table.T, table.T[1 : 1 + len(columns)]
         bonds = rows[1 + len(columns) : -4].reshape(-1, _TOLD, len(table))
-        told = np.stack([bonds[:, 0], bonds[:, 2] - bonds[:, 1]], axis=1).reshape(-1, len(table))
-        super().__init__(model, rows[0].copy(), np.concatenate([values[~modes], told]), values[modes], seconds)
+        energies = np.stack([bonds[:, 0], bonds[:, 2] - bonds[:, 1]], axis=1).reshape(-1, len(table))
+        super().__init__(model, rows[0].copy(), np.concatenate([values[~modes], energies]), values[modes], seconds)
         self.couplings = tuple(
             Coupling(bond.name, **dict(zip(vars(Energies()), map(float, last[1:]), strict=True)))
             for bond, last in zip(system.bonds, bonds[:, :, -1], strict=True)
@@ -92,13 +92,13 @@ def described_model(system: System) -> RecordedModel:
 
 def _columns(system: System, units: Sequence[Sequence[Mapping[str, Any]]]) -> list[RecordedVariable]:
     counts = Counter(entry["path"] for unit in units for entry in unit)
-    found: list[RecordedVariable] = []
+    columns: list[RecordedVariable] = []
     for unit, entries in zip(system.units, units, strict=True):
         for entry in entries:
-            own = system.own_names and counts[entry["path"]] == 1
-            path = entry["path"] if own else f"{unit.name}.{entry['path']}"
-            found.append(RecordedVariable(**{**entry, "path": path, "names": dict(entry.get("names", ()))}))
-    return found
+            short = system.own_names and counts[entry["path"]] == 1
+            path = entry["path"] if short else f"{unit.name}.{entry['path']}"
+            columns.append(RecordedVariable(**{**entry, "path": path, "names": dict(entry.get("names", ()))}))
+    return columns
 
 
 def bond_columns(system: System) -> list[RecordedVariable]:

@@ -84,10 +84,10 @@ def split(
     check_writable(target / _SYSTEM)
     tell("compiling the drive")
     assembly = _assembly(drive)
-    found = cut_netlist(assembly, [at] if isinstance(at, str) else at)
-    titles = _titles(found, names)
+    cut = cut_netlist(assembly, [at] if isinstance(at, str) else at)
+    titles = _titles(cut, names)
     settings = _settings(assembly.__dict__["_simulate"].get("until"), step, master)
-    maker = Maker(assembly, found)
+    maker = Maker(assembly, cut)
     tell("choosing the causality")
     chosen = orient(maker)
     values = _start_values(assembly)
@@ -145,13 +145,13 @@ def _assembly(drive: Component | str | Path) -> Assembly:
     return drive if isinstance(drive, Assembly) else as_assembly(drive)
 
 
-def _titles(found: CutNetlist, names: Sequence[str]) -> list[str]:
+def _titles(cut: CutNetlist, names: Sequence[str]) -> list[str]:
     if not names:
-        return [group[0] for group in found.groups]
-    if len(names) != len(found.groups):
-        groups = "; ".join(_some(group) for group in found.groups)
+        return [group[0] for group in cut.groups]
+    if len(names) != len(cut.groups):
+        groups = "; ".join(_some(group) for group in cut.groups)
         raise NetlistError(
-            f"There are {len(found.groups)} FMUs, but {len(names)} name{'s' if len(names) > 1 else ''}.",
+            f"There are {len(cut.groups)} FMUs, but {len(names)} name{'s' if len(names) > 1 else ''}.",
             why=f"They are: {groups}.",
         )
     for name in names:
@@ -171,7 +171,7 @@ def _start_values(assembly: Assembly) -> dict[str, float]:
     whole = build(assembly)
     point = initialize(whole, 0.0, whole.settings.get("start", "given"))
     column = whole.variables(point.t, point.x, point.z, whole.p, whole.u, point.d).full().ravel()
-    return {one.path: float(value) for one, value in zip(whole.flat_variables, column, strict=True)}
+    return {variable.path: float(value) for variable, value in zip(whole.flat_variables, column, strict=True)}
 
 
 def _couplings(
@@ -197,8 +197,8 @@ def _couplings(
     return tuple(links), tuple(bonds)
 
 
-def _signal(found: CutNetlist, cut: Cut, titles: Sequence[str]) -> Link:
-    source, home = cut.near, found.group_of(cut.near)
-    ends = (source, *(end for end in cut.far if found.group_of(end) != home))
-    ports = [Port(titles[found.group_of(end)], end) for end in ends]
+def _signal(netlist: CutNetlist, cut: Cut, titles: Sequence[str]) -> Link:
+    source, home = cut.near, netlist.group_of(cut.near)
+    ends = (source, *(end for end in cut.far if netlist.group_of(end) != home))
+    ports = [Port(titles[netlist.group_of(end)], end) for end in ends]
     return Link(cut.name, ports[0], tuple(ports[1:]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
-from modelica_like.fmi.cosimulation.described import DescribedFmu, described
+from modelica_like.fmi.cosimulation.described import described
 from modelica_like.fmi.cosimulation.ssp_document import Version, ssd
 from modelica_like.fmi.cosimulation.ssp_reader import read_structure
 from modelica_like.fmi.cosimulation.system import System, check_system
@@ -36,11 +36,19 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
     """
     target, chosen = target_file(path, ".ssp", "An SSP"), known_version(version, Version, "SSP")
     check_system(system)
-    for name in (system.name, *(one.name for one in (*system.links, *system.bonds))):
+    for name in (system.name, *(named.name for named in (*system.links, *system.bonds))):
         if not name.isprintable():
             raise NetlistError(f"The name '{printable(name)}' has characters that XML does not allow.")
     fmus = {unit.name: described(unit.file) for unit in system.units}
-    _check_variables(system, fmus)
+    ports = [(port.unit, port.variable) for link in system.links for port in (link.source, *link.targets)]
+    ports += [(user.name, variable) for user in system.units for variable in user.parameters]
+    file_of = {user.name: user.file.name for user in system.units}
+    for user, variable in ports:
+        variables = fmus[user].variables
+        if variable not in variables:
+            raise UnknownName(
+                f"{user} ({file_of[user]}) has no variable '{variable}'{did_you_mean(variable, variables) or '.'}"
+            )
     homes: dict[Path, str] = {}
     for unit in system.units:
         homes.setdefault(unit.file.resolve(), f"resources/{unit.name}.fmu")
@@ -48,16 +56,6 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
     files = {home: file.read_bytes() for file, home in homes.items()}
     write_archive(target, files | {SSP.description: ssd(system, fmus, sources, chosen)})
     return target
-
-
-def _check_variables(system: System, fmus: dict[str, DescribedFmu]) -> None:
-    ports = [(port.unit, port.variable) for link in system.links for port in (link.source, *link.targets)]
-    ports += [(unit.name, name) for unit in system.units for name in unit.parameters]
-    files = {unit.name: unit.file.name for unit in system.units}
-    for unit, name in ports:
-        known = fmus[unit].variables
-        if name not in known:
-            raise UnknownName(f"{unit} ({files[unit]}) has no variable '{name}'{did_you_mean(name, known) or '.'}")
 
 
 def load_ssp(path: Path, work: Path) -> System:

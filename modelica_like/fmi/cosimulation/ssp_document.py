@@ -47,26 +47,42 @@ def ssd(system: System, fmus: Mapping[str, DescribedFmu], sources: Mapping[str, 
     for unit in system.units:
         _component(parts, unit, fmus[unit.name], sources[unit.name], ports, version)
     if system.links:
-        _connections(inside, system)
-    _units(top, [(fmus[port.unit], port.variable) for port in _with_parameters(ports, system)])
+        group = element(inside, "ssd:Connections")
+        for joint in system.links:
+            for target in joint.targets:
+                element(
+                    group, "ssd:Connection", description=joint.name, startElement=joint.source.unit,
+                    startConnector=joint.source.variable, endElement=target.unit, endConnector=target.variable,
+                )  # fmt: skip
+    ports = [*ports, *(Port(unit.name, name) for unit in system.units for name in unit.parameters)]
+    _units(top, [(fmus[port.unit], port.variable) for port in ports])
     if system.settings.until is not None:
         element(top, "ssd:DefaultExperiment", startTime=0.0, stopTime=system.settings.until)
-    _annotation(top, system)
+    settings = system.settings
+    note = element(element(top, "ssd:Annotations"), "ssc:Annotation", type=COSIMULATION)
+    inner = element(
+        note, "ml:Cosimulation", master=settings.master, inputs=settings.inputs, step=settings.step,
+        tolerance=settings.tolerance, ownNames=system.own_names,
+    )  # fmt: skip
+    for bond in system.bonds:
+        element(inner, "ml:Bond", name=bond.name, flow=bond.flow, rate=bond.rate)
     return document(top).encode()
 
 
 def _component(
     parts: Element, unit: Unit, fmu: DescribedFmu, source: str, ports: list[Port], version: Version
 ) -> None:  # fmt: skip
-    one = element(parts, "ssd:Component", name=unit.name, type=FMU_TYPE, source=source, implementation="CoSimulation")
-    own = [fmu.variables[port.variable] for port in ports if port.unit == unit.name]
-    if own:
-        connectors = element(one, "ssd:Connectors")
-        for variable in own:
+    component = element(
+        parts, "ssd:Component", name=unit.name, type=FMU_TYPE, source=source, implementation="CoSimulation"
+    )
+    variables = [fmu.variables[port.variable] for port in ports if port.unit == unit.name]
+    if variables:
+        connectors = element(component, "ssd:Connectors")
+        for variable in variables:
             connector = element(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
             _type(connector, "ssc", variable, version)
     if unit.parameters:
-        binding = element(element(one, "ssd:ParameterBindings"), "ssd:ParameterBinding")
+        binding = element(element(component, "ssd:ParameterBindings"), "ssd:ParameterBinding")
         values = element(binding, "ssd:ParameterValues")
         group = element(values, "ssv:ParameterSet", version=version, name=PARAMETER_SET)
         given = element(group, "ssv:Parameters")
@@ -96,47 +112,21 @@ def _kind(kind: str, version: Version) -> str | None:
     return "Real" if kind in _REAL else "Integer"
 
 
-def _connections(inside: Element, system: System) -> None:
-    group = element(inside, "ssd:Connections")
-    for link in system.links:
-        for target in link.targets:
-            element(
-                group, "ssd:Connection", description=link.name, startElement=link.source.unit,
-                startConnector=link.source.variable, endElement=target.unit, endConnector=target.variable,
-            )  # fmt: skip
-
-
-def _with_parameters(ports: list[Port], system: System) -> list[Port]:
-    return [*ports, *(Port(unit.name, name) for unit in system.units for name in unit.parameters)]
-
-
 def _units(top: Element, used: list[tuple[DescribedFmu, str]]) -> None:
     """Write the units of all variables that are mentioned."""
-    known: dict[str, UnitDefinition] = {}
+    units: dict[str, UnitDefinition] = {}
     for fmu, name in used:
         unit = fmu.variables[name].unit
         if not unit:
             continue
         definition = fmu.units.get(unit, UnitDefinition(unit))
-        if known.setdefault(unit, definition) != definition:
+        if units.setdefault(unit, definition) != definition:
             raise NetlistError(f"Two FMUs define the unit '{unit}' differently, which an SSP cannot express.")
-    if known:
+    if units:
         group = element(top, "ssd:Units")
-        for name in sorted(known):
-            one = known[name]
+        for name in sorted(units):
+            one = units[name]
             base: dict[str, object] = dict(one.exponents)
             base |= {} if one.factor == 1.0 else {"factor": one.factor}
             base |= {} if one.offset == 0.0 else {"offset": one.offset}
             element(element(group, "ssc:Unit", name=name), "ssc:BaseUnit", **base)
-
-
-def _annotation(top: Element, system: System) -> None:
-    """Write the settings of the run and the bonds."""
-    settings = system.settings
-    note = element(element(top, "ssd:Annotations"), "ssc:Annotation", type=COSIMULATION)
-    inner = element(
-        note, "ml:Cosimulation", master=settings.master, inputs=settings.inputs, step=settings.step,
-        tolerance=settings.tolerance, ownNames=system.own_names,
-    )  # fmt: skip
-    for bond in system.bonds:
-        element(inner, "ml:Bond", name=bond.name, flow=bond.flow, rate=bond.rate)

@@ -135,14 +135,14 @@ def number(xml: Any, attribute: str, default: float | None = None) -> float:
 
 def unit_definitions(top: Any) -> dict[str, UnitDefinition]:
     """Return the units that an SSD or a parameter set defines."""
-    found: dict[str, UnitDefinition] = {}
+    units: dict[str, UnitDefinition] = {}
     for unit in top.iterfind("{*}Units/ssc:Unit", NAMES):
         base = unit.find("ssc:BaseUnit", NAMES)
         if base is not None:
             exponents = tuple((name, int(number(base, name))) for name in BASE_UNITS if base.get(name))
             name = needed(unit, "name")
-            found[name] = UnitDefinition(name, exponents, number(base, "factor", 1.0), number(base, "offset", 0.0))
-    return found
+            units[name] = UnitDefinition(name, exponents, number(base, "factor", 1.0), number(base, "offset", 0.0))
+    return units
 
 
 def read_element(xml: Any, path: ElementPath, files: Files) -> Element:
@@ -163,13 +163,13 @@ def read_element(xml: Any, path: ElementPath, files: Files) -> Element:
 
 
 def _named(element: Element, what: str, where: str) -> Iterator[tuple[str, Any]]:
-    known: set[str] = set()
-    for one in element.xml.iterfind(where, NAMES):
-        name = needed(one, "name")
-        if name in known:
-            raise DuplicateName(f"{element.label} has two {what}s '{name}'.", where=place(one))
-        known.add(name)
-        yield name, one
+    names: set[str] = set()
+    for child in element.xml.iterfind(where, NAMES):
+        name = needed(child, "name")
+        if name in names:
+            raise DuplicateName(f"{element.label} has two {what}s '{name}'.", where=place(child))
+        names.add(name)
+        yield name, child
 
 
 def _fmu(xml: Any, files: Files) -> Path:
@@ -193,13 +193,13 @@ def bound_values(root: Element, files: Files, units: Units) -> dict[Target, Boun
 
     Within one element the later binding wins; between two elements the outer one wins.
     """
-    found: dict[Target, Bound] = {}
-    for element in sorted(root.walk(), key=lambda one: -len(one.path)):
+    values: dict[Target, Bound] = {}
+    for element in sorted(root.walk(), key=lambda source: -len(source.path)):
         for binding in element.xml.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", NAMES):
             prefix = binding.get("prefix", "")
             for name, bound in _parameters(binding, files, units):
-                found.update(dict.fromkeys(_targets(element, prefix + name), bound))
-    return found
+                values.update(dict.fromkeys(_targets(element, prefix + name), bound))
+    return values
 
 
 def _targets(element: Element, name: str) -> Iterator[Target]:
@@ -224,13 +224,13 @@ def _parameters(binding: Any, files: Files, units: Units) -> Iterator[tuple[str,
         raise NetlistError("Parameters inside a component's file are not supported.", where=place(binding))
     inside = binding.iterfind("ssd:ParameterValues/ssv:ParameterSet", NAMES)
     for group in [files.root(files.find(source, place(binding)))] if source else inside:
-        known = {**units, **unit_definitions(group)}
-        for one in group.iterfind("ssv:Parameters/ssv:Parameter", NAMES):
-            yield needed(one, "name"), _value(one, known)
+        all_units = {**units, **unit_definitions(group)}
+        for element in group.iterfind("ssv:Parameters/ssv:Parameter", NAMES):
+            yield needed(element, "name"), _value(element, all_units)
 
 
 def _value(parameter: Any, units: Units) -> Bound:
-    typed = next((one for one in parameter if local(one) != "Annotations"), None)
+    typed = next((child for child in parameter if local(child) != "Annotations"), None)
     if typed is None or local(typed) in _NO_NUMBERS:
         what = "has no value" if typed is None else f"is of type {local(typed)}"
         name = needed(parameter, "name")

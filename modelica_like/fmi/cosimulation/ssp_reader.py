@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import chain, count
 from math import isfinite
@@ -57,9 +57,19 @@ class _Reader:
 
     def __init__(self, top: Any, root: Element, files: Files) -> None:
         self.top, self.root, self.files = top, root, files
-        self.elements = {one.path: one for one in root.walk()}
-        self.files_of = {one.path: one.file for one in root.walk() if one.file is not None}
-        self.names = _flat_names([self.elements[path] for path in self.files_of])
+        self.elements = {node.path: node for node in root.walk()}
+        self.files_of = {node.path: node.file for node in root.walk() if node.file is not None}
+        # Names of components have no dots, blanks and special characters.
+        components = [self.elements[path] for path in self.files_of]
+        names: dict[ElementPath, str] = {}
+        for component in components:
+            name = _word("_".join(component.path))
+            if name in names.values():
+                raise DuplicateName(
+                    f"Two FMUs would have the name {name}.", where=place(component.xml), advice="Rename one of them."
+                )
+            names[component.path] = name
+        self.names = names
         self.fmus = {path: described(file) for path, file in self.files_of.items()}
         self.units = ssp.unit_definitions(top)
         self.drives: dict[Target, _Drive] = {}
@@ -77,19 +87,19 @@ class _Reader:
         parameters = self._parameters(outer)
         units = tuple(Unit(self.names[path], file, parameters[path]) for path, file in self.files_of.items())
         bonds = find_bonds(links) if note is None else tuple(map(_bond, note.iterfind("ml:Bond", NAMES)))
-        own = note is not None and note.get("ownNames") == "true"
+        own_names = note is not None and note.get("ownNames") == "true"
         title = self.top.get("name") or self.root.xml.get("name") or Path(self.files.name).stem
-        system = System(title, units, links, bonds, self._settings(note), own)
+        system = System(title, units, links, bonds, self._settings(note), own_names)
         check_system(system)
         return system
 
     # -- connections -------------------------------------------------------------------------------------------------
 
     def _connect(self, system: Element, xml: Any) -> None:
-        for one in xml:
-            if ssp.local(one).endswith("Transformation") and not _is_identity(one):
+        for child in xml:
+            if ssp.local(child).endswith("Transformation") and not _is_identity(child):
                 raise NetlistError(
-                    f"A connection with a {ssp.local(one)} is not supported.", where=place(xml),
+                    f"A connection with a {ssp.local(child)} is not supported.", where=place(xml),
                     advice="Do the conversion in one of the FMUs.",
                 )  # fmt: skip
         ends = [self._end(system, xml, which) for which in ("start", "end")]
@@ -142,7 +152,9 @@ class _Reader:
             said = targets[taken[0]][0].description
             is_name = said != "" if own else said.isidentifier()
             chosen = said if is_name else _word(_text(source))
-            links.append(Link(_unused(chosen, links), self._port(source), tuple(map(self._port, taken))))
+            used = [link.name for link in links]
+            name = next(c for c in chain([chosen], (f"{chosen}_{k}" for k in count(2))) if c not in used)
+            links.append(Link(name, self._port(source), tuple(map(self._port, taken))))
         return tuple(links)
 
     def _port(self, target: Target) -> Port:
@@ -162,28 +174,28 @@ class _Reader:
 
     def _units_of(self, end: Target) -> list[UnitDefinition]:
         path, name = end
-        own = self.fmus[path].unit_of(name) if path in self.fmus else None
-        return [unit for unit in (own, self._unit_of(end)) if unit is not None]
+        own_unit = self.fmus[path].unit_of(name) if path in self.fmus else None
+        return [unit for unit in (own_unit, self._unit_of(end)) if unit is not None]
 
     # -- values ------------------------------------------------------------------------------------------------------
 
     def _parameters(self, outer: Mapping[Target, Target]) -> dict[ElementPath, dict[str, float]]:
         """Return the values of each component: those bound to it, and those bound to its sources outside."""
         bound = ssp.bound_values(self.root, self.files, self.units)
-        found: dict[ElementPath, dict[str, float]] = {path: {} for path in self.fmus}
+        values: dict[ElementPath, dict[str, float]] = {path: {} for path in self.fmus}
         for target in {**bound, **outer}:
             source = outer[target] if outer.get(target) in bound else target
             (path, name), fmu = target, self.fmus.get(target[0])
             if source not in bound or fmu is None or name not in fmu.variables:
                 continue  # the standard ignores values without a receiver
-            given, own = bound[source], fmu.unit_of(name)
+            given, own_unit = bound[source], fmu.unit_of(name)
             # A value that was given for a connector of a system is in the connector's unit if it has none.
             unit = given.unit if source == target else given.unit or self._unit_of(source)
-            value = unit.convert(given.value, own) if unit and own else given.value
+            value = unit.convert(given.value, own_unit) if unit and own_unit else given.value
             if not isfinite(value):
                 raise NetlistError(f"{_text(target)} = {value:g} is not finite.", where=given.place)
-            found[path][name] = value
-        return found
+            values[path][name] = value
+        return values
 
     def _unit_of(self, end: Target) -> UnitDefinition | None:
         """Return the unit that a connector says it has."""
@@ -210,24 +222,6 @@ def _is_identity(transformation: Any) -> bool:
 
 def _bond(xml: Any) -> Bond:
     return Bond(needed(xml, "name"), needed(xml, "flow"), needed(xml, "rate"))
-
-
-def _unused(name: str, links: Sequence[Link]) -> str:
-    used = [link.name for link in links]
-    return next(one for one in chain([name], (f"{name}_{k}" for k in count(2))) if one not in used)
-
-
-def _flat_names(components: list[Element]) -> dict[ElementPath, str]:
-    """Return names of components without dots, blanks and special characters."""
-    names: dict[ElementPath, str] = {}
-    for one in components:
-        name = _word("_".join(one.path))
-        if name in names.values():
-            raise DuplicateName(
-                f"Two FMUs would have the name {name}.", where=place(one.xml), advice="Rename one of them."
-            )
-        names[one.path] = name
-    return names
 
 
 def _word(text: str) -> str:

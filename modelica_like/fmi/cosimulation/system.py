@@ -18,7 +18,7 @@ def powers() -> tuple[tuple[str, str], ...]:
     from modelica_like.netlist.registry import library_types  # the process of the FMUs needs no library
 
     terminals = (kind.terminal for kind in library_types().values())
-    return tuple(dict.fromkeys(one.power for one in terminals if one and one.power))
+    return tuple(dict.fromkeys(terminal.power for terminal in terminals if terminal and terminal.power))
 
 
 class Port(NamedTuple):
@@ -117,10 +117,10 @@ class Settings:
         _check_word("way to give inputs", self.inputs, get_args(Inputs))
 
 
-def _check_word(what: str, name: str, known: Sequence[str]) -> None:
-    if name not in known:
-        hint = did_you_mean(name, known) or "."
-        raise UnknownName(f"There is no {what} '{name}'{hint}", advice=f"There are {' and '.join(known)}.")
+def _check_word(what: str, name: str, words: Sequence[str]) -> None:
+    if name not in words:
+        hint = did_you_mean(name, words) or "."
+        raise UnknownName(f"There is no {what} '{name}'{hint}", advice=f"There are {' and '.join(words)}.")
 
 
 @dataclass(frozen=True)
@@ -149,10 +149,12 @@ def check_system(system: System) -> None:
     errors: list[ModelicaLikeError] = []
     if not system.units:
         errors.append(NetlistError(f"{system.name} has no FMU.", advice="Declare them in [fmus]."))
-    known = [unit.name for unit in system.units]
+    unit_names = [unit.name for unit in system.units]
     for port in (port for link in system.links for port in (link.source, *link.targets)):
-        if port.unit not in known:
-            errors.append(UnknownName(f"{system.name} has no FMU '{port.unit}'{did_you_mean(port.unit, known) or '.'}"))
+        if port.unit not in unit_names:
+            errors.append(
+                UnknownName(f"{system.name} has no FMU '{port.unit}'{did_you_mean(port.unit, unit_names) or '.'}")
+            )
     driven: dict[Port, str] = {}
     for name, target in ((link.name, target) for link in system.links for target in link.targets):
         if target in driven:
@@ -169,11 +171,11 @@ def check_system(system: System) -> None:
 
 def find_bonds(links: Iterable[Link]) -> tuple[Bond, ...]:
     """Return the bonds that follow from names: `a.x.tau` to `b.y.tau`, and `b.y.w` back to `a.x.w`."""
-    known = powers()
+    pairs = powers()
     by_ends = {(link.source, target): link for link in links for target in link.targets}
     bonds: list[Bond] = []
     for (source, target), link in by_ends.items():
-        for flow, rate in known:
+        for flow, rate in pairs:
             stem, _, last = source.variable.rpartition(".")
             other, _, its_last = target.variable.rpartition(".")
             if last != flow or its_last != flow:

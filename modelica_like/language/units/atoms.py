@@ -105,8 +105,8 @@ def pint_registry() -> Any:
     """Return pint's registry of units; the first call creates it, in about half a second."""
     import pint
 
-    found: Any = pint.get_application_registry
-    return found().get()
+    registry: Any = pint.get_application_registry
+    return registry().get()
 
 
 def _ask_pint(name: str) -> Atom:
@@ -115,13 +115,13 @@ def _ask_pint(name: str) -> Atom:
     registry = pint_registry()
     try:
         unit = registry.Unit(PINT_NAMES.get(name, name))
-        zero, one = (registry.Quantity(value, unit).to_root_units() for value in (0.0, 1.0))
+        zero, unity = (registry.Quantity(value, unit).to_root_units() for value in (0.0, 1.0))
     except (pint.PintError, AttributeError, ValueError, TypeError, ArithmeticError):
         raise UnitError(f"Unknown unit '{name}'{_suggestion(name)}") from None
-    factor, offset = float(one.magnitude - zero.magnitude), float(zero.magnitude)
+    factor, offset = float(unity.magnitude - zero.magnitude), float(zero.magnitude)
     if registry.Quantity(2.0, unit).to_root_units().magnitude != 2 * factor + offset:
         raise UnitError(f"Unit '{name}' is logarithmic; give a plain number.")
-    return _from_pint(dict(one.unit_items()), factor, offset)
+    return _from_pint(dict(unity.unit_items()), factor, offset)
 
 
 _PINT_BASE = {

@@ -79,7 +79,14 @@ def counts_turns(given: Unit, unit: Unit) -> bool:
 
 def _quantity(value: object, unit: Unit, name: str) -> tuple[float, Unit]:
     if isinstance(value, str):
-        return _text_quantity(value, unit, name)
+        try:
+            read = read_quantity(value)
+        except UnitError as error:
+            raise UnitError(f"{name} = '{value}': {error.what}", advice=error.advice) from None
+        if read is None:
+            raise UnitError(f"{name} expects {unit}; '{value}' is not a quantity.")
+        match = _NUMBER.fullmatch(plain_digits(value.strip()))
+        return read if match is not None and match.group(2) else (read[0], unit)
     if isinstance(value, bool) or value is None:
         raise UnitError(f"{name} expects {unit}; {value} is not a number.")
     if isinstance(value, Real):
@@ -90,29 +97,16 @@ def _quantity(value: object, unit: Unit, name: str) -> tuple[float, Unit]:
     return _foreign(value, unit, name)
 
 
-def _text_quantity(text: str, unit: Unit, name: str) -> tuple[float, Unit]:
-    try:
-        read = read_quantity(text)
-    except UnitError as error:
-        raise UnitError(f"{name} = '{text}': {error.what}", advice=error.advice) from None
-    if read is None:
-        raise UnitError(f"{name} expects {unit}; '{text}' is not a quantity.")
-    match = _NUMBER.fullmatch(plain_digits(text.strip()))
-    return read if match is not None and match.group(2) else (read[0], unit)
-
-
 def _foreign(value: Any, unit: Unit, name: str) -> tuple[float, Unit]:
     """Read a pint.Quantity or a zero-dimensional array, without importing either package."""
     try:
         if hasattr(value, "magnitude") and hasattr(value, "units"):
-            return float(value.magnitude), parse_unit(_from_pint(value))
+            return float(value.magnitude), parse_unit(
+                ".".join(f"{name}^({Fraction(power).limit_denominator(100)})" for name, power in value.unit_items())
+            )
         return float(value.item()), unit
     except (AttributeError, TypeError, ValueError):
         raise UnitError(f"{name} expects {unit}; {value!r} is not a number.") from None
-
-
-def _from_pint(value: Any) -> str:
-    return ".".join(f"{name}^({Fraction(power).limit_denominator(100)})" for name, power in value.unit_items())
 
 
 def in_unit(value_si: float, unit_text: str) -> float:

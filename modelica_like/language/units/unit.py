@@ -130,7 +130,7 @@ def _base_powers(name: str, power: Exponent) -> list[tuple[str, Exponent]]:
     plain = {"bar": "Pa", "degC": "K"}.get(name, name if atom.factor == 1.0 else name[1:])
     if plain in ATOMS and ATOMS[plain].factor == 1.0 and ATOMS[plain].exponents == atom.exponents:
         return [(plain, power)]
-    return [(base, power * own) for base, own in zip(BASE, atom.exponents, strict=True)]
+    return [(base, power * exponent) for base, exponent in zip(BASE, atom.exponents, strict=True)]
 
 
 # --- text -----------------------------------------------------------------------------------------------------------
@@ -184,7 +184,10 @@ class _Parser:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.tokens = self._tokens(_plain(text))
+        text = unicodedata.normalize("NFKC", _SUPERSCRIPTS.sub(lambda match: "^" + match.group(), text))
+        for typographic, plain in _SPELLINGS.items():
+            text = text.replace(typographic, plain)
+        self.tokens = self._tokens(text)
         self.next = 0
 
     def parse(self) -> Unit:
@@ -246,10 +249,3 @@ class _Parser:
         return UnitError(
             f"'{self.text}' is not a unit.", advice="Write units as in kg.m2, N.m.s/rad, J/(kg.K) or 1/min."
         )
-
-
-def _plain(text: str) -> str:
-    text = unicodedata.normalize("NFKC", _SUPERSCRIPTS.sub(lambda match: "^" + match.group(), text))
-    for typographic, plain in _SPELLINGS.items():
-        text = text.replace(typographic, plain)
-    return text

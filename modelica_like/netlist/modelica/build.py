@@ -60,6 +60,9 @@ def build_component(instance: Instance, notes: Notes) -> Written:
     return _Builder(instance, notes).run()
 
 
+_STATE_SELECT = {"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}
+
+
 class _Builder:
     def __init__(self, instance: Instance, notes: Notes) -> None:
         self.instance, self.notes = instance, notes
@@ -83,7 +86,11 @@ class _Builder:
             self._attempt(place, self._member, name, member)
         if self.errors:
             raise raise_together_or_one(self.errors)
-        self._equations()
+        self.component.__dict__.update(
+            _statements=tuple(self.statements.equations), _initial=tuple(self.statements.initial),
+            _happenings=tuple(self.statements.happenings),
+            _instants=frozenset(name for name, instant in self.statements.outputs.items() if instant),
+        )  # fmt: skip
         component.__dict__.update(_simulate={}, _display={}, _class=text.path)
         self._connect()
         if self.errors:
@@ -95,7 +102,7 @@ class _Builder:
         try:
             action(*arguments)
         except ModelicaLikeError as error:
-            if not any(one.file.endswith(".mo") for one in error.where):
+            if not any(p.file.endswith(".mo") for p in error.where):
                 error.where = (place,) if place.file else error.where
             self.errors.append(error)
             if self.instance.classes.spent:
@@ -118,15 +125,15 @@ class _Builder:
             part = part_of(self.instance, member)
             setattr(self.component, name, self._part(name, member, part, member.given))
             return
-        made = [
+        parts = [
             self._part(f"{name}[{k}]", member, part_of(self.instance, member, k), element(member.given, k))
             for k in range(1, shape[0] + 1)
         ]
-        if made and isinstance(made[0], Connector):
-            for k, one in enumerate(made, 1):
-                setattr(self.component, f"{name}[{k}]", one)
+        if parts and isinstance(parts[0], Connector):
+            for k, element_part in enumerate(parts, 1):
+                setattr(self.component, f"{name}[{k}]", element_part)
         else:
-            setattr(self.component, name, made)
+            setattr(self.component, name, parts)
 
     def _part(self, name: str, member: Member, part: Instance | Known | str, given: Given) -> Component | Connector:
         self.instance.classes.spend(50, member.text, member.declaration.line)
@@ -160,14 +167,14 @@ class _Builder:
         given = member.given
         if given.value is None and "start" in given.inner and given.inner["start"].value is not None:
             given = given.inner["start"]
-            self.notes.tell(f"{self._label(name)} has no value; its start value is taken.")
-        low, high = (self._number(basic.given.inner.get(one)) for one in ("min", "max"))
+            self.notes.tell(f"{f'{self.instance.path}.{name}'.lstrip('.')} has no value; its start value is taken.")
+        low, high = (self._number(basic.given.inner.get(limit)) for limit in ("min", "max"))
         fixed = self._known(basic.given.inner.get("fixed")) is not False
-        made = param(self._unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
+        parameter = param(self._unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
         outside = given.scope is not None and given.scope[0] is not self.instance
         if given.value is not None and not outside:
-            made.default = self._value(given, self.instance, "")
-        self.component._declare(name, made)
+            parameter.default = self._value(given, self.instance, "")
+        self.component._declare(name, parameter)
         if given.value is not None and outside:
             self.component.give(name, self._value(given, self.instance.owner, ""))
 
@@ -176,8 +183,8 @@ class _Builder:
         assert given.value is not None
         assert given.scope is not None
         node = Resolver(*given.scope)(given.value)
-        known = as_formula(node, prefix) if given.scope[0] is reader else None
-        if known is None:
+        formula = as_formula(node, prefix) if given.scope[0] is reader else None
+        if formula is None:
             numbers = Resolver(*given.scope, numeric=True)(given.value)
             if numbers.kind != "number":
                 raise refused("this value", given.scope[1], given.value.line)
@@ -186,50 +193,51 @@ class _Builder:
                     f"Line {given.value.line}: the formula is a number now, because a formula cannot have all of it."
                 )
             return numbers.args[0]
-        return known
+        return formula
 
     def _variable(self, path: str, name: str, member: Member, basic: Basic) -> None:
         description = member.declaration.description
-        field_made: Field
+        declared: Field
         signal = bool(basic.prefixes & {"input", "output"}) and (
             not {"input", "output"} & member.declaration.prefixes or member.text.kind == "block"
         )
         if basic.kind == "Boolean" and not signal:
-            field_made = boolean(description)
+            declared = boolean(description)
         elif basic.kind == "Integer" and not signal:
-            field_made = integer(description)
+            declared = integer(description)
         elif path in self.statements.assigned or "discrete" in basic.prefixes:
-            field_made = discrete(self._unit(basic), description, start=0.0)
+            declared = discrete(self._unit(basic), description, start=0.0)
         elif "input" in basic.prefixes and signal:
-            field_made = signal_in(self._unit(basic), description)
+            declared = signal_in(self._unit(basic), description)
         elif "output" in basic.prefixes and signal:
-            field_made = signal_out(self._unit(basic), description)
+            declared = signal_out(self._unit(basic), description)
         else:
             nominal = self._number(basic.given.inner.get("nominal"))
-            field_made = var(self._unit(basic), description, state=self._preference(basic), nominal=nominal or 1.0)
+            select: Any = _STATE_SELECT.get(self._known(basic.given.inner.get("stateSelect")), "default")
+            declared = var(self._unit(basic), description, state=select, nominal=nominal or 1.0)
         if path in self.statements.outputs:
             memory = boolean(description)
             self.component._declare(f"{path}{MEMORY}", memory)
             self._start(path, basic, memory)
-        self.component._declare(path, field_made)
+        self.component._declare(path, declared)
         self._display(path, basic)
-        self._start(path, basic, field_made)
+        self._start(path, basic, declared)
 
-    def _start(self, path: str, basic: Basic, made: Field) -> None:
+    def _start(self, path: str, basic: Basic, declared: Field) -> None:
         """Give the start value; it is fixed, or a first guess."""
         prefix = f"{self.instance.name}." if self.instance.owner is not None else ""
         given = basic.given.inner.get("start")
         fixed = self._known(basic.given.inner.get("fixed")) is True
-        if isinstance(made, Discrete):
+        if isinstance(declared, Discrete):
             before = self.statements.memory.get(path)
-            known = (
+            start = (
                 self._known(given)
                 if before is None
                 else Resolver(self.instance, self.instance.text).known()(before).args[0]
             )
-            made.default = float(known) if isinstance(known, bool | int | float) else 0.0
+            declared.default = float(start) if isinstance(start, bool | int | float) else 0.0
             return
-        if isinstance(made, Input) or basic.kind == "Boolean" or (given is None and not fixed):
+        if isinstance(declared, Input) or basic.kind == "Boolean" or (given is None and not fixed):
             return
         outside = given is not None and given.scope is not None and given.scope[0] is not self.instance
         value = (
@@ -240,7 +248,7 @@ class _Builder:
         if fixed:
             self.component.give(path, value)
         elif not outside and path in self.statements.states:
-            made.default = (
+            declared.default = (
                 self._value(given, self.instance, "") if given is not None and given.value is not None else value
             )
         elif value != 0.0:
@@ -269,41 +277,27 @@ class _Builder:
         self.notes.tell(f"The unit '{unit}' is left out: numbers of the text stay as they are.")
         return "1"
 
-    def _preference(self, basic: Basic) -> Any:
-        wanted = self._known(basic.given.inner.get("stateSelect"))
-        return {"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}.get(wanted, "default")
-
     def _display(self, path: str, basic: Basic) -> None:
         unit = str(self._known(basic.given.inner.get("displayUnit")) or "")
         with suppress(UnitError):  # it is only shown
             if unit and same_dimension(parse_unit(unit), parse_unit(self._unit(basic))):
                 self.notes.display[f"{self.instance.path}.{path}".lstrip(".")] = unit
 
-    def _label(self, name: str) -> str:
-        return f"{self.instance.path}.{name}".lstrip(".")
-
     # -- equations and connections -----------------------------------------------------------------------------------
-
-    def _equations(self) -> None:
-        self.component.__dict__.update(
-            _statements=tuple(self.statements.equations), _initial=tuple(self.statements.initial),
-            _happenings=tuple(self.statements.happenings),
-            _instants=frozenset(name for name, instant in self.statements.outputs.items() if instant),
-        )  # fmt: skip
 
     def _connect(self) -> None:
         component = self.component
         joined: set[str] = set()
         wires: dict[str, tuple[str, ...]] = {}
-        for one in self.wires:
-            ends = tuple(end for end in one.ends if end.partition(".")[0].partition("[")[0] not in self.absent)
+        for wire in self.wires:
+            ends = tuple(end for end in wire.ends if end.partition(".")[0].partition("[")[0] not in self.absent)
             if len(ends) < 2:
                 continue
             key = f"wire_{len(wires) + 1}"
             wires[key] = ends
             joined.update(ends)
-            Assembly.place(component, f"connect.{key}", one.source)
-            self._attempt(one.source, self._check_ends, ends)
+            Assembly.place(component, f"connect.{key}", wire.source)
+            self._attempt(wire.source, self._check_ends, ends)
         component.__dict__["_wires"] = wires
         component.__dict__["_free"] = tuple(
             f"{name}.{end}"
@@ -313,12 +307,12 @@ class _Builder:
         )
 
     def _check_ends(self, ends: tuple[str, ...]) -> None:
-        found = [self.component._resolve(end) for end in ends]
-        kinds = {tuple(one.fields) for one in found if isinstance(one, WrittenConnector)}
+        connectors = [self.component._resolve(end) for end in ends]
+        kinds = {tuple(c.fields) for c in connectors if isinstance(c, WrittenConnector)}
         if len(kinds) > 1:
             raise ModelicaTextError(f"The connectors {', '.join(ends)} differ.")
-        for end, one in zip(ends, found, strict=True):
-            if not isinstance(one, Connector) and one.name in getattr(one.owner, "_instants", ()):
+        for end, connector in zip(ends, connectors, strict=True):
+            if not isinstance(connector, Connector) and connector.name in getattr(connector.owner, "_instants", ()):
                 raise ModelicaTextError(
                     f"{end} is true for instants only, which a connection does not carry here.",
                     advice="Write the 'when' in the class of the sample, or name the variable: when block.y then.",
@@ -335,15 +329,15 @@ def _elements(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:
 
 
 def _connector(instance: Instance) -> WrittenConnector:
-    made = WrittenConnector(instance.text.description, free=True)
+    connector = WrittenConnector(instance.text.description, free=True)
     for name, member in instance.members.items():
         basic = basic_type(instance, member)
         if basic is None or basic.kind != "Real" or member.declaration.dimensions:
             raise refused(f"{name} in a connector", member.text, member.declaration.line)
         builder = _Builder(instance, Notes())
         unit = builder._unit(basic)
-        one = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
-        one.owner, one.name = instance.text.name, name
-        made.__dict__["_own_fields"] = {**made._own_fields, name: one}
-    made.__dict__["kind"] = instance.text.path
-    return made
+        quantity = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
+        quantity.owner, quantity.name = instance.text.name, name
+        connector.__dict__["_own_fields"] = {**connector._own_fields, name: quantity}
+    connector.__dict__["kind"] = instance.text.path
+    return connector

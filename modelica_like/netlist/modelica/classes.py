@@ -52,18 +52,22 @@ class Classes:
         Raises:
             ModelicaTextError: there is none.
         """
-        every = [inner for one in self.own for inner in one.walk()]
-        models = [one for one in every if one.kind in ("model", "block", "class") and not one.partial]
-        outermost = [one for one in models if one.owner is None] or models
-        found = [one for one in every if one.path == name or one.name == name] if name else outermost[-1:]
-        elsewhere = self.full(name) if name and not found else None
+        every = [inner for outer in self.own for inner in outer.walk()]
+        models = [c for c in every if c.kind in ("model", "block", "class") and not c.partial]
+        outermost = [model for model in models if model.owner is None] or models
+        matches = (
+            [candidate for candidate in every if candidate.path == name or candidate.name == name]
+            if name
+            else outermost[-1:]
+        )
+        elsewhere = self.full(name) if name and not matches else None
         if isinstance(elsewhere, ClassText):
             return elsewhere
-        if not found:
-            names = ", ".join(one.name for one in models) or "none"
+        if not matches:
+            names = ", ".join(model.name for model in models) or "none"
             what = f"no class '{name}'" if name else "no model"
             raise ModelicaTextError(f"'{self.file.name}' has {what}. Its models: {names}.", where=self.own[0].place(1))
-        return found[0]
+        return matches[0]
 
     @property
     def spent(self) -> bool:
@@ -100,29 +104,31 @@ class Classes:
         level: ClassText | None = scope
         outermost = scope
         while level is not None:
-            found = self._inside(level, name) or self._imported(level, head, rest) or _tabled(f"{level.path}.{name}")
-            if found is not None:
-                return found
+            class_text = (
+                self._inside(level, name) or self._imported(level, head, rest) or _tabled(f"{level.path}.{name}")
+            )
+            if class_text is not None:
+                return class_text
             outermost, level = level, level.owner
         package = outermost.within
         while package:
-            found = self.full(f"{package}.{name}")
-            if found is not None:
-                return found
+            class_text = self.full(f"{package}.{name}")
+            if class_text is not None:
+                return class_text
             package = package.rpartition(".")[0]
         return self.full(f"Modelica.Units.SI.{rest}" if head in _SI else name)
 
     def _imported(self, level: ClassText, head: str, rest: str) -> Found | None:
         after = f".{rest}" if rest else ""
-        for one in level.elements:
-            if not isinstance(one, Import):
+        for element in level.elements:
+            if not isinstance(element, Import):
                 continue
-            if not one.names and one.alias == head:
-                return self.full(one.path + after)
-            if head in one.names or "*" in one.names:
-                found = self.full(f"{one.path}.{head}{after}")
-                if found is not None:
-                    return found
+            if not element.names and element.alias == head:
+                return self.full(element.path + after)
+            if head in element.names or "*" in element.names:
+                class_text = self.full(f"{element.path}.{head}{after}")
+                if class_text is not None:
+                    return class_text
         return None
 
     def _inside(self, level: ClassText, name: str) -> Found | None:
@@ -136,36 +142,35 @@ class Classes:
             return None
         self.open.add(key)
         try:
-            return self._inherited(level, name)
+            bases = [element for element in level.elements if isinstance(element, Extends)] + (
+                [level.short] if level.short else []
+            )
+            for extension in bases:
+                base = self.find(extension.base, level)
+                if isinstance(base, ClassText) and base is not level:
+                    class_text = self._inside(base, name)
+                    if class_text is not None:
+                        return class_text
+            return None
         finally:
             self.open.remove(key)
-
-    def _inherited(self, level: ClassText, name: str) -> Found | None:
-        bases = [one for one in level.elements if isinstance(one, Extends)] + ([level.short] if level.short else [])
-        for one in bases:
-            base = self.find(one.base, level)
-            if isinstance(base, ClassText) and base is not level:
-                found = self._inside(base, name)
-                if found is not None:
-                    return found
-        return None
 
     def full(self, path: str) -> Found | None:
         """Return a class by its full name; units of version 3 of the standard library have the names of version 4."""
         for old, new in _RENAMED:
             if path == old or path.startswith(f"{old}."):
                 path = f"{new}{path[len(old) :]}"
-        for one in self.own:
-            if path == one.path:
-                return one
-            if path.startswith(f"{one.path}."):
-                return self._inside(one, path[len(one.path) + 1 :])
+        for class_text in self.own:
+            if path == class_text.path:
+                return class_text
+            if path.startswith(f"{class_text.path}."):
+                return self._inside(class_text, path[len(class_text.path) + 1 :])
         if path in BASIC or _tabled(path):
             return _tabled(path) or path
         head, _, rest = path.partition(".")
         built = built_in().get(head)
-        found = self._inside(built, rest) if built is not None and rest else None
-        return found if found is not None else self._on_disk(path)
+        inner = self._inside(built, rest) if built is not None and rest else None
+        return inner if inner is not None else self._on_disk(path)
 
     def _on_disk(self, path: str) -> ClassText | Known | str | None:
         """Return a class of the package that the file belongs to."""
@@ -175,10 +180,10 @@ class Classes:
         for k, name in enumerate(names):
             for file in (place / f"{name}.mo", place / name / "package.mo"):
                 if file.is_file():
-                    found = self._of_file(file, name)
-                    if found is not None and k + 1 == len(names):
-                        return found
-                    inner = self._inside(found, ".".join(names[k + 1 :])) if found is not None else None
+                    class_text = self._of_file(file, name)
+                    if class_text is not None and k + 1 == len(names):
+                        return class_text
+                    inner = self._inside(class_text, ".".join(names[k + 1 :])) if class_text is not None else None
                     if inner is not None:
                         return inner
             place = place / name
@@ -186,10 +191,10 @@ class Classes:
 
     def _of_file(self, file: Path, name: str) -> ClassText | None:
         if file.resolve() == self.file.resolve():
-            return next((one for one in self.own if one.name == name), None)
+            return next((candidate for candidate in self.own if candidate.name == name), None)
         if file not in self.read:
             self.read[file] = parse_modelica(read_text(file), str(file))
-        return next((one for one in self.read[file] if one.name == name), None)
+        return next((candidate for candidate in self.read[file] if candidate.name == name), None)
 
 
 def _tabled(path: str) -> Known | str | None:

@@ -26,7 +26,7 @@ class Expressions(Tokens):
         line = self.line
         self.deeper()
         if not self.take("if"):
-            made = self.simple()
+            result = self.simple()
         else:
             parts = [self.expression()]
             self.need("then")
@@ -36,9 +36,9 @@ class Expressions(Tokens):
                 self.need("then")
                 parts.append(self.expression())
             self.need("else")
-            made = Expr("if", (*parts, self.expression()), line)
+            result = Expr("if", (*parts, self.expression()), line)
         self.depth -= 1
-        return made
+        return result
 
     def simple(self) -> Expr:
         """Read an expression that is not an `if`, possibly a range."""
@@ -54,21 +54,21 @@ class Expressions(Tokens):
         """Read operators of this level and above, by precedence climbing."""
         line = self.line
         if level <= _NOT and self.take("not"):
-            made = Expr("not", (self._operation(_RELATION),), line)
+            left = Expr("not", (self._operation(_RELATION),), line)
         elif level <= _SUM and (sign := self.take("+", "-", ".+", ".-")):
-            made = self._operation(_PRODUCT)
-            made = Expr("neg", (made,), line) if sign in ("-", ".-") else made
+            left = self._operation(_PRODUCT)
+            left = Expr("neg", (left,), line) if sign in ("-", ".-") else left
         else:
-            made = self._primary()
+            left = self._primary()
         below = _POWER + 1
-        while level <= (own := _LEVELS.get(self.kind, 0)) < below:
-            signs, terms = list[str](), [made]
-            while _LEVELS.get(self.kind) == own and not (own in _SINGLE and signs):
+        while level <= (precedence := _LEVELS.get(self.kind, 0)) < below:
+            signs, terms = list[str](), [left]
+            while _LEVELS.get(self.kind) == precedence and not (precedence in _SINGLE and signs):
                 signs.append(_ELEMENTWISE.get(self.kind, self.kind))
                 self.at += 1
-                terms.append(self._operation(own + 1))
-            made, below = chain(signs, terms), own
-        return made
+                terms.append(self._operation(precedence + 1))
+            left, below = chain(signs, terms), precedence
+        return left
 
     def _primary(self) -> Expr:
         kind, text, line = self.tokens[self.at]
@@ -89,11 +89,11 @@ class Expressions(Tokens):
             self.at += 1
             return Expr("name", (("end", ()),), line)
         if self.take("("):
-            made = self.expression()
+            result = self.expression()
             if self.kind == ",":
                 self.refuse("Functions with several results are not supported.", line)
             self.need(")")
-            return made
+            return result
         if self.take("{"):
             return self._array(line)
         if self.take("["):
@@ -105,13 +105,13 @@ class Expressions(Tokens):
     def _array(self, line: int) -> Expr:
         items = [] if self.kind == "}" else [self.expression()]
         if items and self.take("for"):
-            made = Expr("for", (items[0], self.iterators()), line)
+            array = Expr("for", (items[0], self.iterators()), line)
         else:
             while self.take(","):
                 items.append(self.expression())
-            made = Expr("array", tuple(items), line)
+            array = Expr("array", tuple(items), line)
         self.need("}")
-        return made
+        return array
 
     def _matrix(self, line: int) -> Expr:
         rows: list[Expr] = []
@@ -158,20 +158,20 @@ class Expressions(Tokens):
         """Read indices or dimensions in brackets."""
         self.need("[")
         self.brackets += 1
-        made = []
+        indices = []
         while not self.take("]"):
             line = self.line
-            made.append(Expr("all", (), line) if self.take(":") else self.expression())
+            indices.append(Expr("all", (), line) if self.take(":") else self.expression())
             if self.kind != "]":
                 self.need(",")
         self.brackets -= 1
-        return tuple(made)
+        return tuple(indices)
 
     def iterators(self) -> tuple[tuple[str, Expr | None], ...]:
         """Read the iterators of a loop with their ranges."""
-        made = []
+        ranges = []
         while True:
             name = self.need("name")
-            made.append((name, self.expression() if self.take("in") else None))
+            ranges.append((name, self.expression() if self.take("in") else None))
             if not self.take(","):
-                return tuple(made)
+                return tuple(ranges)

@@ -34,7 +34,7 @@ class Unfit(ValueError):
 
 def known(expression: Expr) -> Expr:
     """Return the value of an expression without names."""
-    args = tuple(known(one) if isinstance(one, Expr) else one for one in expression.args)
+    args = tuple(known(argument) if isinstance(argument, Expr) else argument for argument in expression.args)
     if expression.kind == "if":
         taken = (value for condition, value in zip(args[:-1:2], args[1::2], strict=True) if condition.args[0])
         return next(taken, args[-1])
@@ -77,25 +77,40 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
     """
     if kind == "array":
         return Expr("array", args, line)
-    if any(one.kind == "array" for one in args):
-        return _of_arrays(kind, args, line)
+    if any(argument.kind == "array" for argument in args):
+        if kind == "*" and all(argument.kind == "array" for argument in args):
+            return _product(args[0], args[1], line)
+        length = next(len(argument.args) for argument in args if argument.kind == "array")
+        if any(argument.kind == "array" and len(argument.args) != length for argument in args):
+            raise Unfit("The sizes of two arrays differ")
+        rows = (
+            tuple(argument.args[k] if argument.kind == "array" else argument for argument in args)
+            for k in range(length)
+        )
+        return Expr("array", tuple(operation(kind, row, line) for row in rows), line)
     if kind == "neg":
         return number(-args[0].args[0], line) if args[0].kind == "number" else Expr("neg", args, line)
     if kind == "not":
         return Expr("boolean", (not args[0].args[0],), line) if args[0].kind == "boolean" else Expr("not", args, line)
     if kind in ("and", "or"):
-        return _joined(kind, args, line)
-    if kind in _RELATIONS and all(one.kind in KNOWN for one in args):
+        decides = kind == "or"
+        if any(argument.kind == "boolean" and argument.args[0] is decides for argument in args):
+            return Expr("boolean", (decides,), line)
+        left = [argument for argument in args if argument.kind != "boolean"]
+        if not left:
+            return Expr("boolean", (not decides,), line)
+        return left[0] if len(left) == 1 else Expr(kind, args, line)
+    if kind in _RELATIONS and all(argument.kind in KNOWN for argument in args):
         return Expr("boolean", (_RELATIONS[kind](args[0].args[0], args[1].args[0]),), line)
-    if kind in _BINARY and all(one.kind == "number" for one in args):
+    if kind in _BINARY and all(argument.kind == "number" for argument in args):
         return _computed(_BINARY[kind], args, line)
-    if kind == "+" and all(one.kind == "string" for one in args):
+    if kind == "+" and all(argument.kind == "string" for argument in args):
         return Expr("string", (args[0].args[0] + args[1].args[0],), line)
     return Expr(kind, args, line)
 
 
 def _computed(function: Callable[..., float], args: tuple[Expr, ...], line: int) -> Expr:
-    values = [one.args[0] for one in args]
+    values = [argument.args[0] for argument in args]
     try:
         result = function(*values)
     except (ArithmeticError, ValueError):
@@ -103,26 +118,6 @@ def _computed(function: Callable[..., float], args: tuple[Expr, ...], line: int)
     if isinstance(result, complex) or not math.isfinite(result):
         raise Unfit(f"A formula of {', '.join(f'{value:g}' for value in values)} has no value")
     return number(result, line)
-
-
-def _joined(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
-    decides = kind == "or"
-    if any(one.kind == "boolean" and one.args[0] is decides for one in args):
-        return Expr("boolean", (decides,), line)
-    left = [one for one in args if one.kind != "boolean"]
-    if not left:
-        return Expr("boolean", (not decides,), line)
-    return left[0] if len(left) == 1 else Expr(kind, args, line)
-
-
-def _of_arrays(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
-    if kind == "*" and all(one.kind == "array" for one in args):
-        return _product(args[0], args[1], line)
-    length = next(len(one.args) for one in args if one.kind == "array")
-    if any(one.kind == "array" and len(one.args) != length for one in args):
-        raise Unfit("The sizes of two arrays differ")
-    rows = (tuple(one.args[k] if one.kind == "array" else one for one in args) for k in range(length))
-    return Expr("array", tuple(operation(kind, row, line) for row in rows), line)
 
 
 def _product(left: Expr, right: Expr, line: int) -> Expr:
@@ -138,7 +133,7 @@ def _product(left: Expr, right: Expr, line: int) -> Expr:
 
 def total(items: list[Expr], line: int) -> Expr:
     """Return the sum of expressions."""
-    return joined(lambda one, other: operation("+", (one, other), line), items) if items else number(0, line)
+    return joined(lambda left, other: operation("+", (left, other), line), items) if items else number(0, line)
 
 
 def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
@@ -150,7 +145,7 @@ def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
     if name in ("min", "max") and len(args) == 1 and args[0].kind == "array":
         if not args[0].args:
             raise Unfit(f"{name} of an array without elements has no value")
-        return joined(lambda one, other: function(name, (one, other), line), list(args[0].args))
+        return joined(lambda left, other: function(name, (left, other), line), list(args[0].args))
     wanted = 2 if name in ("atan2", "mod", "rem", "div", "min", "max") else 1
     if len(args) != wanted:
         raise Unfit(f"{name} has {wanted} argument{'s' if wanted > 1 else ''}, not {len(args)}")

@@ -24,9 +24,9 @@ def _filled(value: Expr, shape: tuple[Expr, ...], line: int) -> Expr:
 
 
 def _line(args: tuple[Expr, ...], line: int) -> Expr:
-    if len(args) != 3 or any(one.kind != "number" for one in args):
+    if len(args) != 3 or any(argument.kind != "number" for argument in args):
         raise fold.Unfit("linspace needs three known numbers")
-    start, stop, count = (one.args[0] for one in args)
+    start, stop, count = (argument.args[0] for argument in args)
     return Expr(
         "array",
         tuple(fold.number(start + (stop - start) * k / max(count - 1, 1), line) for k in range(fold.count(count))),
@@ -35,10 +35,10 @@ def _line(args: tuple[Expr, ...], line: int) -> Expr:
 
 
 def _product(args: tuple[Expr, ...], line: int) -> Expr:
-    made = fold.number(1, line)
-    for one in args[0].args:
-        made = fold.operation("*", (made, one), line)
-    return made
+    product = fold.number(1, line)
+    for argument in args[0].args:
+        product = fold.operation("*", (product, argument), line)
+    return product
 
 
 def _identity(args: tuple[Expr, ...], line: int) -> Expr:
@@ -66,11 +66,11 @@ OF_ARRAYS: dict[str, Callable[[tuple[Expr, ...], int], Expr]] = {
 
 def size(items: Expr, dimension: int, line: int) -> Expr:
     """Return the size of an array in one dimension, or in all as an array."""
-    made: list[Expr] = []
+    numbers: list[Expr] = []
     while items.kind == "array":
-        made.append(fold.number(len(items.args), line))
+        numbers.append(fold.number(len(items.args), line))
         items = items.args[0] if items.args else fold.number(0)
-    return made[dimension - 1] if 0 < dimension <= len(made) else Expr("array", tuple(made), line)
+    return numbers[dimension - 1] if 0 < dimension <= len(numbers) else Expr("array", tuple(numbers), line)
 
 
 def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named: Mapping[str, Expr]) -> Expr:
@@ -95,40 +95,40 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
         raise refused(f"the record {name}(…) as a value", resolver.text, line)
     if resolver.depth > _DEEPEST:
         raise refused(f"{name}, which calls itself,", resolver.text, line)
-    made = _Call(resolver, text).result(given, named, line)
-    known = made.kind in (*fold.KNOWN, "array")
-    return made if known else Expr("call", ("noEvent", (made,), ()), line)
+    result = _Call(resolver, text).result(given, named, line)
+    is_constant = result.kind in (*fold.KNOWN, "array")
+    return result if is_constant else Expr("call", ("noEvent", (result,), ()), line)
 
 
 class _Call:
     def __init__(self, resolver: Resolver, text: ClassText) -> None:
         self.resolver, self.text = resolver, text
         members = Instance(resolver.classes, text, Given()).members
-        self.declared = {name: one.declaration for name, one in members.items()}
+        self.declared = {name: member.declaration for name, member in members.items()}
         self.local: dict[str, Expr] = {}
 
     def result(self, given: tuple[Expr, ...], named: Mapping[str, Expr], line: int) -> Expr:
-        inputs = [name for name, one in self.declared.items() if "input" in one.prefixes]
-        outputs = [name for name, one in self.declared.items() if "output" in one.prefixes]
+        inputs = [name for name, d in self.declared.items() if "input" in d.prefixes]
+        outputs = [name for name, d in self.declared.items() if "output" in d.prefixes]
         if len(outputs) != 1:
             raise refused(f"{self.text.name}, a function with {len(outputs)} results,", self.text, self.text.line)
         self.local.update(zip(inputs, given, strict=False))
         self.local.update(named)
         if len(given) > len(inputs) or any(name not in inputs for name in named):
             raise refused(f"these arguments of {self.text.name}", self.resolver.text, line)
-        for name, one in self.declared.items():
+        for name, variable in self.declared.items():
             if name not in self.local:
-                self.local[name] = self._start(name, one, line)
+                self.local[name] = self._start(name, variable, line)
         self.run(self.text.algorithm)
         return self.local[outputs[0]]
 
-    def _start(self, name: str, one: Declaration, line: int) -> Expr:
-        value = one.modification.value
+    def _start(self, name: str, declaration: Declaration, line: int) -> Expr:
+        value = declaration.modification.value
         if value is not None:
             return self.here()(value)
-        if "input" in one.prefixes:
+        if "input" in declaration.prefixes:
             raise refused(f"{self.text.name} without its argument {name}", self.resolver.text, line)
-        shape = tuple(self.here()(dimension) for dimension in one.dimensions if dimension.kind != "all")
+        shape = tuple(self.here()(dimension) for dimension in declaration.dimensions if dimension.kind != "all")
         return _filled(fold.number(0, line), shape, line)
 
     def here(self) -> Resolver:
@@ -136,26 +136,29 @@ class _Call:
         return kind(None, self.text, self.local, classes=self.resolver.classes, depth=self.resolver.depth + 1)
 
     def run(self, statements: list[Statement]) -> None:
-        for one in statements:
-            self.resolver.classes.spend(5, self.text, one.line)
-            if one.kind == ":=":
-                self.assign(one.parts[0], self.here()(one.parts[1]))
-            elif one.kind == "if":
-                self.branch(list(one.parts), one.line)
-            elif one.kind == "for":
-                self.loop(list(one.parts[0]), one.parts[1])
-            elif one.kind == "while":
-                while self.here()(one.parts[0]) == Expr("boolean", (True,), one.parts[0].line):
-                    self.resolver.classes.spend(5, self.text, one.line)
-                    self.run(one.parts[1])
-            elif one.kind != "call" or one.parts[0].args[0] not in ("assert", "Modelica.Utilities.Streams.print"):
-                raise refused(f"'{one.kind}' in a function", self.text, one.line)
+        for statement in statements:
+            self.resolver.classes.spend(5, self.text, statement.line)
+            if statement.kind == ":=":
+                self.assign(statement.parts[0], self.here()(statement.parts[1]))
+            elif statement.kind == "if":
+                self.branch(list(statement.parts), statement.line)
+            elif statement.kind == "for":
+                self.loop(list(statement.parts[0]), statement.parts[1])
+            elif statement.kind == "while":
+                while self.here()(statement.parts[0]) == Expr("boolean", (True,), statement.parts[0].line):
+                    self.resolver.classes.spend(5, self.text, statement.line)
+                    self.run(statement.parts[1])
+            elif statement.kind != "call" or statement.parts[0].args[0] not in (
+                "assert",
+                "Modelica.Utilities.Streams.print",
+            ):
+                raise refused(f"'{statement.kind}' in a function", self.text, statement.line)
 
     def assign(self, target: Expr, value: Expr) -> None:
         if target.kind != "name" or len(target.args) != 1 or target.args[0][0] not in self.local:
             raise refused("this target of an assignment", self.text, target.line)
         name, subscripts = target.args[0]
-        places = [int(self.here().number(one)) - 1 for one in subscripts]
+        places = [int(self.here().number(subscript)) - 1 for subscript in subscripts]
         self.local[name] = _replaced(self.local[name], places, value)
 
     def branch(self, branches: list[tuple[Expr | None, list[Statement]]], line: int) -> None:
@@ -163,9 +166,9 @@ class _Call:
         if not branches:
             return
         condition, statements = branches[0]
-        known = Expr("boolean", (True,)) if condition is None else self.here()(condition)
-        if known.kind == "boolean":
-            if known.args[0]:
+        holds = Expr("boolean", (True,)) if condition is None else self.here()(condition)
+        if holds.kind == "boolean":
+            if holds.args[0]:
                 self.run(statements)
             else:
                 self.branch(branches[1:], line)
@@ -176,7 +179,7 @@ class _Call:
         self.branch(branches[1:], line)
         for name, other in self.local.items():
             if taken[name] != other:
-                self.local[name] = _either(known, taken[name], other, line)
+                self.local[name] = _either(holds, taken[name], other, line)
 
     def loop(self, iterators: list[tuple[str, Expr | None]], statements: list[Statement]) -> None:
         (name, over), rest = iterators[0], iterators[1:]
@@ -201,9 +204,11 @@ def _replaced(whole: Expr, places: list[int], value: Expr) -> Expr:
     return Expr("array", tuple(items), whole.line)
 
 
-def _either(condition: Expr, one: Expr, other: Expr, line: int) -> Expr:
-    if one.kind == "array" and other.kind == "array":
+def _either(condition: Expr, expression: Expr, other: Expr, line: int) -> Expr:
+    if expression.kind == "array" and other.kind == "array":
         return Expr(
-            "array", tuple(_either(condition, a, b, line) for a, b in zip(one.args, other.args, strict=True)), line
+            "array",
+            tuple(_either(condition, a, b, line) for a, b in zip(expression.args, other.args, strict=True)),
+            line,
         )
-    return Expr("if", (condition, one, other), line)
+    return Expr("if", (condition, expression, other), line)

@@ -41,8 +41,8 @@ class Given:
     def over(self, weaker: Given) -> Given:
         """Return both; this one wins."""
         inner = dict(weaker.inner)
-        for name, one in self.inner.items():
-            inner[name] = one.over(inner[name]) if name in inner else one
+        for name, entry in self.inner.items():
+            inner[name] = entry.over(inner[name]) if name in inner else entry
         mine = self.value is not None
         return Given(
             self.value if mine else weaker.value, self.scope if mine else weaker.scope, inner,
@@ -52,18 +52,18 @@ class Given:
 
 def given(modification: Modification, scope: tuple[Instance, ClassText], line: int) -> Given:
     """Return a modification with its scope."""
-    made = Given(modification.value, scope if modification.value is not None else None, {}, None, line)
-    for one in modification.arguments:
-        inner = given(one.modification, scope, one.line)
-        inner.each = one.each
-        if one.redeclared is not None:
-            inner.redeclared = one.redeclared
+    entry = Given(modification.value, scope if modification.value is not None else None, {}, None, line)
+    for argument in modification.arguments:
+        inner = given(argument.modification, scope, argument.line)
+        inner.each = argument.each
+        if argument.redeclared is not None:
+            inner.redeclared = argument.redeclared
             inner.scope = scope
-        for name in reversed(one.name.split(".")[1:]):
-            inner = Given(inner={name: inner}, line=one.line)
-        name = one.name.split(".")[0]
-        made.inner[name] = inner.over(made.inner[name]) if name in made.inner else inner
-    return made
+        for name in reversed(argument.name.split(".")[1:]):
+            inner = Given(inner={name: inner}, line=argument.line)
+        name = argument.name.split(".")[0]
+        entry.inner[name] = inner.over(entry.inner[name]) if name in entry.inner else inner
+    return entry
 
 
 @dataclass(slots=True)
@@ -100,7 +100,7 @@ class Instance:
         self.equations: list[tuple[Statement, ClassText]] = []
         self.initial_equations: list[tuple[Statement, ClassText]] = []
         self.folded: set[str] = set()
-        self._replaced = {name: one for name, one in given.inner.items() if isinstance(one.redeclared, ClassText)}
+        self._replaced = {name: entry for name, entry in given.inner.items() if isinstance(entry.redeclared, ClassText)}
         self._collect(text, given, 0)
 
     @property
@@ -127,13 +127,13 @@ class Instance:
             raise refused(what, text, line)
         if text.short is not None:
             self._extend(text.short, text.owner or text, outer, depth)
-        for one in text.elements:
-            if isinstance(one, Extends):
-                self._extend(one, text, outer, depth)
-            elif not isinstance(one, Import):
-                self._declare(one, text, outer)
-        self.equations += [(one, text) for one in text.equations]
-        self.initial_equations += [(one, text) for one in text.initial_equations]
+        for element in text.elements:
+            if isinstance(element, Extends):
+                self._extend(element, text, outer, depth)
+            elif not isinstance(element, Import):
+                self._declare(element, text, outer)
+        self.equations += [(equation, text) for equation in text.equations]
+        self.initial_equations += [(equation, text) for equation in text.initial_equations]
 
     def _extend(self, one: Extends, text: ClassText, outer: Given, depth: int) -> None:
         base = self.find(one.base, text)
@@ -147,25 +147,32 @@ class Instance:
         elif ".Icons." not in f".{one.base}" and not one.base.endswith(".Icon"):
             raise unknown_class(one.base, text, one.line)
 
-    def _declare(self, one: Declaration, text: ClassText, outer: Given) -> None:
+    def _declare(self, declaration: Declaration, text: ClassText, outer: Given) -> None:
         for word in ("inner", "outer", "stream"):
-            if word in one.prefixes:
-                raise refused(f"'{word}' before {one.name}", text, one.line)
-        made = given(one.modification, (self, text), one.line)
-        from_outside = outer.inner.get(one.name)
+            if word in declaration.prefixes:
+                raise refused(f"'{word}' before {declaration.name}", text, declaration.line)
+        entry = given(declaration.modification, (self, text), declaration.line)
+        from_outside = outer.inner.get(declaration.name)
         if from_outside is not None:
-            made = from_outside.over(made)
-        if isinstance(made.redeclared, Declaration):
-            new = made.redeclared
+            entry = from_outside.over(entry)
+        if isinstance(entry.redeclared, Declaration):
+            new = entry.redeclared
             scope = from_outside.scope if from_outside and from_outside.scope else (self, text)
-            made = given(new.modification, scope, new.line).over(made)
-            made.redeclared = None
-            prefixes = one.prefixes | new.prefixes
-            one = Declaration(
-                prefixes, new.type, one.name, one.dimensions, one.modification, one.condition, one.description, new.line
+            entry = given(new.modification, scope, new.line).over(entry)
+            entry.redeclared = None
+            prefixes = declaration.prefixes | new.prefixes
+            declaration = Declaration(
+                prefixes,
+                new.type,
+                declaration.name,
+                declaration.dimensions,
+                declaration.modification,
+                declaration.condition,
+                declaration.description,
+                new.line,
             )
             text = scope[1]
-        self.members.setdefault(one.name, Member(one, text, made))
+        self.members.setdefault(declaration.name, Member(declaration, text, entry))
 
 
 def refused(what: str, text: ClassText, line: int, advice: str = "") -> ModelicaTextError:

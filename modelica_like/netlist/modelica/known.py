@@ -51,9 +51,9 @@ def library_part(
         ModelicaTextError, UnknownName: a parameter does not exist here, or has a value that is not supported.
     """
     part = _Part(owner, name, member, known, given, notes)
-    made = part.make(driven)
+    component = part.make(driven)
     initial += part.initial
-    return made
+    return component
 
 
 class _Part:
@@ -74,22 +74,22 @@ class _Part:
         self.initial: list[tuple[Expr, Expr, Source]] = []
 
     def make(self, driven: set[str]) -> Component:
-        self.used = used = {
-            one.path for text in self.known.set.values() for one in names_in(parse_expression(str(text)))
-        }
+        self.used = used = {n.path for text in self.known.set.values() for n in names_in(parse_expression(str(text)))}
         starts: list[tuple[str, Given]] = []
-        for name, one in self.entries.items():
+        for name, start in self.entries.items():
             here = self.known.here(name)
             if name in self.known.only:
-                self._demand(name, one)
+                if start.value is not None and start.scope is not None:
+                    self._equal(name, Resolver(*start.scope, numeric=True)(start.value), start.value.line)
+                    self.values.pop(name, None)
             elif name in self.known.ignore and name not in used:
                 continue
             elif name in used or isinstance(self.fields.get(here), Parameter | Input) or here in self.kind._structural:
-                self._read(name, one)
+                self._read(name, start)
             elif isinstance(self.fields.get(here), Variable) or "." in here:
-                starts.append((here, one))
+                starts.append((here, start))
             else:
-                self._unknown(name, one)
+                self._unknown(name, start)
         self._defaults()
         settings = {self.known.here(name): value for name, value in self.values.items() if name not in used}
         for here, text in self.known.set.items():
@@ -102,62 +102,67 @@ class _Part:
         for here, value in settings.items():
             if here not in structural:
                 part.give(here, self._value(value))
-        for here, one in starts:
-            self._start(part, here, one)
+        for here, start in starts:
+            self._start(part, here, start)
         return part
 
     def _entries(self) -> Iterator[tuple[str, Given]]:
         """Yield names and modifications; those of a record are taken apart, as `losses.P`."""
         records = {name.partition(".")[0] for name in self.known.names.values() if "." in name}
-        for name, one in self.given.inner.items():
+        for name, entry in self.given.inner.items():
             if name not in records:
-                yield name, one
+                yield name, entry
                 continue
-            yield from ((f"{name}.{key}", inner) for key, inner in one.inner.items())
-            if one.value is not None and one.value.kind == "name" and one.scope is not None:
-                record = record_of(one.scope[0], one.value)
+            yield from ((f"{name}.{key}", inner) for key, inner in entry.inner.items())
+            if entry.value is not None and entry.value.kind == "name" and entry.scope is not None:
+                record = record_of(entry.scope[0], entry.value)
                 if record is None:
-                    raise refused(f"this value for {self.name}.{name}", one.scope[1], one.value.line)
+                    raise refused(f"this value for {self.name}.{name}", entry.scope[1], entry.value.line)
                 for key in record.members:
-                    path = Expr("name", (*one.value.args, (key, ())), one.value.line)
-                    yield f"{name}.{key}", Given(path, one.scope, line=one.line)
+                    path = Expr("name", (*entry.value.args, (key, ())), entry.value.line)
+                    yield f"{name}.{key}", Given(path, entry.scope, line=entry.line)
 
     def _kind(self) -> type[Component]:
         """Return the component type; a parameter may choose it."""
         if not self.known.by:
             return self.known.type
         parameter, choices = self.known.by["parameter"], self.known.by
-        one = self.entries.pop(parameter, None)
-        value = Resolver(*one.scope, numeric=True)(one.value).args[0] if one and one.scope and one.value else "default"
+        entry = self.entries.pop(parameter, None)
+        value = (
+            Resolver(*entry.scope, numeric=True)(entry.value).args[0]
+            if entry and entry.scope and entry.value
+            else "default"
+        )
         name = str(value).rpartition(".")[2]
         if name not in choices:
             raise refused(
                 f"{self.known.path.rpartition('.')[2]} with {parameter} = {name}",
                 self.member.text,
-                one.line if one else 0,
+                entry.line if entry else 0,
             )
         return find_type(choices[name])
 
     def _owners(self) -> Resolver:
         return Resolver(self.owner, self.member.text)
 
-    def _read(self, name: str, one: Given) -> None:
+    def _read(self, name: str, given: Given) -> None:
         """Resolve a value; a formula that other names than the owner's use becomes a number."""
-        unit = one.inner.get("displayUnit")
+        unit = given.inner.get("displayUnit")
         here = self.known.here(name)
         if unit is not None and unit.value is not None and isinstance(self.fields.get(here), Input):
             shown = Resolver(*unit.scope)(unit.value) if unit.scope else unit.value
             self.notes.display[f"{self.owner.path}.{self.name}.{here}".lstrip(".")] = str(shown.args[0])
-        if one.value is None or one.scope is None:
+        if given.value is None or given.scope is None:
             return
-        node = Resolver(*one.scope)(one.value)
-        if one.scope[0] is not self.owner or (as_formula(node) is None and node.kind not in (*fold.KNOWN, "array")):
-            known = Resolver(*one.scope, numeric=True)(one.value)
-            if known != node:
-                self.notes.tell(f"{self.name}.{name} is a number now: a formula cannot have '{_words(one)}'.")
-            node = known
+        node = Resolver(*given.scope)(given.value)
+        if given.scope[0] is not self.owner or (as_formula(node) is None and node.kind not in (*fold.KNOWN, "array")):
+            number = Resolver(*given.scope, numeric=True)(given.value)
+            if number != node:
+                words = given.scope[1].place(given.value.line).text
+                self.notes.tell(f"{self.name}.{name} is a number now: a formula cannot have '{words}'.")
+            node = number
         if node.kind == "name" and name in self.known.omit:
-            node = Resolver(*one.scope, numeric=True)(one.value)
+            node = Resolver(*given.scope, numeric=True)(given.value)
         if node.kind != "number" or self.known.omit.get(name) != node.args[0]:
             self.values[name] = node
 
@@ -174,26 +179,19 @@ class _Part:
             if name in self.known.only and name in self.values:
                 self._equal(name, self.values.pop(name), self.member.declaration.line)
 
-    def _demand(self, name: str, one: Given) -> None:
-        """Check a parameter for which one value is supported."""
-        if one.value is not None and one.scope is not None:
-            self._equal(name, Resolver(*one.scope, numeric=True)(one.value), one.value.line)
-            self.values[name] = Expr("boolean", (True,))
-            self.values.pop(name)
-
     def _equal(self, name: str, value: Expr, line: int) -> None:
         only = self.known.only[name]
         wanted = only if isinstance(only, list) else [only]
-        found = value.args[0].rpartition(".")[2] if isinstance(value.args[0], str) else value.args[0]
-        if found not in wanted:
+        actual = value.args[0].rpartition(".")[2] if isinstance(value.args[0], str) else value.args[0]
+        if actual not in wanted:
             raise refused(
-                f"{self.known.path.rpartition('.')[2]}.{name} = {found}", self.member.text, line,
+                f"{self.known.path.rpartition('.')[2]}.{name} = {actual}", self.member.text, line,
                 f"The component {self.known.component} has {name} = {' or '.join(map(str, wanted))} only.",
             )  # fmt: skip
 
     def _plain(self, here: str, value: Expr) -> Any:
         """Return the value of a field that decides the structure."""
-        if value.kind == "name" or (value.kind == "array" and _has_names(value)):
+        if value.kind == "name" or (value.kind == "array" and any(True for _ in names_in(value))):
             value = self._owners().known()(value)
         if value.kind == "literal":
             kind, _, name = value.args[0].rpartition(".")
@@ -202,28 +200,28 @@ class _Part:
                 raise refused(f"{value.args[0]} for {self.name}", self.member.text, self.member.declaration.line)
             return choices[name]
         if value.kind == "array":
-            items = tuple(self._plain(here, one) for one in value.args)
+            items = tuple(self._plain(here, argument) for argument in value.args)
             return _without_jumps(items, self.name, self.notes) if here == "table" else items
         if value.kind == "number" and isinstance(self.kind._structural[here], int):
             return int(value.args[0])
         return value.args[0]
 
     def _value(self, value: Expr) -> Any:
-        made = as_formula(value)
-        if made is None:
-            made = as_formula(self._owners().known()(value))
-        if made is None:
+        formula = as_formula(value)
+        if formula is None:
+            formula = as_formula(self._owners().known()(value))
+        if formula is None:
             raise refused(f"this value for {self.name}", self.member.text, self.member.declaration.line)
-        return made
+        return formula
 
-    def _start(self, part: Component, here: str, one: Given) -> None:
-        unknown = [key for key in one.inner if key not in _ATTRIBUTES]
-        if unknown or one.value is not None:
+    def _start(self, part: Component, here: str, given: Given) -> None:
+        unknown = [key for key in given.inner if key not in _ATTRIBUTES]
+        if unknown or given.value is not None:
             what = f"{self.name}.{here} with {unknown[0] if unknown else 'an equation'}"
-            raise refused(what, self.member.text, one.line)
+            raise refused(what, self.member.text, given.line)
         attributes = {
             key: Resolver(*inner.scope)(inner.value)
-            for key, inner in one.inner.items()
+            for key, inner in given.inner.items()
             if inner.value is not None and inner.scope is not None
         }
         if "displayUnit" in attributes:
@@ -232,7 +230,7 @@ class _Part:
         fixed = "fixed" in attributes and attributes["fixed"].args == (True,)
         if isinstance(part.find(path).fields[last], Output) and not fixed:
             return
-        start = one.inner.get("start")
+        start = given.inner.get("start")
         value: Any = self.known.starts.get(here, 0.0)
         if start is not None and start.value is not None and start.scope is not None:
             outside = start.scope[0] is not self.owner
@@ -243,44 +241,36 @@ class _Part:
         elif value != 0.0:
             part.set(here, guess(value))
 
-    def _unknown(self, name: str, one: Given) -> None:
-        fixed, start = one.inner.get("fixed"), one.inner.get("start")
+    def _unknown(self, name: str, given: Given) -> None:
+        fixed, start = given.inner.get("fixed"), given.inner.get("start")
         rate = next((below for below in table()["rates"].get(name, "").split() if below in self.fields), "")
         if rate and fixed is not None and fixed.value is not None and fixed.value.args == (True,):
             value: Expr = fold.number(0)
             if start is not None and start.value is not None and start.scope is not None:
                 value = Resolver(*start.scope)(start.value)
-            speed = Expr("name", ((f"{self.name}.{rate}", ()),), one.line)
+            speed = Expr("name", ((f"{self.name}.{rate}", ()),), given.line)
             self.initial.append(
-                (Expr("call", ("der", (speed,), ()), one.line), value, self.member.text.place(one.line))
+                (Expr("call", ("der", (speed,), ()), given.line), value, self.member.text.place(given.line))
             )
             return
         if name in table()["ignored"]["variables"].split():
             return
-        if one.value is None and one.inner and (fixed is None or fixed.value is None or not fixed.value.args[0]):
+        if given.value is None and given.inner and (fixed is None or fixed.value is None or not fixed.value.args[0]):
             return  # attributes of a variable that the component does not have
         ours = {back: front for front, back in self.known.names.items()}
         names = [self.known.names.get(key, key) for key in (*self.fields, *self.kind._structural)]
         raise UnknownName(
             f"{self.known.path} has no '{name}' here{did_you_mean(name, [*names, *ours]) or '.'}",
-            where=self.member.text.place(one.line or self.member.declaration.line),
+            where=self.member.text.place(given.line or self.member.declaration.line),
         )
-
-
-def _has_names(value: Expr) -> bool:
-    return any(True for _ in names_in(value))
-
-
-def _words(one: Given) -> str:
-    return one.scope[1].place(one.value.line).text if one.scope and one.value else ""
 
 
 def _without_jumps(rows: tuple[Any, ...], name: str, notes: Notes) -> tuple[Any, ...]:
     """Return a table over time in which two rows at one time are a microsecond apart."""
-    made: list[Any] = []
+    changed: list[Any] = []
     for row in rows:
-        if made and isinstance(row, tuple) and row[0] <= made[-1][0]:
-            row = (made[-1][0] + 1e-6, *row[1:])
+        if changed and isinstance(row, tuple) and row[0] <= changed[-1][0]:
+            row = (changed[-1][0] + 1e-6, *row[1:])
             notes.tell(f"{name}: where the table jumps, it does so in a microsecond.")
-        made.append(row)
-    return tuple(made)
+        changed.append(row)
+    return tuple(changed)

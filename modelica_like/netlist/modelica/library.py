@@ -62,11 +62,11 @@ class Known:
 
     def here(self, name: str) -> str:
         """Return the component's name for one of the class's: of a parameter, variable or connector."""
-        own = {given: ours for ours, given in self.names.items()}
-        if name in own:
-            return own[name]
+        here_of = {given: ours for ours, given in self.names.items()}
+        if name in here_of:
+            return here_of[name]
         head, bracket, index = name.partition("[")
-        pattern = own.get(f"{head}[#]") if bracket else None
+        pattern = here_of.get(f"{head}[#]") if bracket else None
         return pattern.replace("#", index.rstrip("]")) if pattern else name
 
     def there(self, name: str) -> str:
@@ -89,7 +89,7 @@ def known_classes() -> dict[str, Known]:
     """Return the classes that components stand for, by their full names."""
     data = table()
     common = data["ignored"]["parameters"].split()
-    found: dict[str, Known] = {}
+    by_name: dict[str, Known] = {}
     for package, classes in data["classes"].items():
         for name, entry in classes.items():
             rest = {key: value for key, value in entry.items() if key not in _READ}
@@ -97,25 +97,25 @@ def known_classes() -> dict[str, Known]:
             ignored = frozenset([*common, *entry.get("ignore", "").split()])
             path = f"{package}.{name}"
             absent = frozenset([*data["absent"]["fields"].split(), *entry.get("absent", "").split()])
-            found[path] = Known(path, entry.get("is", name), names, ignore=ignored, absent=absent, **rest)
-    return found
+            by_name[path] = Known(path, entry.get("is", name), names, ignore=ignored, absent=absent, **rest)
+    return by_name
 
 
 @lru_cache(maxsize=1)
 def by_component() -> dict[str, Known]:
     """Return the class that a component is written as, by the component's name: the first of the table."""
-    found: dict[str, Known] = {}
+    classes: dict[str, Known] = {}
     for known in known_classes().values():
         if not known.by:
-            found.setdefault(known.component, known)
-    return found
+            classes.setdefault(known.component, known)
+    return classes
 
 
 @lru_cache(maxsize=1)
 def built_in() -> dict[str, ClassText]:
     """Return the outermost classes of the built-in text."""
     file = _HERE / "builtin.mo"
-    return {one.name: one for one in parse_modelica(file.read_text(encoding="utf-8"), file.name)}
+    return {stored.name: stored for stored in parse_modelica(file.read_text(encoding="utf-8"), file.name)}
 
 
 def connector_type(path: str) -> type[Connector] | None:

@@ -18,7 +18,7 @@ def named_array(path: str, shape: tuple[int, ...], kind: str) -> Expr:
     if not shape:
         return Expr("name" if kind != "Boolean" else "condition", ((path, ()),))
     inner = [f"{path[:-1]},{k}]" if path.endswith("]") else f"{path}[{k}]" for k in range(1, shape[0] + 1)]
-    return Expr("array", tuple(named_array(one, shape[1:], kind) for one in inner))
+    return Expr("array", tuple(named_array(index, shape[1:], kind) for index in inner))
 
 
 def unknown_name(what: str, text: ClassText, line: int) -> UnknownName:
@@ -29,21 +29,21 @@ def unknown_name(what: str, text: ClassText, line: int) -> UnknownName:
 def sizes(owner: Instance, member: Member) -> tuple[int, ...]:
     """Return the dimensions of a declared array; a colon takes the size of the value."""
     resolver = resolve.Resolver(owner, member.text, numeric=True)
-    made: list[int] = []
-    for k, one in enumerate(member.declaration.dimensions):
-        if one.kind != "all":
-            made.append(resolver.count(one))
+    shape: list[int] = []
+    for k, dimension in enumerate(member.declaration.dimensions):
+        if dimension.kind != "all":
+            shape.append(resolver.count(dimension))
             continue
-        value = value_of(owner, member.declaration.name, member.text, one.line)
+        value = value_of(owner, member.declaration.name, member.text, dimension.line)
         for _ in range(k):
             value = value.args[0] if value.args and isinstance(value.args[0], Expr) else value
         if value.kind != "array":
-            raise refused(f"the size of {member.declaration.name} from this value", member.text, one.line)
-        made.append(len(value.args))
-    if math.prod(made) > fold.LONGEST:
-        what = f"{member.declaration.name}, an array of {math.prod(made)} elements (at most {fold.LONGEST})"
+            raise refused(f"the size of {member.declaration.name} from this value", member.text, dimension.line)
+        shape.append(len(value.args))
+    if math.prod(shape) > fold.LONGEST:
+        what = f"{member.declaration.name}, an array of {math.prod(shape)} elements (at most {fold.LONGEST})"
         raise refused(what, member.text, member.declaration.line)
-    return tuple(made)
+    return tuple(shape)
 
 
 def exists(owner: Instance, member: Member) -> bool:
@@ -55,10 +55,10 @@ def exists(owner: Instance, member: Member) -> bool:
     declared = member.declaration
     if declared.condition is None:
         return True
-    known = resolve.Resolver(owner, member.text, numeric=True)(declared.condition)
-    if known.kind != "boolean":
+    condition = resolve.Resolver(owner, member.text, numeric=True)(declared.condition)
+    if condition.kind != "boolean":
         raise refused("a condition of a component that is not known before the run", member.text, declared.line)
-    return known.args[0]
+    return condition.args[0]
 
 
 def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
@@ -104,20 +104,20 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
     """
     declared = member.declaration
     owner.classes.spend(1, member.text, declared.line)
-    found = owner.find(declared.type, member.text)
-    if found is None:
+    inner = owner.find(declared.type, member.text)
+    if inner is None:
         raise unknown_class(declared.type, member.text, declared.line)
-    while isinstance(found, ClassText) and found.short is not None and not found.prefixes:
+    while isinstance(inner, ClassText) and inner.short is not None and not inner.prefixes:
         # `model A = B(k = 1)`: the part is a B, and the modification one of the part.
-        scope = found.owner or found
-        base = owner.find(found.short.base, scope)
+        scope = inner.owner or inner
+        base = owner.find(inner.short.base, scope)
         if base is None:
-            raise unknown_class(found.short.base, scope, found.line)
-        member.given = member.given.over(given(found.short.modification, (owner, scope), found.line))
-        member.declaration = declared = replace(declared, type=found.short.base)
-        member.text, found = scope, base
-    if not isinstance(found, ClassText):
-        return found
+            raise unknown_class(inner.short.base, scope, inner.line)
+        member.given = member.given.over(given(inner.short.modification, (owner, scope), inner.line))
+        member.declaration = declared = replace(declared, type=inner.short.base)
+        member.text, inner = scope, base
+    if not isinstance(inner, ClassText):
+        return inner
     if member.part is None:
         count = sizes(owner, member)
         if len(count) > 1:
@@ -125,10 +125,10 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
                 f"{declared.name}, an array of components with several dimensions", member.text, declared.line
             )
         if not count:
-            member.part = _instance(owner, member, found, declared.name, member.given)
+            member.part = _instance(owner, member, inner, declared.name, member.given)
         else:
             member.part = [
-                _instance(owner, member, found, f"{declared.name}[{k}]", element(member.given, k))
+                _instance(owner, member, inner, f"{declared.name}[{k}]", element(member.given, k))
                 for k in range(1, count[0] + 1)
             ]
     if isinstance(member.part, list):
@@ -150,38 +150,38 @@ def _instance(owner: Instance, member: Member, text: ClassText, name: str, given
     if text.kind == "record" and value is not None and given.scope is not None and given.scope[0] is not None:
         scope, inside = given.scope
         if value.kind == "call":
-            arguments = {key: Given(one, given.scope, line=value.line) for key, one in value.args[2]}
+            arguments = {key: Given(x, given.scope, line=value.line) for key, x in value.args[2]}
             given = Given(inner=given.inner).over(Given(inner=arguments))
         elif value.kind == "name":
-            made = record_of(scope, value)
-            if made is None:
+            instance = record_of(scope, value)
+            if instance is None:
                 raise unknown_name(f"{value.path} is not a record.", inside, value.line)
-            return made
+            return instance
     return Instance(owner.classes, text, given, owner, name)
 
 
 def record_of(scope: Instance, name: Expr) -> Instance | None:
     """Return the record that a name means in an instance, None if it is none."""
-    made = scope
-    for one, _ in name.args:
-        member = made.members.get(one)
-        found = part_of(made, member) if member is not None and basic_type(made, member) is None else None
-        if not isinstance(found, Instance):
+    record = scope
+    for step, _ in name.args:
+        member = record.members.get(step)
+        inner = part_of(record, member) if member is not None and basic_type(record, member) is None else None
+        if not isinstance(inner, Instance):
             return None
-        made = found
-    return made if made.text.kind == "record" else None
+        record = inner
+    return record if record.text.kind == "record" else None
 
 
 def element(given: Given, index: int) -> Given:
     """Return the modification of one element of an array: arrays without `each` are taken apart."""
-    made = Given(given.value, given.scope, {}, given.redeclared, given.line, given.each)
+    entry = Given(given.value, given.scope, {}, given.redeclared, given.line, given.each)
     for name, one in given.inner.items():
-        made.inner[name] = element(one, index)
+        entry.inner[name] = element(one, index)
     if given.value is not None and given.scope is not None and not given.each:
         value = resolve.Resolver(*given.scope, numeric=False)(given.value)
         if value.kind == "array" and index <= len(value.args):
-            made.value = value.args[index - 1]
-    return made
+            entry.value = value.args[index - 1]
+    return entry
 
 
 def value_of_known(owner: Instance, member: Member, part: Known, name: str, text: ClassText, line: int) -> Expr:

@@ -44,51 +44,58 @@ class _Form:
         self.model, self.notes = model, notes
         self.units: dict[tuple[str, str], Unit] = {}
         self.wires = list(model.wires.values())
-        self.parameters = {name: one.unit for name, one in model.fields.items() if isinstance(one, Parameter)}
+        self.parameters = {name: field.unit for name, field in model.fields.items() if isinstance(field, Parameter)}
 
     def assembly(self) -> Assembly:
         self._left_out()
         self._signal_units()
         self._parameter_units()
         parts = {
-            name: [self._part(f"{name}[{k}]", one) for k, one in enumerate(part, 1)]
+            name: [self._part(f"{name}[{k}]", element) for k, element in enumerate(part, 1)]
             if isinstance(part, list)
             else self._part(name, part)
             for name, part in self.model._parts.items()
         }
-        made = Assembly(
+        parameters: dict[str, Any] = {}
+        for name, unit in self.parameters.items():
+            value = self.model.value(name)
+            if value is None:
+                raise ModelicaTextError(f"{name} has no value.")
+            parameters[name] = self._text(value, unit, name)
+        assembly = Assembly(
             self.model._name, parts=parts, free=self.model.free_ends, description=self.model.__dict__["_description"],
-            parameters={name: self._parameter(name) for name in self.parameters},
-            connect={_wire_name(ends, k): ends for k, ends in enumerate(self.wires, 1)},
+            parameters=parameters, connect={_wire_name(ends, k): ends for k, ends in enumerate(self.wires, 1)},
         )  # fmt: skip
-        shown = {path: unit for path, unit in self.model.__dict__["_display"].items() if _is_shown(made, path, unit)}
-        made.__dict__.update(_simulate=dict(self.model.__dict__["_simulate"]), _display=shown)
-        return made
+        shown = {
+            path: unit for path, unit in self.model.__dict__["_display"].items() if _is_shown(assembly, path, unit)
+        }
+        assembly.__dict__.update(_simulate=dict(self.model.__dict__["_simulate"]), _display=shown)
+        return assembly
 
     def _left_out(self) -> None:
         """Leave out variables that are only computed from the parts; refuse equations that the parts depend on."""
-        own = {name for name, one in self.model.fields.items() if not isinstance(one, Parameter)}
+        signals = {name for name, field in self.model.fields.items() if not isinstance(field, Parameter)}
         joined = {end for ends in self.wires for end in ends}
         defined = {left.args[0][0] for left, _, _ in self.model._statements if left.kind == "name"}
-        if defined != own or own & joined or self.model._happenings or self.model._initial:
+        if defined != signals or signals & joined or self.model._happenings or self.model._initial:
             raise ModelicaTextError(
                 f"{self.model._name} has equations of its own; a netlist contains only parts and connections.",
                 where=[source for _, _, source in (*self.model._initial, *self.model._statements)[:1]],
                 advice="Load the text itself: load and all commands read it like a netlist.",
             )  # fmt: skip
-        if own:
-            self.notes.append(f"{', '.join(sorted(own))}: left out, because a netlist has no equations.")
+        if signals:
+            self.notes.append(f"{', '.join(sorted(signals))}: left out, because a netlist has no equations.")
 
     # -- units -------------------------------------------------------------------------------------------------------
 
     def _end(self, end: str) -> tuple[Component, str] | None:
         """Return part and name of a signal, None for a connector."""
-        found = self.model._resolve(end)
-        return None if isinstance(found, Connector) else (found.owner, found.name)
+        resolved = self.model._resolve(end)
+        return None if isinstance(resolved, Connector) else (resolved.owner, resolved.name)
 
     def _signal_units(self) -> None:
         """Find the units of signals whose blocks take any: from the ends that have one, through the blocks."""
-        sets = [[one for end in ends if (one := self._end(end)) is not None] for ends in self.wires]
+        sets = [[place for end in ends if (place := self._end(end)) is not None] for ends in self.wires]
         blocks = [part for part in self.model.walk() if part is not self.model]
         while True:
             while self._along(sets) or any(self._through(block) for block in blocks):
@@ -101,37 +108,37 @@ class _Form:
     def _along(self, sets: list[list[tuple[Component, str]]]) -> bool:
         changed = False
         for ends in sets:
-            known = [unit for one in ends if (unit := self._unit(*one)) is not None]
-            for one in ends:
-                if known and self._unit(*one) is None:
-                    self._set(*one, known[0])
+            units = [unit for e in ends if (unit := self._unit(*e)) is not None]
+            for end in ends:
+                if units and self._unit(*end) is None:
+                    self._set(*end, units[0])
                     changed = True
         return changed
 
     def _through(self, block: Component) -> bool:
         """Pass units through a block; tell whether one was found."""
         kind = type(block).__name__
-        ports = [name for name, one in block.fields.items() if isinstance(one, Input | Output) and one.unit == ANY]
+        ports = [name for name, f in block.fields.items() if isinstance(f, Input | Output) and f.unit == ANY]
         if kind == "Product":
             y, u1, u2 = (self._unit(block, name) for name in ("y", "u1", "u2"))
-            found = {
+            units_of = {
                 "y": u1 * u2 if u1 and u2 else None,
                 "u1": y / u2 if y and u2 else None,
                 "u2": y / u1 if y and u1 else None,
             }
-            new = [name for name, unit in found.items() if unit is not None and self._unit(block, name) is None]
+            new = [name for name, unit in units_of.items() if unit is not None and self._unit(block, name) is None]
             for name in new:
-                self._set(block, name, found[name])
+                self._set(block, name, units_of[name])
             return bool(new)
         value = block.value("k") if kind in _GAINS else None
         if kind in _GAINS and value is not None and value.formula is None:
             return False  # the unit of k may be any: it follows from both sides
         if kind in _GAINS:
             return self._gain(block, value)
-        known = next((unit for name in ports if (unit := self._unit(block, name)) is not None), None)
-        new = [name for name in ports if known is not None and self._unit(block, name) is None]
+        units = next((unit for name in ports if (unit := self._unit(block, name)) is not None), None)
+        new = [name for name in ports if units is not None and self._unit(block, name) is None]
         for name in new:
-            self._set(block, name, known)
+            self._set(block, name, units)
         return bool(new)
 
     def _gain(self, block: Component, value: Value | None) -> bool:
@@ -160,7 +167,7 @@ class _Form:
         if kind in _GAINS and name == "k":
             u, y = self._unit(part, "u") or ONE, self._unit(part, "y") or ONE
             return y / u * _SECOND ** _GAINS[kind]
-        ports = (self._unit(part, one) for one, field in part.fields.items() if isinstance(field, Input | Output))
+        ports = (self._unit(part, key) for key, field in part.fields.items() if isinstance(field, Input | Output))
         return next((unit for unit in ports if unit is not None), ONE)
 
     def _parameter_units(self) -> None:
@@ -181,9 +188,9 @@ class _Form:
             owner, _, name = path.rpartition(".")
             return self.parameters[path] if not owner else self.model.find(owner).fields[name].unit
 
-        made = formula.evaluate(lambda path: leaves.setdefault(path, ca.SX.sym(path)))
-        found = Dimensions(unit_of).unit_or_any(made)
-        return None if found == ANY else found
+        expression = formula.evaluate(lambda path: leaves.setdefault(path, ca.SX.sym(path)))
+        unit = Dimensions(unit_of).unit_or_any(expression)
+        return None if unit == ANY else unit
 
     # -- values ------------------------------------------------------------------------------------------------------
 
@@ -191,33 +198,27 @@ class _Form:
         twin = part.copy()
         if isinstance(twin, Written):
             return twin
-        for name, one in part.fields.items():
+        for name, field in part.fields.items():
             value = part._values.get(name)
-            free = isinstance(one, Parameter) and one.unit == ANY
-            unit = self._own_unit(part, name) if free else one.unit
-            default = one.default if value is None and free and isinstance(one.default, int | float) else None
+            free = isinstance(field, Parameter) and field.unit == ANY
+            unit = self._own_unit(part, name) if free else field.unit
+            default = field.default if value is None and free and isinstance(field.default, int | float) else None
             if value is not None:
                 twin.give(name, self._text(value, unit, f"{path}.{name}"))
             elif default and not same_dimension(unit, ONE):
                 twin.give(name, _quantity(float(default), unit))
             start = part._starts.get(name)
             if start is not None:
-                text = self._text(start, one.unit, f"{path}.{name}")
+                text = self._text(start, field.unit, f"{path}.{name}")
                 twin.give(name, text if start.fixed else guess(text))
         return twin
-
-    def _parameter(self, name: str) -> Any:
-        value = self.model.value(name)
-        if value is None:
-            raise ModelicaTextError(f"{name} has no value.")
-        return self._text(value, self.parameters[name], name)
 
     def _text(self, value: Value, unit: Unit, path: str) -> Any:
         """Return a number with its unit; a formula stays if its unit fits."""
         if value.formula is None:
             return _quantity(value.number or 0.0, unit)
-        found = self._formula_unit(value.formula)
-        if found is not None and (same_dimension(found, unit) or unit == ANY):
+        formula_unit = self._formula_unit(value.formula)
+        if formula_unit is not None and (same_dimension(formula_unit, unit) or unit == ANY):
             return value.formula
         number = float(value.formula.evaluate(self._number))
         self.notes.append(

@@ -70,65 +70,65 @@ def class_of_equations(
         if isinstance(statement, Equation):
             sides = ca.vertsplit(ca.cse(ca.vertcat(statement.left, statement.right)))
             events = event_steps(sides[0] - sides[1])
-            left, right = (_text(one, component, events=events) for one in sides)
+            left, right = (_text(side, component, events=events) for side in sides)
             lines.append(f"  {left} = {right};")
     return "\n".join([*lines, *_events(component), f"end {name};"])
 
 
 def _events(component: Component) -> list[str]:
     """Return the equations of the modes: a mode changes where a transition from its value before has its condition."""
-    events = [one for one, _ in located(component.events())]
-    ends = [one for one in events if isinstance(one, When) and _only_ends(one)]
-    if any(not isinstance(one, Transition | StartMode) and one not in ends for one in events):
+    events = [e for e, _ in located(component.events())]
+    ends = [e for e in events if isinstance(e, When) and _only_ends(e)]
+    if any(not isinstance(e, Transition | StartMode) and e not in ends for e in events):
         raise ModelicaTextError(f"{component.label} has a 'when' or an assertion of Python, which is not written.")
     lines: list[str] = []
     for name, mode in component.modes.items():
-        goes = [one for one in events if isinstance(one, Transition) and one.mode.mode is mode and not one.fails]
-        begins = [one for one in events if isinstance(one, StartMode) and one.mode.mode is mode]
-        chosen = " else".join(f"if {_text(one.when, component, True)} then {mode.number(one.target)}" for one in begins)
+        goes = [e for e in events if isinstance(e, Transition) and e.mode.mode is mode and not e.fails]
+        begins = [e for e in events if isinstance(e, StartMode) and e.mode.mode is mode]
+        chosen = " else".join(f"if {_text(b.when, component, True)} then {mode.number(b.target)}" for b in begins)
         first = str(mode.number(component.start_mode(name)))
         first = f"{chosen} else {first}" if chosen else first
-        rest = "".join(f" elseif {_due(one, component)} then {mode.number(one.target)}" for one in goes)
+        rest = "".join(f" elseif {_due(t, component)} then {mode.number(t.target)}" for t in goes)
         name = identifier(name)
         lines.append(f"  {name} = if initial() then ({first}){rest} else pre({name});")
-    resets = [one for one in events if isinstance(one, Transition) and one.reset]
-    for k, one in enumerate(resets):
-        lines.append(f"  {'elsewhen' if k else 'when'} {_due(one, component)} then")
-        for target, value in one.reset.items():
+    resets = [e for e in events if isinstance(e, Transition) and e.reset]
+    for k, event in enumerate(resets):
+        lines.append(f"  {'elsewhen' if k else 'when'} {_due(event, component)} then")
+        for target, value in event.reset.items():
             symbol, new = symbols_in(target)[0], _text(value, component, True)
             field = symbol.owner.fields[symbol.name]
             _check_reset(component, symbol, value)
             path = identifier(relative_path(symbol.owner, component, symbol.name))
             lines.append(f"    {path} = {new};" if isinstance(field, Discrete) else f"    reinit({path}, {new});")
     lines += ["  end when;"] if resets else []
-    for one in ends:
-        lines += _ending(one, component)
-    for one in events:
-        if isinstance(one, Transition) and one.fails:
-            words = one.notice.replace('"', "'")
-            lines.append(f'  assert(not ({_due(one, component, False)}), "{words}");')
+    for event in ends:
+        conditions = ", ".join(_text(each, component) for each in event.conditions)
+        texts = (key.text.replace('"', "'") for _, new in event.branches for key in new if isinstance(key, Ending))
+        written = (f'    terminate("{re.sub(r"[{}]", "", text)}");' for text in texts)
+        lines += [f"  when {{{conditions}}} then", *written, "  end when;"]
+    for event in events:
+        if isinstance(event, Transition) and event.fails:
+            words = event.notice.replace('"', "'")
+            lines.append(f'  assert(not ({_due(event, component, False)}), "{words}");')
     return lines
 
 
-def _only_ends(one: Any) -> bool:
+def _only_ends(event: Any) -> bool:
     """Return whether an event is a `when` that ends the run and does nothing else."""
-    whole = one.branches if isinstance(one, When) else ()
+    whole = event.branches if isinstance(event, When) else ()
     return len(whole) == 1 and all(isinstance(key, Ending) and not key.fails for key in whole[0][1])
 
 
-def _ending(one: When, component: Component) -> list[str]:
-    conditions = ", ".join(_text(each, component) for each in one.conditions)
-    texts = (key.text.replace('"', "'") for _, new in one.branches for key in new if isinstance(key, Ending))
-    written = (f'    terminate("{re.sub(r"[{}]", "", text)}");' for text in texts)
-    return [f"  when {{{conditions}}} then", *written, "  end when;"]
-
-
-def _due(one: Transition, component: Component, before: bool = True) -> str:
+def _due(transition: Transition, component: Component, before: bool = True) -> str:
     """Return the condition of a transition, with modes and discrete values before the event or after it."""
-    name = identifier(one.mode.mode.name)
+    name = identifier(transition.mode.mode.name)
     name = f"pre({name})" if before else name
-    sources = " or ".join(f"{name} == {one.mode.mode.number(source)}" for source in one.sources)
-    when = f"time >= {_text(one.at, component, before)}" if one.when is None else _text(one.when, component, before)
+    sources = " or ".join(f"{name} == {transition.mode.mode.number(source)}" for source in transition.sources)
+    when = (
+        f"time >= {_text(transition.at, component, before)}"
+        if transition.when is None
+        else _text(transition.when, component, before)
+    )
     return f"({sources}) and {when}"
 
 
@@ -137,17 +137,22 @@ def _check_reset(component: Component, target: Symbol, value: Any) -> None:
     if not isinstance(component.fields.get(target.name), Discrete):
         return
     equations = (as_statement(item, source, "") for item, source in located(component.equations()))
-    sides = [side for one in equations if isinstance(one, Equation) for side in (one.left, one.right)]
-    states = {one.name for side in sides for one in symbols_in(side) if one.order}
-    for one in symbols_in(ca.SX(value)):
-        if one is not TIME and isinstance(one.owner.fields.get(one.name), Variable) and one.name not in states:
+    sides = [side for e in equations if isinstance(e, Equation) for side in (e.left, e.right)]
+    states = {s.name for side in sides for s in symbols_in(side) if s.order}
+    for symbol in symbols_in(ca.SX(value)):
+        if (
+            symbol is not TIME
+            and isinstance(symbol.owner.fields.get(symbol.name), Variable)
+            and symbol.name not in states
+        ):
             raise ModelicaTextError(
-                f"{component.label} sets {target.name} at an event by {one.name} before it, which has no Modelica text."
+                f"{component.label} sets {target.name} at an event by {symbol.name} before it, which has no Modelica "
+                "text."
             )
 
 
 def _declarations(component: Component, write_formula: Callable[[Formula], str], driven: frozenset[str]) -> list[str]:
-    lines = [f"  {connector_class(one)} {identifier(key)};" for key, one in component.connectors.items() if one.used]
+    lines = [f"  {connector_class(c)} {identifier(key)};" for key, c in component.connectors.items() if c.used]
     for key, field in component.fields.items():
         if isinstance(field, Parameter) or (isinstance(field, Input) and key not in driven):
             value = component.value(key)
@@ -170,8 +175,8 @@ def _declarations(component: Component, write_formula: Callable[[Formula], str],
             text = write_formula(start.formula) if start is not None and start.formula is not None else repr(number)
             lines.append(f"  discrete Real {identifier(key)}(start = {text});")
     for key, mode in component.modes.items():
-        told = ", ".join(f"{number}: {one}" for number, one in enumerate(mode.names))
-        lines.append(f'  Integer {identifier(key)}(start = {mode.number(component.start_mode(key))}) "{told}";')
+        numbers = ", ".join(f"{number}: {name}" for number, name in enumerate(mode.names))
+        lines.append(f'  Integer {identifier(key)}(start = {mode.number(component.start_mode(key))}) "{numbers}";')
     return _arrays(lines)
 
 
@@ -187,7 +192,7 @@ def _arrays(lines: list[str]) -> list[str]:
 
 def _attributes(unit: str, *more: str) -> str:
     texts = [f'unit = "{unit}"'] if unit not in ("1", "*", "") else []
-    texts += [one for one in more if one]
+    texts += [operand for operand in more if operand]
     return f"({', '.join(texts)})" if texts else ""
 
 
@@ -226,18 +231,18 @@ def _text(expression: Any, component: Component, before: bool = False, events: C
         return "der(" * symbol.order + path + ")" * symbol.order
     if silence(node):
         return _text(node.dep(0), component, before)
-    operation, args = node.op(), [_text(one, component, before, events) for one in operands(node)]
+    operation, args = node.op(), [_text(operand, component, before, events) for operand in operands(node)]
     quiet = not _has_events(node, events)
     if operation in _SIGNS:
         return f"({args[0]} {_SIGNS[operation]} {args[1]})"
     if operation in _SINGLE:
         return _SINGLE[operation](args[0])
     if operation == ca.OP_IF_ELSE_ZERO:
-        made = f"if {args[0]} then {args[1]} else 0"
-        return f"noEvent({made})" if quiet else f"({made})"
+        text = f"if {args[0]} then {args[1]} else 0"
+        return f"noEvent({text})" if quiet else f"({text})"
     if operation in _FUNCTIONS:
-        made = f"{_FUNCTIONS[operation]}({', '.join(args)})"
-        return f"noEvent({made})" if quiet and _FUNCTIONS[operation] in ("sign", "floor", "ceil") else made
+        text = f"{_FUNCTIONS[operation]}({', '.join(args)})"
+        return f"noEvent({text})" if quiet and _FUNCTIONS[operation] in ("sign", "floor", "ceil") else text
     raise ModelicaTextError(f"{component.label} uses a function that Modelica text does not have here.")
 
 
@@ -245,4 +250,4 @@ def _has_events(node: Any, identities: Collection[int]) -> bool:
     """Tell whether an expression has steps that make events."""
     if node.is_symbolic():
         return isinstance(symbols_in(node)[0], Marker)
-    return node.element_hash() in identities or any(_has_events(one, identities) for one in operands(node))
+    return node.element_hash() in identities or any(_has_events(operand, identities) for operand in operands(node))

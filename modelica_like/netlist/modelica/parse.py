@@ -37,8 +37,8 @@ def parse_modelica(text: str, file: str) -> list[ClassText]:
     try:
         return parser.stored()
     except ModelicaTextError as error:
-        told = error if error.where else parser.error(error.what, parser.line)
-        raise told.with_traceback(None) from None  # hundreds of frames are no help, and too many for pickle
+        located = error if error.where else parser.error(error.what, parser.line)
+        raise located.with_traceback(None) from None  # hundreds of frames are no help, and too many for pickle
 
 
 def parse_expression(text: str) -> Expr:
@@ -86,90 +86,90 @@ class _Parser(Expressions):
         if self.take("extends"):
             unsupported.append(("'class extends'", line))
         name = self.need("name")
-        made = ClassText(name, kind, line, self.file, owner, within, partial, unsupported=unsupported, lines=self.lines)
+        class_text = ClassText(
+            name, kind, line, self.file, owner, within, partial, unsupported=unsupported, lines=self.lines
+        )
         if self.take("="):
-            self._short(made)
+            self._short(class_text)
             self.depth -= 1
-            return made
+            return class_text
         if self.kind == "(":
             self.modification()
-        made.description = self.strings()
-        self._composition(made)
+        class_text.description = self.strings()
+        self._composition(class_text)
         self.need("end")
         if self.text != name:
             self.refuse(f"{kind} {name} of line {line} ends with 'end {self.text}'.", self.line)
         self.take("name")
         self.depth -= 1
-        return made
+        return class_text
 
-    def _short(self, made: ClassText) -> None:
+    def _short(self, class_text: ClassText) -> None:
         if self.take("enumeration"):
             self.need("(")
-            made.literals = tuple(self._literals())
+            literals = []
+            while self.kind == "name":
+                literals.append(self.take("name"))
+                self.strings()
+                self.annotation(None)
+                self.take(",")
+            class_text.literals = tuple(literals)
             self.need(")")
         else:
             while word := self.take("input", "output", "flow"):
-                made.prefixes |= {word}
+                class_text.prefixes |= {word}
             line, base = self.line, self.dotted()
             if self.kind == "[":
-                made.unsupported.append(("a short class definition of an array", line))
+                class_text.unsupported.append(("a short class definition of an array", line))
                 self.subscripts()
-            made.short = Extends(base, self.modification(), line)
-        made.description = self.strings()
-        self.annotation(made)
+            class_text.short = Extends(base, self.modification(), line)
+        class_text.description = self.strings()
+        self.annotation(class_text)
 
-    def _literals(self) -> list[str]:
-        literals = []
-        while self.kind == "name":
-            literals.append(self.take("name"))
-            self.strings()
-            self.annotation(None)
-            self.take(",")
-        return literals
-
-    def _composition(self, made: ClassText) -> None:
+    def _composition(self, class_text: ClassText) -> None:
         hidden = False
         while self.kind != "end":
             line = self.line
             if word := self.take("public", "protected"):
                 hidden = word == "protected"
             elif self.kind == "annotation":
-                self.annotation(made)
+                self.annotation(class_text)
                 self.need(";")
             elif self.kind in ("initial", "equation", "algorithm"):
-                self._section(made, bool(self.take("initial")), line)
+                initial = bool(self.take("initial"))
+                if self.take("algorithm"):
+                    if class_text.kind != "function":
+                        class_text.unsupported.append(("an algorithm outside a function", line))
+                    class_text.algorithm += self.statements()
+                else:
+                    self.need("equation")
+                    (class_text.initial_equations if initial else class_text.equations).extend(self.statements())
             elif self.take("external"):
-                made.unsupported.append(("external functions", line))
+                class_text.unsupported.append(("external functions", line))
                 while self.kind not in (";", "end of file"):
                     self.at += 1
                 self.need(";")
             elif self.kind == "end of file":
-                self.refuse(f"{made.kind} {made.name} of line {made.line} has no 'end {made.name};'.", line)
+                self.refuse(
+                    f"{class_text.kind} {class_text.name} of line {class_text.line} has no 'end {class_text.name};'.",
+                    line,
+                )
             else:
-                self._element(made, hidden)
+                self._element(class_text, hidden)
                 self.need(";")
 
-    def _section(self, made: ClassText, initial: bool, line: int) -> None:
-        if self.take("algorithm"):
-            if made.kind != "function":
-                made.unsupported.append(("an algorithm outside a function", line))
-            made.algorithm += self.statements()
-        else:
-            self.need("equation")
-            (made.initial_equations if initial else made.equations).extend(self.statements())
-
-    def _element(self, made: ClassText, hidden: bool) -> None:
+    def _element(self, class_text: ClassText, hidden: bool) -> None:
         line = self.line
         if self.take("import"):
-            made.elements.append(self._import())
+            class_text.elements.append(self._import())
         elif self.take("extends"):
-            made.elements.append(Extends(self.dotted(), self.modification(), line))
+            class_text.elements.append(Extends(self.dotted(), self.modification(), line))
         elif self._is_element_class():
-            inner = self._element_class(made)
-            made.classes[inner.name] = inner
+            inner = self._element_class(class_text)
+            class_text.classes[inner.name] = inner
             return
         else:
-            made.elements += self.declarations(hidden)
+            class_text.elements += self.declarations(hidden)
         self.annotation(None)
 
     def _is_element_class(self) -> bool:
@@ -177,9 +177,9 @@ class _Parser(Expressions):
         while self.tokens[at][1] in _BEFORE:
             at += 1
         start, self.at = self.at, at
-        found = self.is_class()
+        result = self.is_class()
         self.at = start
-        return found
+        return result
 
     def _element_class(self, owner: ClassText | None) -> ClassText:
         self.take("redeclare")
@@ -225,35 +225,35 @@ class _Parser(Expressions):
             prefixes.add(self.take(self.kind))
         type_name = self.dotted()
         common = self.subscripts() if self.kind == "[" else ()
-        made = [self._declared(frozenset(prefixes), type_name, common)]
+        declarations = [self._declared(frozenset(prefixes), type_name, common)]
         while not single and self.take(","):
-            made.append(self._declared(frozenset(prefixes), type_name, common))
+            declarations.append(self._declared(frozenset(prefixes), type_name, common))
         self._constrained()
-        return made
+        return declarations
 
     def _declared(self, prefixes: frozenset[str], type_name: str, common: tuple[Expr, ...]) -> Declaration:
         line, name = self.line, self.need("name")
         dimensions = (self.subscripts() if self.kind == "[" else ()) + common
         modification = self.modification()
         condition = self.expression() if self.take("if") else None
-        made = Declaration(prefixes, type_name, name, dimensions, modification, condition, self.strings(), line)
+        declaration = Declaration(prefixes, type_name, name, dimensions, modification, condition, self.strings(), line)
         self.annotation(None)
-        return made
+        return declaration
 
     # -- modifications -----------------------------------------------------------------------------------------------
 
     def modification(self) -> Modification:
-        made = Modification()
+        modification = Modification()
         if self.take("("):
             self.deeper()
             while not self.take(")"):
-                made.arguments.append(self._argument())
+                modification.arguments.append(self._argument())
                 if self.kind != ")":
                     self.need(",")
             self.depth -= 1
         if self.take("=", ":="):
-            made.value = self.expression()
-        return made
+            modification.value = self.expression()
+        return modification
 
     def _argument(self) -> Argument:
         line, redeclare, each = self.line, False, False
@@ -261,25 +261,25 @@ class _Parser(Expressions):
             each, redeclare = each or word == "each", redeclare or word in ("redeclare", "replaceable")
         if not redeclare:
             name = self.dotted()
-            made = Argument(name, self.modification(), line, each)
+            argument = Argument(name, self.modification(), line, each)
             self.strings()
-            return made
+            return argument
         redeclared = self._element_class(None) if self.is_class() else self.declarations(single=True)[0]
         return Argument(redeclared.name, Modification(), line, each, redeclared)
 
-    def annotation(self, made: ClassText | None) -> None:
+    def annotation(self, class_text: ClassText | None) -> None:
         """Skip an annotation; that of a class may say how long to simulate."""
         if not self.take("annotation"):
             return
         depth = 0
         while True:
             kind, text, line = self.tokens[self.at]
-            if text == "experiment" and kind == "name" and depth == 1 and made is not None:
+            if text == "experiment" and kind == "name" and depth == 1 and class_text is not None:
                 self.at += 1
-                for one in self.modification().arguments:
-                    value = one.modification.value
+                for argument in self.modification().arguments:
+                    value = argument.modification.value
                     if value is not None and value.kind == "number":
-                        made.experiment[one.name] = value.args[0]
+                        class_text.experiment[argument.name] = value.args[0]
                 continue
             if kind == "end of file":
                 self.refuse("An annotation has no end.", line)
@@ -291,19 +291,19 @@ class _Parser(Expressions):
     # -- equations and statements ------------------------------------------------------------------------------------
 
     def statements(self) -> list[Statement]:
-        made = []
+        statements = []
         while self.kind not in ("else", "elseif", "elsewhen") and self.kind not in SECTIONS:
-            made.append(self._statement())
+            statements.append(self._statement())
             self.strings()
             self.annotation(None)
             self.need(";")
-        return made
+        return statements
 
     def _statement(self) -> Statement:
         self.deeper()
-        made = self._one_statement(self.line)
+        statement = self._one_statement(self.line)
         self.depth -= 1
-        return made
+        return statement
 
     def _one_statement(self, line: int) -> Statement:
         if word := self.take("if", "when"):
@@ -311,15 +311,15 @@ class _Parser(Expressions):
         if self.take("for"):
             iterators = self.iterators()
             self.need("loop")
-            made = Statement("for", (iterators, self.statements()), line)
+            statement = Statement("for", (iterators, self.statements()), line)
             self._ends("for")
-            return made
+            return statement
         if self.take("while"):
             condition = self.expression()
             self.need("loop")
-            made = Statement("while", (condition, self.statements()), line)
+            statement = Statement("while", (condition, self.statements()), line)
             self._ends("while")
-            return made
+            return statement
         if self.take("connect"):
             self.need("(")
             left = self.expression()

@@ -31,7 +31,7 @@ def read_modelica(path: Path, name: str = "") -> tuple[Written, list[str]]:
     text = classes.chosen(name)
     notes = Notes()
     try:
-        made = build_component(Instance(classes, text, Given()), notes)
+        component = build_component(Instance(classes, text, Given()), notes)
     except RecursionError:
         raise ModelicaTextError(
             "Classes, functions or formulas are nested too deeply.", where=text.place(text.line)
@@ -40,8 +40,8 @@ def read_modelica(path: Path, name: str = "") -> tuple[Written, list[str]]:
     settings = {"start": "rest", "on_chattering": "rest"} | (
         {"until": f"{text.experiment['StopTime']:g} s"} if "StopTime" in text.experiment else {}
     )
-    made.__dict__.update(_simulate=settings, _display=notes.display, _origin=f"{path.resolve()}:{text.path}")
-    for part in made.walk():
-        if isinstance(part, Written) and part is not made:
+    component.__dict__.update(_simulate=settings, _display=notes.display, _origin=f"{path.resolve()}:{text.path}")
+    for part in component.walk():
+        if isinstance(part, Written) and part is not component:
             part.__dict__["_origin"] = f"{path.resolve()}:{part.__dict__['_class']}"
-    return made, notes.told
+    return component, notes.told

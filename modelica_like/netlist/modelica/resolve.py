@@ -54,9 +54,9 @@ class Resolver:
     ) -> None:  # fmt: skip
         self.instance, self.text, self.numeric, self.depth = instance, text, numeric, depth
         self.local = dict(local or {})
-        found = classes or (instance.classes if instance else None)
-        assert found is not None
-        self.classes = found
+        lookup = classes or (instance.classes if instance else None)
+        assert lookup is not None
+        self.classes = lookup
 
     def __call__(self, expression: Expr) -> Expr:
         """Return the resolved expression.
@@ -74,9 +74,16 @@ class Resolver:
         if kind == "for":
             return self._built(args[0], list(args[1]))
         if kind == "if":
-            return self._chosen(args, line)
+            kept: list[Expr] = []
+            for condition, value in zip(args[:-1:2], args[1::2], strict=True):
+                choice = self(condition)
+                if choice.kind != "boolean":
+                    kept += [choice, self(value)]
+                elif choice.args[0]:
+                    return Expr("if", (*kept, self(value)), line) if kept else self(value)
+            return Expr("if", (*kept, self(args[-1])), line) if kept else self(args[-1])
         if kind == "range":
-            numbers = [self.number(one) for one in args]
+            numbers = [self.number(argument) for argument in args]
             start, step, stop = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
             return self._told(lambda: fold.row(start, step, stop, line), line)
         values = tuple(map(self, args))
@@ -90,17 +97,6 @@ class Resolver:
         except ModelicaTextError as error:
             error.where = error.where or (self.text.place(line),)
             raise
-
-    def _chosen(self, args: tuple[Expr, ...], line: int) -> Expr:
-        """Resolve an `if`; branches that are known not to be taken are not looked at."""
-        kept: list[Expr] = []
-        for condition, value in zip(args[:-1:2], args[1::2], strict=True):
-            known = self(condition)
-            if known.kind != "boolean":
-                kept += [known, self(value)]
-            elif known.args[0]:
-                return Expr("if", (*kept, self(value)), line) if kept else self(value)
-        return Expr("if", (*kept, self(args[-1])), line) if kept else self(args[-1])
 
     def _built(self, element: Expr, iterators: list[tuple[str, Expr | None]]) -> Expr:
         """Resolve an array built by iterators, the last one innermost."""
@@ -117,10 +113,10 @@ class Resolver:
 
     def array(self, expression: Expr) -> tuple[Expr, ...]:
         """Return the elements of an array."""
-        made = self(expression)
-        if made.kind != "array":
+        result = self(expression)
+        if result.kind != "array":
             raise refused("a loop over something that is not an array", self.text, expression.line)
-        return made.args
+        return result.args
 
     def number(self, expression: Expr) -> float:
         """Return the value of an expression of constants and parameters.
@@ -128,8 +124,8 @@ class Resolver:
         Raises:
             ModelicaTextError: it has none.
         """
-        made = self if self.numeric else self.known()
-        value = made(expression)
+        resolved = self if self.numeric else self.known()
+        value = resolved(expression)
         if value.kind != "number":
             raise ModelicaTextError(
                 "A number is needed here that constants and parameters determine.",
@@ -165,17 +161,17 @@ class Resolver:
 
     def indexed(self, value: Expr, subscripts: tuple[Expr, ...], line: int) -> Expr:
         """Return an element of an array."""
-        for k, one in enumerate(subscripts):
+        for k, subscript in enumerate(subscripts):
             if value.kind != "array":
                 raise refused("a subscript of something that is not an array", self.text, line)
-            if one.kind == "all":
+            if subscript.kind == "all":
                 rest = subscripts[k + 1 :]
                 return Expr("array", tuple(self.indexed(item, rest, line) for item in value.args), line)
-            chosen = self.index(one, len(value.args))
+            chosen = self.index(subscript, len(value.args))
             if isinstance(chosen, Expr):
                 rest = subscripts[k + 1 :]
-                found = tuple(self.indexed(value, (index, *rest), line) for index in chosen.args)
-                return Expr("array", found, line)
+                rows = tuple(self.indexed(value, (index, *rest), line) for index in chosen.args)
+                return Expr("array", rows, line)
             value = value.args[chosen - 1]
         return value
 
@@ -201,8 +197,8 @@ class Resolver:
         (name, subscripts), rest = parts[0], parts[1:]
         member = owner.members.get(name)
         if member is None:
-            known = did_you_mean(name, owner.members) or "."
-            raise members.unknown_name(f"{owner.path or owner.text.name} has no '{name}'{known}", self.text, line)
+            hint = did_you_mean(name, owner.members) or "."
+            raise members.unknown_name(f"{owner.path or owner.text.name} has no '{name}'{hint}", self.text, line)
         basic = basic_type(owner, member)
         if basic is not None:
             if rest:
@@ -215,15 +211,15 @@ class Resolver:
         every = bool(shape) and (not subscripts or subscripts[0].kind == "all")
         chosen = self.index(whole if every else subscripts[0], shape[0]) if shape else 0
         if isinstance(chosen, Expr):
-            items = (((name, (one,)), *rest) for one in chosen.args)
-            return Expr("array", tuple(self._member(owner, before, one, line) for one in items), line)
+            items = (((name, (argument,)), *rest) for argument in chosen.args)
+            return Expr("array", tuple(self._member(owner, before, item, line) for item in items), line)
         part = members.part_of(owner, member, chosen)
         path = f"{before}{name}[{chosen}]" if chosen else f"{before}{name}"
         if not rest:
             raise refused(f"{name}, a component, as a value", self.text, line)
         if isinstance(part, Instance):
             return self._member(part, f"{path}.", rest, line)
-        inner = ".".join(one + "".join(f"[{int(self.number(index))}]" for index in subs) for one, subs in rest)
+        inner = ".".join(head + "".join(f"[{int(self.number(index))}]" for index in subs) for head, subs in rest)
         if isinstance(part, Known):
             inner = part.here(inner)
             if self.numeric:
@@ -249,16 +245,16 @@ class Resolver:
         """Resolve a constant of a class, or a literal of an enumeration."""
         path, line = expression.path, expression.line
         package, _, name = path.rpartition(".")
-        found = self.find(package) if package else None
+        class_text = self.find(package) if package else None
         if package.endswith("StateSelect"):
             return Expr("literal", (name,), line)
-        if isinstance(found, ClassText) and found.literals:
-            if name not in found.literals:
+        if isinstance(class_text, ClassText) and class_text.literals:
+            if name not in class_text.literals:
                 raise members.unknown_name(
-                    f"{package} has no '{name}'{did_you_mean(name, found.literals) or '.'}", self.text, line
+                    f"{package} has no '{name}'{did_you_mean(name, class_text.literals) or '.'}", self.text, line
                 )
-            return Expr("literal", (f"{found.name}.{name}",), line)
-        holder = found if isinstance(found, ClassText) else None
+            return Expr("literal", (f"{class_text.name}.{name}",), line)
+        holder = class_text if isinstance(class_text, ClassText) else None
         if holder is None and not package:
             holder = self._around(name)
         if holder is None:
@@ -268,24 +264,26 @@ class Resolver:
             inside = Instance(self.classes, holder, Given())
             if name in inside.members:
                 return self.indexed(members.value_of(inside, name, self.text, line), expression.args[-1][1], line)
-        known = [*self.local, *(self.instance.members if self.instance else ())]
-        raise members.unknown_name(f"There is no '{path}'{did_you_mean(path, known) or '.'}", self.text, line)
+        names = [*self.local, *(self.instance.members if self.instance else ())]
+        raise members.unknown_name(f"There is no '{path}'{did_you_mean(path, names) or '.'}", self.text, line)
 
     def _imported_constant(self, name: str) -> ClassText | None:
         """Return the package of a constant that is imported by its own name."""
         level: ClassText | None = self.text
         while level is not None:
-            for one in level.elements:
-                if isinstance(one, Import) and name in (one.alias, *one.names):
-                    found = self.classes.full(one.path if name in one.names else one.path.rpartition(".")[0])
-                    return found if isinstance(found, ClassText) else None
+            for element in level.elements:
+                if isinstance(element, Import) and name in (element.alias, *element.names):
+                    class_text = self.classes.full(
+                        element.path if name in element.names else element.path.rpartition(".")[0]
+                    )
+                    return class_text if isinstance(class_text, ClassText) else None
             level = level.owner
         return None
 
     def _around(self, name: str) -> ClassText | None:
         level: ClassText | None = self.text if self.instance is None else self.text.owner
         while level is not None:
-            if any(isinstance(one, Declaration) and one.name == name for one in level.elements):
+            if any(isinstance(element, Declaration) and element.name == name for element in level.elements):
                 return level
             level = level.owner
         return None
@@ -321,14 +319,14 @@ class Resolver:
         if short == "size":
             items = self._sized(given[0])
             return functions.size(items, int(self.number(given[1])) if len(given) > 1 else 0, line)
-        values = tuple(self(one) for one in given)
+        values = tuple(self(argument) for argument in given)
         if short in functions.OF_ARRAYS:
             if not values or (short in ("sum", "product", "scalar", "transpose") and values[0].kind != "array"):
                 raise ModelicaTextError(f"{short}(…) needs an array.", where=self.text.place(line))
             return self._told(lambda: functions.OF_ARRAYS[short](values, line), line)
         if short in ELEMENTARY:
             return self._told(lambda: fold.function(short, values, line), line)
-        others = {key: self(one) for key, one in named}
+        others = {key: self(argument) for key, argument in named}
         return self._told(lambda: functions.called(self, expression, values, others), line)
 
     def _homotopy(self, given: list[Expr], line: int) -> Expr:

@@ -50,14 +50,14 @@ class Statements:
             ModelicaTextError: something is not supported.
         """
         self._bindings()
-        for one, text in self.instance.equations:
-            self._statement(one, text, {})
+        for happening, text in self.instance.equations:
+            self._statement(happening, text, {})
         start = Statements(self.instance)
-        for one, text in self.instance.initial_equations:
-            start._statement(one, text, {})
-        if start.connections or any(not one.text for one in start.happenings):
-            one, text = self.instance.initial_equations[0]
-            raise refused("a connection or a 'when' among initial equations", text, one.line)
+        for happening, text in self.instance.initial_equations:
+            start._statement(happening, text, {})
+        if start.connections or any(not h.text for h in start.happenings):
+            happening, text = self.instance.initial_equations[0]
+            raise refused("a connection or a 'when' among initial equations", text, happening.line)
         for left, right, source in start.equations:
             if left.kind == "call" and left.args[0] == "pre":
                 self.memory[left.args[1][0].args[0][0]] = right
@@ -68,20 +68,20 @@ class Statements:
                 self._check_memory(call, source)
         values = [side for left, right, _ in (*self.equations, *self.initial) for side in (left, right)]
         sources = [source for _, _, source in (*self.equations, *self.initial) for _ in (0, 1)]
-        for one in self.happenings:
-            for conditions, new in one.branches:
+        for happening in self.happenings:
+            for conditions, new in happening.branches:
                 demanded = (value.args[0] for name, value in new.items() if name.startswith(ASSERT))
                 numbers = [*conditions, *demanded, *(value for name, value in new.items() if not _is_ending(name))]
                 values += numbers
-                sources += [one.source] * len(numbers)
+                sources += [happening.source] * len(numbers)
         for value, source in zip(values, sources, strict=True):
             if not _is_numeric(value):
                 raise ModelicaTextError("A text, an array or a choice stands where a number belongs.", where=source)
 
     def _check_memory(self, call: Expr, source: Source) -> None:
         """Refuse `pre` and `change` of a variable that changes all the time."""
-        one = call.args[1][0] if call.args[0] in ("pre", "change") else None
-        name = one.args[0][0] if one is not None and one.kind == "name" else ""
+        argument = call.args[1][0] if call.args[0] in ("pre", "change") else None
+        name = argument.args[0][0] if argument is not None and argument.kind == "name" else ""
         member = self.instance.members.get(name)
         basic = basic_type(self.instance, member) if member is not None else None
         if (
@@ -123,33 +123,40 @@ class Statements:
             part = part_of(self.instance, member, k)
             if isinstance(part, Known) or (isinstance(part, Instance) and part.text.kind != "connector"):
                 continue
-            for last, one in (element(member.given, k) if k else member.given).inner.items():
-                if one.value is None or one.scope is None:
+            for last, entry in (element(member.given, k) if k else member.given).inner.items():
+                if entry.value is None or entry.scope is None:
                     continue
-                if one.scope[0] is not self.instance:
+                if entry.scope[0] is not self.instance:
                     what = f"an equation for {name}.{last} in the modification of its component"
-                    raise refused(what, one.scope[1], one.line)
-                path = Expr("name", ((f"{name}[{k}].{last}" if k else f"{name}.{last}", ()),), one.line)
-                self._equate(path, Resolver(*one.scope)(one.value), one.scope[1], one.line)
+                    raise refused(what, entry.scope[1], entry.line)
+                path = Expr("name", ((f"{name}[{k}].{last}" if k else f"{name}.{last}", ()),), entry.line)
+                self._equate(path, Resolver(*entry.scope)(entry.value), entry.scope[1], entry.line)
 
-    def _statement(self, one: Statement, text: ClassText, local: dict[str, Expr]) -> None:
+    def _statement(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
         resolver = Resolver(self.instance, text, local)
-        self.instance.classes.spend(10, text, one.line)
-        if one.kind == "=":
-            self._equate(resolver(one.parts[0]), resolver(one.parts[1]), text, one.line)
-        elif one.kind == "connect":
-            left, right = (self._end(side, resolver) for side in one.parts)
-            self.connections.append((left, right, text.place(one.line)))
-        elif one.kind == "for":
-            self._loop(list(one.parts[0]), one.parts[1], text, local)
-        elif one.kind == "if":
-            self._branches(one, text, local)
-        elif one.kind == "when":
-            self._when(one, text, local)
-        elif one.kind == "call":
-            self._demand(one.parts[0], resolver, text)
+        self.instance.classes.spend(10, text, statement.line)
+        if statement.kind == "=":
+            self._equate(resolver(statement.parts[0]), resolver(statement.parts[1]), text, statement.line)
+        elif statement.kind == "connect":
+            left, right = (self._end(side, resolver) for side in statement.parts)
+            self.connections.append((left, right, text.place(statement.line)))
+        elif statement.kind == "for":
+            self._loop(list(statement.parts[0]), statement.parts[1], text, local)
+        elif statement.kind == "if":
+            self._branches(statement, text, local)
+        elif statement.kind == "when":
+            self._when(statement, text, local)
+        elif statement.kind == "call":
+            if statement.parts[0].args[0] != "assert":
+                raise refused(f"{statement.parts[0].args[0]}(…) among equations", text, statement.parts[0].line)
+            demand = self._demanded(statement.parts[0], resolver, text)
+            if demand is not None:
+                condition, words = demand
+                self.happenings.append(
+                    Happening((((condition,), {}),), text.place(statement.parts[0].line), words.args[0])
+                )
         else:
-            raise refused(f"'{one.kind}' among equations", text, one.line)
+            raise refused(f"'{statement.kind}' among equations", text, statement.line)
 
     def _end(self, end: Expr, resolver: Resolver) -> Expr:
         """Resolve the subscripts of an end of a connection, and keep its names."""
@@ -175,39 +182,39 @@ class Statements:
             if rest:
                 self._loop(rest, body, text, inner)
             else:
-                for one in body:
-                    self._statement(one, text, inner)
+                for statement in body:
+                    self._statement(statement, text, inner)
 
-    def _branches(self, one: Statement, text: ClassText, local: dict[str, Expr]) -> None:
+    def _branches(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
         """Take the branch that parameters decide; else make one equation of those at the same place in all branches."""
         resolver = Resolver(self.instance, text, local)
         open_branches: list[tuple[Expr | None, Statements]] = []
-        for condition, body in one.parts:
-            known = Expr("boolean", (True,)) if condition is None else resolver(condition)
-            if known.kind == "boolean" and not known.args[0]:
+        for condition, body in statement.parts:
+            holds = Expr("boolean", (True,)) if condition is None else resolver(condition)
+            if holds.kind == "boolean" and not holds.args[0]:
                 continue
-            target = Statements(self.instance) if open_branches or known.kind != "boolean" else self
+            target = Statements(self.instance) if open_branches or holds.kind != "boolean" else self
             for inner in body:
                 target._statement(inner, text, local)
             if target is self:
                 return
             if target.connections or target.happenings:
-                raise refused("a connection or an event in a branch that changes during a run", text, one.line)
-            open_branches.append((None if known.kind == "boolean" else known, target))
-            if known.kind == "boolean":
+                raise refused("a connection or an event in a branch that changes during a run", text, statement.line)
+            open_branches.append((None if holds.kind == "boolean" else holds, target))
+            if holds.kind == "boolean":
                 break
         if not open_branches:
             return
-        self._joined(open_branches, text, one.line)
+        self._joined(open_branches, text, statement.line)
 
     def _joined(self, branches: list[tuple[Expr | None, Statements]], text: ClassText, line: int) -> None:
-        counts = {len(one.equations) for _, one in branches}
+        counts = {len(branch.equations) for _, branch in branches}
         if len(counts) > 1 or branches[-1][0] is not None:
             raise refused("an 'if' whose branches have different numbers of equations", text, line)
         for k in range(counts.pop()):
-            rows = [(condition, *one.equations[k]) for condition, one in branches]
+            rows = [(condition, *branch.equations[k]) for condition, branch in branches]
             left = rows[0][1]
-            if all(_same(row[1], left) for row in rows):
+            if all(row[1].kind == "name" and _text(row[1]) == _text(left) for row in rows):
                 self.equations.append((left, _choice([(row[0], row[2]) for row in rows], line), rows[0][3]))
                 continue
             zero = [(row[0], fold.operation("-", (row[1], row[2]), line)) for row in rows]
@@ -217,8 +224,8 @@ class Statements:
         if left.kind == "array" or right.kind == "array":
             if left.kind != right.kind or len(left.args) != len(right.args):
                 raise ModelicaTextError("The sizes of both sides differ.", where=text.place(line))
-            for one, other in zip(left.args, right.args, strict=True):
-                self._equate(one, other, text, line)
+            for argument, other in zip(left.args, right.args, strict=True):
+                self._equate(argument, other, text, line)
         elif left.kind == "condition":
             right = _condition(right)
             member = self.instance.members.get(left.args[0][0].partition("[")[0])
@@ -241,62 +248,49 @@ class Statements:
 
     # -- events ------------------------------------------------------------------------------------------------------
 
-    def _when(self, one: Statement, text: ClassText, local: dict[str, Expr]) -> None:
-        resolver, source = Resolver(self.instance, text, local), text.place(one.line)
+    def _when(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
+        resolver, source = Resolver(self.instance, text, local), text.place(statement.line)
         branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]] = []
-        made: set[str] = set()
-        for condition, body in one.parts:
+        assigned: set[str] = set()
+        for condition, body in statement.parts:
             if condition is None:
-                raise refused("'else' of a 'when'", text, one.line)
-            known = resolver(condition)
-            conditions = known.args if known.kind == "array" else (known,)
+                raise refused("'else' of a 'when'", text, statement.line)
+            holds = resolver(condition)
+            conditions = holds.args if holds.kind == "array" else (holds,)
             if any(each.kind in ("boolean", "number") for each in conditions):
                 raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
             values = self._changes(body, text, local)
-            states = self._states(body, resolver)
-            made |= {name for name in values if name not in states and not _is_ending(name)}
+            calls = (s.parts[0] for s in body if s.kind == "call" and s.parts[0].args[0] == "reinit")
+            states = {resolver(call.args[1][0]).args[0][0] for call in calls}
+            assigned |= {name for name in values if name not in states and not _is_ending(name)}
             branches.append((conditions, values))
-        for name in made & self.assigned:
+        for name in assigned & self.assigned:
             raise ModelicaTextError(f"Two whens determine {name}.", where=source)
-        self.assigned |= made
+        self.assigned |= assigned
         self.happenings.append(Happening(tuple(branches), source))
-
-    def _states(self, body: list[Statement], resolver: Resolver) -> set[str]:
-        """Return the names that `reinit` sets."""
-        calls = (one.parts[0] for one in body if one.kind == "call" and one.parts[0].args[0] == "reinit")
-        return {resolver(call.args[1][0]).args[0][0] for call in calls}
 
     def _changes(self, body: list[Statement], text: ClassText, local: dict[str, Expr]) -> dict[str, Expr]:
         """Return the new values of a branch of a when."""
         resolver = Resolver(self.instance, text, local)
         values: dict[str, Expr] = {}
-        for one in body:
-            call = one.parts[0] if one.kind == "call" else None
-            if one.kind == "=":
-                target, value = resolver(one.parts[0]), resolver(one.parts[1])
+        for statement in body:
+            call = statement.parts[0] if statement.kind == "call" else None
+            if statement.kind == "=":
+                target, value = resolver(statement.parts[0]), resolver(statement.parts[1])
                 if target.kind not in ("name", "condition"):
-                    raise refused("a 'when' with an equation that is not solved for a variable", text, one.line)
+                    raise refused("a 'when' with an equation that is not solved for a variable", text, statement.line)
                 values[target.args[0][0]] = _condition(value) if target.kind == "condition" else value
             elif call is not None and call.args[0] == "reinit" and len(call.args[1]) == 2:
                 target, value = (resolver(side) for side in call.args[1])
                 values[target.args[0][0]] = value
             elif call is not None and call.args[0] == "terminate":
-                values[TERMINATE] = Expr("string", (_words(call.args[1][0]),), one.line)
+                values[TERMINATE] = Expr("string", (_words(call.args[1][0]),), statement.line)
             elif call is not None and call.args[0] == "assert":
                 demand = self._demanded(call, resolver, text)
-                values |= {} if demand is None else {f"{ASSERT}{len(values)}": Expr("demand", demand, one.line)}
+                values |= {} if demand is None else {f"{ASSERT}{len(values)}": Expr("demand", demand, statement.line)}
             else:
-                raise refused(f"'{one.kind}' in a 'when'", text, one.line)
+                raise refused(f"'{statement.kind}' in a 'when'", text, statement.line)
         return values
-
-    def _demand(self, call: Expr, resolver: Resolver, text: ClassText) -> None:
-        """Read an assertion: it ends the run where it is broken."""
-        if call.args[0] != "assert":
-            raise refused(f"{call.args[0]}(…) among equations", text, call.line)
-        demand = self._demanded(call, resolver, text)
-        if demand is not None:
-            condition, words = demand
-            self.happenings.append(Happening((((condition,), {}),), text.place(call.line), words.args[0]))
 
     def _demanded(self, call: Expr, resolver: Resolver, text: ClassText) -> tuple[Expr, Expr] | None:
         """Return the condition of an assertion and its words; None of a warning and of what always holds."""
@@ -329,7 +323,7 @@ def _condition(node: Expr) -> Expr:
 
 
 def _is_numeric(node: Expr) -> bool:
-    inner = node.args[1] if node.kind == "call" else [one for one in node.args if isinstance(one, Expr)]
+    inner = node.args[1] if node.kind == "call" else [argument for argument in node.args if isinstance(argument, Expr)]
     return node.kind not in ("string", "array", "literal") and all(map(_is_numeric, inner))
 
 
@@ -341,18 +335,14 @@ def _choice(branches: list[tuple[Expr | None, Expr]], line: int) -> Expr:
 
 
 def _text(node: Expr) -> str:
-    inner = (f"({_text(one)})" if isinstance(one, Expr) else str(one) for one in node.args)
+    inner = (f"({_text(argument)})" if isinstance(argument, Expr) else str(argument) for argument in node.args)
     if node.kind == "call":
-        inner = (node.args[0], *(_text(one) for one in node.args[1]))
+        inner = (node.args[0], *(_text(argument) for argument in node.args[1]))
     return f"{node.kind}:{','.join(inner)}"
-
-
-def _same(one: Expr, other: Expr) -> bool:
-    return one.kind == "name" and _text(one) == _text(other)
 
 
 def _words(node: Expr) -> str:
     """Return the text of a message; numbers in it are left out."""
     if node.kind == "string":
         return node.args[0].replace("{", "(").replace("}", ")")
-    return "".join(_words(one) for one in node.args if isinstance(one, Expr)) or "…"
+    return "".join(_words(argument) for argument in node.args if isinstance(argument, Expr)) or "…"

@@ -57,14 +57,14 @@ class Tokens:
             match = _TOKEN.match(text, position)
             if match is None:
                 self.refuse(f"{text[position]!r} has no meaning in Modelica.", line)
-            kind, found = match.lastgroup or "", match.group()
+            kind, word = match.lastgroup or "", match.group()
             if kind == "open":
-                self.refuse(f"A {_OPEN[found]} has no end.", line)
-            if (kind == "name" and (found in _KEYWORDS or found in KINDS)) or kind == "sign":
-                tokens.append((found, found, line))
+                self.refuse(f"A {_OPEN[word]} has no end.", line)
+            if (kind == "name" and (word in _KEYWORDS or word in KINDS)) or kind == "sign":
+                tokens.append((word, word, line))
             elif kind != "skip":
-                tokens.append((kind, found, line))
-            line += found.count("\n")
+                tokens.append((kind, word, line))
+            line += word.count("\n")
             position = match.end()
         tokens.append(("end of file", "", line))
         return tokens
@@ -109,13 +109,13 @@ class Tokens:
 
     def need(self, kind: str) -> str:
         """Return the text of the next token, which must be of this kind."""
-        found = self.take(kind)
-        if not found:
+        text = self.take(kind)
+        if not text:
             wanted = f"a {kind}" if kind == "name" else f"'{kind}'"
-            told = f"'{self.text}'" if self.text else "the end of the file"
-            self.refuse(f"Expected {wanted} before {told}.", self.line)
-        bare = found.strip("'")  # the name of a reserved word; 'time' is not the time
-        return bare if found != bare and bare in _RESERVED and bare != "time" else found
+            present = f"'{self.text}'" if self.text else "the end of the file"
+            self.refuse(f"Expected {wanted} before {present}.", self.line)
+        bare = text.strip("'")  # the name of a reserved word; 'time' is not the time
+        return bare if text != bare and bare in _RESERVED and bare != "time" else text
 
     def dotted(self) -> str:
         """Read a name with dots; one from the outermost level begins with a dot."""

@@ -42,7 +42,10 @@ class Expr:
         inner = [*_children(self)]
         if not inner:
             return
-        depth, size = 1 + max(one.depth for one in inner), 1 + sum(one.size for one in inner)
+        depth, size = (
+            1 + max(expression.depth for expression in inner),
+            1 + sum(expression.size for expression in inner),
+        )
         if depth > _DEEPEST:
             raise ModelicaTextError(f"A formula has more than {_DEEPEST} levels.")
         if size > _LARGEST:
@@ -188,13 +191,13 @@ def substituted(expression: Expr, values: dict[str, Expr]) -> Expr:
     if expression.kind == "name":
         if len(expression.args) == 1 and not expression.args[0][1]:
             return values.get(expression.args[0][0], expression)
-        parts = tuple((name, tuple(substituted(one, values) for one in subs)) for name, subs in expression.args)
+        parts = tuple((name, tuple(substituted(index, values) for index in subs)) for name, subs in expression.args)
         return Expr("name", parts, expression.line)
     if expression.kind == "call":
         name, given, named = expression.args
-        named = tuple((key, substituted(one, values)) for key, one in named)
-        return Expr("call", (name, tuple(substituted(one, values) for one in given), named), expression.line)
-    args = tuple(substituted(one, values) if isinstance(one, Expr) else one for one in expression.args)
+        named = tuple((key, substituted(value, values)) for key, value in named)
+        return Expr("call", (name, tuple(substituted(argument, values) for argument in given), named), expression.line)
+    args = tuple(substituted(a, values) if isinstance(a, Expr) else a for a in expression.args)
     return Expr(expression.kind, args, expression.line)
 
 
@@ -202,16 +205,16 @@ def names_in(expression: Expr) -> Iterator[Expr]:
     """Yield the names in an expression."""
     if expression.kind == "name":
         yield expression
-    for one in _children(expression):
-        yield from names_in(one)
+    for child in _children(expression):
+        yield from names_in(child)
 
 
 def calls_in(expression: Expr) -> Iterator[Expr]:
     """Yield the calls in an expression."""
     if expression.kind == "call":
         yield expression
-    for one in _children(expression):
-        yield from calls_in(one)
+    for child in _children(expression):
+        yield from calls_in(child)
 
 
 def chain(signs: list[str], terms: list[Expr]) -> Expr:
@@ -219,21 +222,21 @@ def chain(signs: list[str], terms: list[Expr]) -> Expr:
 
     The tree of a long chain of products is as deep as it is long; sums, `and` and `or` are joined two by two.
     """
-    made = terms[0]
+    result = terms[0]
     if len(terms) <= CHAIN or signs[0] not in ("+", "-", "or", "and"):
         for sign, term in zip(signs, terms[1:], strict=True):
-            made = Expr(sign, (made, term), made.line)
-        return made
+            result = Expr(sign, (result, term), result.line)
+        return result
     pairs = zip(signs, terms[1:], strict=True)
-    items = [made, *(Expr("neg", (term,), term.line) if sign == "-" else term for sign, term in pairs)]
+    items = [result, *(Expr("neg", (term,), term.line) if sign == "-" else term for sign, term in pairs)]
     kind = "+" if signs[0] == "-" else signs[0]
-    return joined(lambda one, other: Expr(kind, (one, other), one.line), items)
+    return joined(lambda left, other: Expr(kind, (left, other), left.line), items)
 
 
 def joined(join: Callable[[Expr, Expr], Expr], items: list[Expr]) -> Expr:
     """Return what joins expressions two by two; many are halved again and again, so that they are not as deep."""
     while len(items) > CHAIN:
-        halves = [join(one, other) for one, other in zip(items[::2], items[1::2], strict=False)]
+        halves = [join(item, other) for item, other in zip(items[::2], items[1::2], strict=False)]
         items = [*halves, *items[2 * len(halves) :]]
     return functools.reduce(join, items)
 
@@ -244,6 +247,6 @@ def _children(expression: Expr) -> Iterator[Expr]:
             yield from subscripts
     elif expression.kind == "call":
         yield from expression.args[1]
-        yield from (one for _, one in expression.args[2])
+        yield from (value for _, value in expression.args[2])
     else:
-        yield from (one for one in expression.args if isinstance(one, Expr))
+        yield from (argument for argument in expression.args if isinstance(argument, Expr))

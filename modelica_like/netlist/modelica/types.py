@@ -36,17 +36,17 @@ def basic_type(instance: Instance, member: Member) -> Basic | None:
         ModelicaTextError: its class does not exist.
     """
     declaration, attributes, prefixes = member.declaration, member.given, member.declaration.prefixes
-    found = instance.find(declaration.type, member.text)
-    if found is None:
+    base = instance.find(declaration.type, member.text)
+    if base is None:
         raise unknown_class(declaration.type, member.text, declaration.line)
-    while isinstance(found, ClassText):
-        if found.literals:
+    while isinstance(base, ClassText):
+        if base.literals:
             return Basic("enumeration", attributes, prefixes)
-        if found.short is None:
+        if base.short is None:
             return None
-        scope = found.owner or found
-        attributes = attributes.over(given(found.short.modification, (instance, scope), found.line))
-        prefixes = prefixes | found.prefixes
-        found = instance.classes.find(found.short.base, scope)
-    plain = isinstance(found, str) and found in (*SCALARS, "StateSelect")
-    return Basic(str(found), attributes, prefixes) if plain else None
+        scope = base.owner or base
+        attributes = attributes.over(given(base.short.modification, (instance, scope), base.line))
+        prefixes = prefixes | base.prefixes
+        base = instance.classes.find(base.short.base, scope)
+    plain = isinstance(base, str) and base in (*SCALARS, "StateSelect")
+    return Basic(str(base), attributes, prefixes) if plain else None

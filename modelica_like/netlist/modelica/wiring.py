@@ -33,13 +33,13 @@ def groups(connections: list[tuple[Expr, Expr, Source]], instance: Instance) -> 
     wires: list[Wire] = []
     for left, right, source in connections:
         for pair in _pairs(left, right, instance, source):
-            touched = [one for one in wires if set(pair) & set(one.ends)]
-            made = Wire([], touched[0].source if touched else source)
-            for end in (*(end for one in touched for end in one.ends), *pair):
-                if end not in made.ends:
-                    made.ends.append(end)
-            wires = [one for one in wires if one not in touched]
-            wires.append(made)
+            touched = [w for w in wires if set(pair) & set(w.ends)]
+            wire = Wire([], touched[0].source if touched else source)
+            for end in (*(end for t in touched for end in t.ends), *pair):
+                if end not in wire.ends:
+                    wire.ends.append(end)
+            wires = [w for w in wires if w not in touched]
+            wires.append(wire)
     return wires
 
 
@@ -51,8 +51,8 @@ def _pairs(left: Expr, right: Expr, instance: Instance, source: Source) -> list[
         if len(ends[k]) == 1 and count > 1:  # an array of signals that a component has as single ones
             name, subscripts = end.args[-1]
             elements = (Expr("number", (float(position),)) for position in range(1, count + 1))
-            each = (Expr("name", (*end.args[:-1], (name, (*subscripts, one))), end.line) for one in elements)
-            ends[k] = [path for one in each for path in _ends(one, instance)]
+            each = (Expr("name", (*end.args[:-1], (name, (*subscripts, element))), end.line) for element in elements)
+            ends[k] = [path for e in each for path in _ends(e, instance)]
     if len(ends[0]) != len(ends[1]):
         raise ModelicaTextError("The sizes of both ends differ.", where=source)
     return list(zip(*ends, strict=True))
@@ -65,13 +65,13 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
     if member is None:
         raise unknown_name(f"{instance.text.name} has no '{name}'.", instance.text, end.line)
     shape = sizes(instance, member)
-    indices = [f"[{int(one.args[0])}]" for one in subscripts if one.kind == "number"]
+    indices = [f"[{int(subscript.args[0])}]" for subscript in subscripts if subscript.kind == "number"]
     if shape and not indices:
         indices = [f"[{k}]" for k in range(1, shape[0] + 1)]
     heads = [f"{name}{index}" for index in indices or [""]]
     if basic_type(instance, member) is not None or not rest:
         return heads
-    inner = ".".join(one + "".join(f"[{int(k.args[0])}]" for k in subs) for one, subs in rest)
+    inner = ".".join(n + "".join(f"[{int(k.args[0])}]" for k in subs) for n, subs in rest)
     part = part_of(instance, member, int(indices[0][1:-1]) if indices else 0)
     if isinstance(part, Known):
         return [f"{head}.{part.here(inner)}" for head in heads]

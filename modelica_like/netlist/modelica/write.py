@@ -50,15 +50,18 @@ class _Writer:
 
     def model(self, assembly: Assembly, name: str) -> str:
         """Return the class of an assembly."""
-        joined = self._joined(assembly)
-        lines = [f"model {name}{_described(assembly.__dict__['_description'])}"]
+        joined = {_path(assembly, end) for ends in self._wires(assembly) for end in ends}
+        quoted = assembly.__dict__["_description"].replace("\\", "\\\\").replace('"', '\\"')
+        lines = [f'model {name} "{quoted}"' if quoted else f"model {name}"]
         for key, field in assembly.fields.items():
             if isinstance(field, Parameter):
                 value = assembly.value(key)
                 if value is None:
                     raise ModelicaTextError(f"{assembly.label}.{key} has no value.")
-                lines.append(f"  parameter Real {identifier(key)}{_unit(value)} = {self._value(value, assembly)};")
-        lines += [f"  {connector_class(one)} {identifier(key)};" for key, one in assembly.connectors.items()]
+                unit = str(coherent(value.unit))
+                attribute = f'(unit = "{unit}")' if unit not in ("1", "") else ""
+                lines.append(f"  parameter Real {identifier(key)}{attribute} = {self._value(value, assembly)};")
+        lines += [f"  {connector_class(c)} {identifier(key)};" for key, c in assembly.connectors.items()]
         for key, field in assembly.fields.items():
             if isinstance(field, Input | Output):
                 lines.append(f"  {_BLOCKS}{type(field).__name__} {identifier(key)};")
@@ -78,18 +81,18 @@ class _Writer:
         if not isinstance(part, list):
             kind, values = self._part(owner, name, part, joined)
             return f"{kind} {identifier(name)}{_arguments(values)}"
-        made = [self._part(owner, f"{name}[{k}]", one, joined) for k, one in enumerate(part, 1)]
-        kinds = {kind for kind, _ in made}
-        keys = {tuple(values) for _, values in made}
+        arguments = [self._part(owner, f"{name}[{k}]", element, joined) for k, element in enumerate(part, 1)]
+        kinds = {kind for kind, _ in arguments}
+        keys = {tuple(values) for _, values in arguments}
         if len(kinds) != 1 or len(keys) != 1:
             raise ModelicaTextError(
                 f"{owner.label}.{name} is an array of different parts, which Modelica does not have.",
                 where=owner.source_of(f"parts.{name}"), advice="Give each part a name of its own.",
             )  # fmt: skip
         values = {
-            key: (f"each {key}", made[0][1][key])
-            if all(one[key] == made[0][1][key] for _, one in made)
-            else (key, "{" + ", ".join(one[key] for _, one in made) + "}")
+            key: (f"each {key}", arguments[0][1][key])
+            if all(a[key] == arguments[0][1][key] for _, a in arguments)
+            else (key, "{" + ", ".join(a[key] for _, a in arguments) + "}")
             for key in keys.pop()
         }
         return f"{kinds.pop()} {identifier(name)}[{len(part)}]{_arguments(dict(values.values()))}"
@@ -106,8 +109,8 @@ class _Writer:
             return name, {}
         known = by_component().get(type(part).__name__)
         if known is None or known.type is not type(part):
-            for key, one in part.connectors.items():
-                one.__dict__["_used"] = not one.optional or f"{path}.{key}" in joined
+            for key, connector in part.connectors.items():
+                connector.__dict__["_used"] = not connector.optional or f"{path}.{key}" in joined
             name = f"{type(part).__name__}_{re.sub('[^a-zA-Z0-9]', '_', path)}"
             driven = frozenset(key for key in part.fields if f"{path}.{key}" in joined)
             text = class_of_equations(part, name, lambda formula: formula_text(formula, part), driven)
@@ -119,8 +122,8 @@ class _Writer:
 
     def _starts(self, part: Component, known: Known | None, owner: Assembly) -> dict[str, str]:
         starts: dict[str, dict[str, Value]] = {}
-        inside = [(f"{one.path.removeprefix(f'{part.path}.')}.", one) for one in part.walk() if one is not part]
-        given = [(f"{path}{name}", value) for path, one in [("", part), *inside] for name, value in one._starts.items()]
+        inside = [(f"{node.path.removeprefix(f'{part.path}.')}.", node) for node in part.walk() if node is not part]
+        given = [(f"{path}{name}", value) for path, c in [("", part), *inside] for name, value in c._starts.items()]
         for name, value in given:
             there = known.there(name) if known else name
             if "." in there:
@@ -128,7 +131,7 @@ class _Writer:
             starts.setdefault(there.partition("[")[0], {})[there] = value
         if part._start_modes:
             raise ModelicaTextError(f"{part.label} has a start mode, which Modelica text does not say here.")
-        return dict.fromkeys((self._start(base, one, part, owner) for base, one in starts.items()), "")
+        return dict.fromkeys((self._start(base, start, part, owner) for base, start in starts.items()), "")
 
     def _start(self, base: str, given: dict[str, Value], part: Component, owner: Assembly) -> str:
         """Return the modification of a start value, or of those of all elements of an array."""
@@ -136,18 +139,14 @@ class _Writer:
             fixed = ", fixed = true" if given[base].fixed else ""
             return f"{identifier(base)}(start = {self._value(given[base], owner)}{fixed})"
         elements = [given.get(name) for name in part.fields if name.startswith(f"{base}[")]
-        values = ", ".join("0" if one is None else self._value(one, owner) for one in elements)
-        fixed = ", ".join(str(one is not None and one.fixed).lower() for one in elements)
+        values = ", ".join("0" if element is None else self._value(element, owner) for element in elements)
+        fixed = ", ".join(str(element is not None and element.fixed).lower() for element in elements)
         return f"{identifier(base)}(start = {{{values}}}, fixed = {{{fixed}}})"
 
     def _value(self, value: Value, owner: Component) -> str:
         return _number(value.number or 0.0) if value.formula is None else formula_text(value.formula, owner)
 
     # -- connections -------------------------------------------------------------------------------------------------
-
-    def _joined(self, assembly: Assembly) -> set[str]:
-        """Return the paths of the ends that are connected."""
-        return {_path(assembly, end) for ends in self._wires(assembly) for end in ends}
 
     def _wires(self, assembly: Assembly) -> Iterator[list[Any]]:
         for statement in assembly.equations():
@@ -158,8 +157,8 @@ class _Writer:
     def _pairs(self, assembly: Assembly) -> Iterator[tuple[str, str]]:
         for ends in self._wires(assembly):
             texts = [_there(assembly, end) for end in ends]
-            for one in texts[1:]:
-                yield texts[0], one
+            for text in texts[1:]:
+                yield texts[0], text
 
 
 class _Arguments:
@@ -208,7 +207,14 @@ class _Arguments:
     def _structural(self, name: str, value: Any) -> None:
         if name in self.known.fix:
             if value != self.known.fix[name]:
-                self._held(name, value)
+                # The last value holds: a row more makes the last slope zero.
+                if name != "extrapolate" or value != "hold":
+                    raise self._refused(name, value)
+                for one in self.part._tables:
+                    rows = self.part.__dict__[one]
+                    if len(rows) > 1 and rows[-1][1:] != rows[-2][1:]:
+                        more = (*rows, (rows[-1][0] + max(abs(rows[-1][0]), 1.0), *rows[-1][1:]))
+                        self.done[self.known.there(one)] = self._plain(one, more)
         elif value != self.part._structural[name] or any(self._scales(name)):
             if name in self.known.absent:
                 raise self._refused(name, value)
@@ -217,18 +223,8 @@ class _Arguments:
     def _scales(self, name: str) -> list[str]:
         """Return the parameters that scale the columns of a table, empty where none is given."""
         columns = self.part._tables[name].columns if name in self.part._tables else ()
-        given = (one.scale in self.part._values and one.scale not in self.known.names for one in columns)
-        return [one.scale if scaled else "" for one, scaled in zip(columns, given, strict=True)]
-
-    def _held(self, name: str, value: Any) -> None:
-        """Write a table whose last value holds: a row more makes the last slope zero."""
-        if name != "extrapolate" or value != "hold":
-            raise self._refused(name, value)
-        for one in self.part._tables:
-            rows = self.part.__dict__[one]
-            if len(rows) > 1 and rows[-1][1:] != rows[-2][1:]:
-                more = (*rows, (rows[-1][0] + max(abs(rows[-1][0]), 1.0), *rows[-1][1:]))
-                self.done[self.known.there(one)] = self._plain(one, more)
+        given = (column.scale in self.part._values and column.scale not in self.known.names for column in columns)
+        return [column.scale if scaled else "" for column, scaled in zip(columns, given, strict=True)]
 
     def _put(self, there: str, text: str) -> None:
         if text.startswith("connected "):
@@ -239,28 +235,25 @@ class _Arguments:
         if any(f"{self.path}.{name}" in self.joined for name in names):
             return
         given = [name for name in names if name in self.part._values or name in self.part._structural]
-        if given or all(self._has(name) for name in names):
+        if given or all(name in self.part._structural or self.part.value(name) is not None for name in names):
             self.done[there] = self._expression(text)
-
-    def _has(self, name: str) -> bool:
-        return name in self.part._structural or self.part.value(name) is not None
 
     def _expression(self, text: str) -> str:
         """Return an expression of the component's fields with their values."""
-        made = text
+        result = text
         for name in _fields(text):
             if name in self.part._structural:
                 value = self._plain(name, self.part.__dict__[name])
             else:
-                known = self.part.value(name)
-                value = self.writer._value(known, self.owner) if known is not None else name
+                field_value = self.part.value(name)
+                value = self.writer._value(field_value, self.owner) if field_value is not None else name
                 value = value if re.fullmatch(r"[\w.]+", value) else f"({value})"
-            made = re.sub(rf"(?<![\w.]){name}(?![\w.])", lambda _, value=value: value, made)
-        node = parse_expression(made)
+            result = re.sub(rf"(?<![\w.]){name}(?![\w.])", lambda _, value=value: value, result)
+        node = parse_expression(result)
         if any(True for _ in names_in(node)) or any(True for _ in calls_in(node)):
-            return made
+            return result
         value = fold.known(node)
-        return made if value.kind == "array" else self._plain("", value.args[0])
+        return result if value.kind == "array" else self._plain("", value.args[0])
 
     def _defaults(self) -> None:
         """Write what the component takes where its class has another default."""
@@ -293,9 +286,11 @@ class _Arguments:
         if value and isinstance(value[0], tuple):
             factors = [f"*{self._expression(scale)}" if scale else "" for scale in self._scales(name)]
             factors += [factors[-1] if factors else ""] * len(value[0])
-            rows = (", ".join(f"{_number(one)}{by}" for one, by in zip(row, factors, strict=False)) for row in value)
+            rows = (
+                ", ".join(f"{_number(number)}{by}" for number, by in zip(row, factors, strict=False)) for row in value
+            )
             return f"[{'; '.join(rows)}]"
-        return "{" + ", ".join(self._plain(name, one) for one in value) + "}"
+        return "{" + ", ".join(self._plain(name, item) for item in value) + "}"
 
     def _refused(self, name: str, value: Any) -> ModelicaTextError:
         return ModelicaTextError(
@@ -320,17 +315,20 @@ def formula_text(formula: Formula, owner: Component, outer: int = 0) -> str:
     if kind == "neg":
         return f"(-{formula_text(operands[0], owner, 3)})"
     if kind not in _PRECEDENCE:
-        return f"{kind}({', '.join(formula_text(one, owner) for one in operands)})"
-    own = _PRECEDENCE[kind]
-    left, right = formula_text(operands[0], owner, own + (kind == "**")), formula_text(operands[1], owner, own + 1)
+        return f"{kind}({', '.join(formula_text(operand, owner) for operand in operands)})"
+    precedence = _PRECEDENCE[kind]
+    left, right = (
+        formula_text(operands[0], owner, precedence + (kind == "**")),
+        formula_text(operands[1], owner, precedence + 1),
+    )
     text = f"{left}{'^' if kind == '**' else f' {kind} '}{right}"
-    return f"({text})" if own < outer else text
+    return f"({text})" if precedence < outer else text
 
 
 def _fields(text: str) -> list[str]:
     if text.startswith("connected "):
         return []
-    return sorted({one.path for one in names_in(parse_expression(text))}, key=len, reverse=True)
+    return sorted({name.path for name in names_in(parse_expression(text))}, key=len, reverse=True)
 
 
 def _there(assembly: Assembly, end: Any) -> str:
@@ -362,20 +360,10 @@ def _class_name(assembly: Assembly) -> str:
 def _arguments(values: Mapping[str, str]) -> str:
     texts = [f"{key} = {value}" if value else key for key, value in values.items()]
     # A modification has no dots: record.P = 1 is record(P = 1).
-    texts = [re.sub(r"^(each )?(\w+)\.(\w+ = .*)$", r"\1\2(\3)", one) for one in texts]
+    texts = [re.sub(r"^(each )?(\w+)\.(\w+ = .*)$", r"\1\2(\3)", text) for text in texts]
     return f"({', '.join(texts)})" if texts else ""
-
-
-def _described(text: str) -> str:
-    quoted = text.replace("\\", "\\\\").replace('"', '\\"')
-    return f' "{quoted}"' if text else ""
 
 
 def _number(value: float) -> str:
     whole = float(value)
     return str(int(whole)) if whole == int(whole) and abs(whole) < 1e15 else repr(whole)
-
-
-def _unit(value: Value) -> str:
-    unit = str(coherent(value.unit))
-    return f'(unit = "{unit}")' if unit not in ("1", "") else ""

@@ -104,17 +104,19 @@ class Written(Assembly):
 
     def events(self) -> Events:
         """Yield the whens and the assertions."""
-        for one in self._happenings:
-            if one.text:
-                yield replace(assert_(self.symbolic(one.branches[0][0][0]), one.text), source=one.source)
+        for happening in self._happenings:
+            if happening.text:
+                yield replace(
+                    assert_(self.symbolic(happening.branches[0][0][0]), happening.text), source=happening.source
+                )
                 continue
-            made = None
-            for conditions, values in one.branches:
+            event = None
+            for conditions, values in happening.branches:
                 active = tuple(self.symbolic(condition) for condition in conditions)
                 new = dict[Any, Any](self._changed(path, value) for path, value in values.items())
-                made = when(active, new) if made is None else made.elsewhen(active, new)
-            if made is not None:
-                yield replace(made, source=one.source)
+                event = when(active, new) if event is None else event.elsewhen(active, new)
+            if event is not None:
+                yield replace(event, source=happening.source)
 
     def _changed(self, path: str, value: Node) -> tuple[Any, Any]:
         """Return what a `when` changes, and its new value."""
@@ -129,8 +131,8 @@ class Written(Assembly):
         """Return minus the power that enters at own connectors, unless parts take it on."""
         joined = {end for ends in self.wires.values() for end in ends}
         total: Any = 0.0
-        for name, one in self.connectors.items():
-            total = total if name in joined else total - one.power()
+        for name, connector in self.connectors.items():
+            total = total if name in joined else total - connector.power()
         return total
 
     def symbolic(self, node: Node, events: bool | None = True) -> Any:
@@ -154,15 +156,15 @@ class Written(Assembly):
             discrete = isinstance(symbol.owner.fields[symbol.name], Discrete)
             return symbol if discrete else ca.SX(symbol) > 0.5
         if kind == "if":
-            made = self.symbolic(args[-1], events)
+            result = self.symbolic(args[-1], events)
             for condition, value in reversed(list(zip(args[:-1:2], args[1::2], strict=True))):
-                made = where(self.symbolic(condition, events), self.symbolic(value, events), made, events=events)
-            return made
+                result = where(self.symbolic(condition, events), self.symbolic(value, events), result, events=events)
+            return result
         if kind == "call":
             events = False if args[0] == "noEvent" else events
-            return self._called(args[0], [self.symbolic(one, events) for one in args[1]], events)
-        made = _OPERATIONS[kind](*(self.symbolic(one, events) for one in args))
-        return silent(made) if events is False and kind in _RELATIONS else made
+            return self._called(args[0], [self.symbolic(argument, events) for argument in args[1]], events)
+        result = _OPERATIONS[kind](*(self.symbolic(argument, events) for argument in args))
+        return silent(result) if events is False and kind in _RELATIONS else result
 
     def _called(self, name: str, values: list[Any], events: bool | None) -> Any:
         if name == "pre" and not (isinstance(values[0], Symbol) and is_a(values[0], Discrete)):
@@ -265,5 +267,5 @@ def _formula(node: Node, prefix: str) -> Formula | None:
     operands = args
     if kind == "call" and args[0] in _IN_FORMULAS:
         operation, operands = args[0], args[1]
-    inner = [_formula(one, prefix) for one in operands] if operation else [None]
-    return None if any(one is None for one in inner) else Formula(operation, tuple(inner))
+    inner = [_formula(operand, prefix) for operand in operands] if operation else [None]
+    return None if any(operand is None for operand in inner) else Formula(operation, tuple(inner))

@@ -108,7 +108,7 @@ def export_html(
         "layout": _layout(), "message_length": MESSAGE_LENGTH,
     }  # fmt: skip
     write_bytes(target, page(model.name, description, content, Path(__file__).parent / "wasm.js").encode())
-    shown = sum(one["shown"] for one in content["variables"])
+    shown = sum(variable["shown"] for variable in content["variables"])
     size, elapsed = target.stat().st_size, time.perf_counter() - begin
     return Page(target, len(content["sliders"]) - 1, shown, size, elapsed)
 
@@ -137,12 +137,12 @@ def page(
         "schematic": schematic, "script": script, "hash": script_hash(script),
     }  # fmt: skip
     text = (folder / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], text)
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], text)
 
 
 def joined_scripts(*files: Path) -> str:
     """Return the script of a page."""
-    return "\n".join(one.read_text(encoding="utf-8").rstrip() for one in files)
+    return "\n".join(file.read_text(encoding="utf-8").rstrip() for file in files)
 
 
 def script_hash(script: str) -> str:
@@ -175,11 +175,11 @@ def page_content(model: CompiledDae, signals: Sequence[Signal], until: float, op
         "variables": list(_variables(model, variables.by_name, signals, units, display)),
         "modes": [
             {
-                "name": one.path, "reference": variables.by_name[one.path].reference, "names": one.names or None,
-                "unit": units.number(ONE), "driving": 1,
+                "name": discrete.path, "reference": variables.by_name[discrete.path].reference,
+                "names": discrete.names or None, "unit": units.number(ONE), "driving": 1,
             }
-            for one in model.flat_discretes
-            if not one.hidden
+            for discrete in model.flat_discretes
+            if not discrete.hidden
         ],
         "units": units.rows,
     }  # fmt: skip
@@ -222,59 +222,72 @@ def _spelled(unit: Unit) -> str:
     if unit in (ONE, ANY):
         return ""
     text = "°" if str(unit) == "deg" else str(unit).replace(".", "·")
-    return re.sub(r"(?<=[A-Za-z])\d+", lambda found: found[0].translate(_HIGH), text)
+    return re.sub(r"(?<=[A-Za-z])\d+", lambda match: match[0].translate(_HIGH), text)
 
 
 def _variables(
-    model: CompiledDae, known: dict[str, FmuVariable], signals: Sequence[Signal], units: _Units, display: Display
+    model: CompiledDae,
+    fmu_variables: dict[str, FmuVariable],
+    signals: Sequence[Signal],
+    units: _Units,
+    display: Display,
 ) -> Iterator[dict[str, Any]]:
     """Variables, each with its value reference; formulas as trees over several references."""
-    names, variables = {one.name for one in signals}, {one.path for one in model.flat_variables} & known.keys()
-    for one in model.flat_variables:
-        if one.path in known and (one.path in names or one.kind in ("local", "output")):
+    names, variables = (
+        {signal_.name for signal_ in signals},
+        {variable.path for variable in model.flat_variables} & fmu_variables.keys(),
+    )
+    for signal in model.flat_variables:
+        if signal.path in fmu_variables and (signal.path in names or signal.kind in ("local", "output")):
             yield {
-                "name": one.path, "reference": known[one.path].reference, "description": one.description,
-                "unit": units.number(parse_unit(display.of(one.path))), "shown": one.path in names,
-                "driving": one.driving,
+                "name": signal.path, "reference": fmu_variables[signal.path].reference,
+                "description": signal.description, "unit": units.number(parse_unit(display.of(signal.path))),
+                "shown": signal.path in names, "driving": signal.driving,
             }  # fmt: skip
-    for one in signals:
-        if one.name not in variables:
+    for signal in signals:
+        if signal.name not in variables:
             references: list[int] = []
             yield {
-                "name": one.name, "tree": _tree(one.formula, known, references), "references": references,
-                "unit": units.number(parse_unit(one.shown_in(display))), "shown": True, "driving": 1,
+                "name": signal.name, "tree": _tree(signal.formula, fmu_variables, references), "references": references,
+                "unit": units.number(parse_unit(signal.shown_in(display))), "shown": True, "driving": 1,
             }  # fmt: skip
 
 
-def _tree(formula: Formula, known: Mapping[str, FmuVariable], references: list[int]) -> Any:
+def _tree(formula: Formula, variables: Mapping[str, FmuVariable], references: list[int]) -> Any:
     """A number; `[place]` for the value of a reference, -1 for time; or `[operation, operands…]`."""
     kind, operands = formula.operation, formula.operands
     if kind in ("number", "quantity"):
         return operands[0] if kind == "number" else si_value(operands[0])
     if kind != "name":
-        return [kind, *(_tree(one, known, references) for one in operands)]
-    if operands[0] != "time" and operands[0] not in known:
+        return [kind, *(_tree(operand, variables, references) for operand in operands)]
+    if operands[0] != "time" and operands[0] not in variables:
         raise UnknownName(f"A page with sliders cannot show '{operands[0]}': it has variables, parameters and modes.")
     if operands[0] != "time":
-        references.append(known[operands[0]].reference)
+        references.append(variables[operands[0]].reference)
     return [len(references) - 1 if operands[0] != "time" else -1]
 
 
-def _sliders(model: CompiledDae, known: dict[str, FmuVariable], display: Display) -> Iterator[dict[str, Any]]:
+def _sliders(model: CompiledDae, variables: dict[str, FmuVariable], display: Display) -> Iterator[dict[str, Any]]:
     """Adjustable values in the shown unit, with factor and offset to SI units."""
     inputs = (model.flat_variables[k] for k in model.inputs)
-    for one in (*model.flat_parameters, *inputs):
-        if isinstance(one, FlatParameter) and not one.tunable:
+    for quantity in (*model.flat_parameters, *inputs):
+        if isinstance(quantity, FlatParameter) and not quantity.tunable:
             continue
-        about, asked = known[one.path], display.of_quantity(str(one.unit))
-        unit = one.written if isinstance(one, FlatParameter) and one.written and asked == str(one.unit) else None
-        unit = unit or parse_unit(asked)
-        shown = (None if si is None else (si - unit.offset) / unit.factor for si in (about.start, one.min, one.max))
+        about, shown_unit = variables[quantity.path], display.of_quantity(str(quantity.unit))
+        unit = (
+            quantity.written
+            if isinstance(quantity, FlatParameter) and quantity.written and shown_unit == str(quantity.unit)
+            else None
+        )
+        unit = unit or parse_unit(shown_unit)
+        shown = (
+            None if si is None else (si - unit.offset) / unit.factor for si in (about.start, quantity.min, quantity.max)
+        )
         value, least, most = shown
         low, high, log = _span(value or 0.0, least, most)
         yield {
-            "name": one.path, "group": one.path.rpartition(".")[0], "reference": about.reference,
-            "description": one.description, "unit": _spelled(unit), "factor": unit.factor, "offset": unit.offset,
+            "name": quantity.path, "group": quantity.path.rpartition(".")[0], "reference": about.reference,
+            "description": quantity.description, "unit": _spelled(unit), "factor": unit.factor, "offset": unit.offset,
             "value": value or 0.0, "low": low, "high": high, "log": log,
         }  # fmt: skip
 

@@ -97,7 +97,7 @@ def check_format(path: Path, *, moving: bool = False) -> None:
     """
     ending = path.suffix.lower()
     if ending not in FORMATS:
-        raise NetlistError(f"'{path.name}': a schematic can be {', '.join(one[1:] for one in FORMATS)}.")
+        raise NetlistError(f"'{path.name}': a schematic can be {', '.join(suffix[1:] for suffix in FORMATS)}.")
     if moving and ending != ".svg":
         raise NetlistError(f"'{path.name}': only SVG moves.", advice="Write a file that ends with .svg.")
     package = _PACKAGES.get(ending)

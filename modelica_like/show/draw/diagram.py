@@ -129,17 +129,17 @@ def diagram(component: Component, depth: int, notes: Notes | None = None) -> Dia
     for net in nets:
         _mark(net)
     kept = [node for node in nodes.values() if not (node.icon and node.icon.at_ports)]
-    made = Diagram([*kept, *outer.values()], [net for net in nets if len(net.ports) > 1])
+    picture = Diagram([*kept, *outer.values()], [net for net in nets if len(net.ports) > 1])
     for node in kept:
         if node.icon is None:
             _box(node)
-    _orient(made)
+    _orient(picture)
     for node in kept:
         _spread(node)
     for node in outer.values():
         (port,) = node.ports.values()
         node.border = _OPPOSITE[port.side]
-    return made
+    return picture
 
 
 def alone(kind: type[Component]) -> Node:
@@ -169,16 +169,14 @@ def _joined(component: Component) -> Iterator[list[Connector | Symbol]]:
     sets: list[dict[tuple[int, str], Connector | Symbol]] = []
     for statement in component.equations():
         if isinstance(statement, Connection):
-            new = {_identity(end): end for end in statement.ends}
-            for old in [one for one in sets if one.keys() & new.keys()]:
+            new = {
+                (id(end.owner), end.name) if isinstance(end, Symbol) else (id(end), ""): end for end in statement.ends
+            }
+            for old in [net for net in sets if net.keys() & new.keys()]:
                 new = old | new
                 sets.remove(old)
             sets.append(new)
-    yield from (list(one.values()) for one in sets)
-
-
-def _identity(end: Connector | Symbol) -> tuple[int, str]:
-    return (id(end.owner), end.name) if isinstance(end, Symbol) else (id(end), "")
+    yield from (list(net.values()) for net in sets)
 
 
 def _port(end: Connector | Symbol, scope: Component, nodes: dict[str, Node], outer: dict[str, Node]) -> Port:
@@ -244,30 +242,30 @@ def _spread(node: Node) -> None:
             port.along += _BESIDE * (k - (len(there) - 1) / 2)
 
 
-def _orient(made: Diagram) -> None:
+def _orient(picture: Diagram) -> None:
     """Turn nodes so that power flows from west to east: from the first part on, nets are entered from the west."""
-    nets_of: dict[Node, list[Net]] = {node: [] for node in made.nodes}
-    for net in made.nets:
+    nets_of: dict[Node, list[Net]] = {node: [] for node in picture.nodes}
+    for net in picture.nets:
         for port in net.ports:
             nets_of[port.node].append(net)
-    known = set[Node]()
-    for node in made.nodes:
+    reached = set[Node]()
+    for node in picture.nodes:
         for port in node.ports.values() if node.component is None else ():
             port.side = _OPPOSITE[port.side]
-    for first in sorted(made.nodes, key=_rank):
-        if first in known or (first.component is None and any(one.side == "W" for one in _ends(first))):
+    for first in sorted(picture.nodes, key=_rank):
+        if first in reached or (first.component is None and any(end.side == "W" for end in _ends(first))):
             continue
-        known.add(first)
+        reached.add(first)
         pending = deque([first])
         while pending:
             node = pending.popleft()
-            for port in sorted(_ends(node), key=lambda one: one.side != "E"):
+            for port in sorted(_ends(node), key=lambda x: x.side != "E"):
                 for other in (other for net in nets_of[node] if port in net.ports for other in net.ports):
-                    if other.node in known or other.node.component is None or other.signal:
+                    if other.node in reached or other.node.component is None or other.signal:
                         continue
                     if other.side == port.side and other.side in ("W", "E"):
                         other.node.turn()
-                    known.add(other.node)
+                    reached.add(other.node)
                     pending.append(other.node)
 
 

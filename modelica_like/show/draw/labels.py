@@ -39,9 +39,9 @@ class Text:
         return west, self.at[1] - self.size, west + wide, self.at[1] + 2.0
 
 
-def meet(one: Box, other: Box) -> bool:
+def meet(box: Box, other: Box) -> bool:
     """Whether two boxes overlap."""
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+    return box[0] < other[2] and other[0] < box[2] and box[1] < other[3] and other[1] < box[3]
 
 
 def text_width(text: str, size: float) -> float:

@@ -63,13 +63,13 @@ class Layers:
 def layered(diagram: Diagram) -> Layers:
     """Assign every node to a column, let long nets pass between nodes, and order columns so that few lines cross."""
     column_of = _columns(diagram)
-    made = Layers(
+    layers = Layers(
         [[] for _ in range(max(column_of.values(), default=-1) + 1)],
         [Channel() for _ in range(max(column_of.values(), default=-1) + 2)],
     )
     slots = {node: Slot(node) for node in diagram.nodes}
     for node in diagram.nodes:
-        made.columns[column_of[node]].append(slots[node])
+        layers.columns[column_of[node]].append(slots[node])
     for net in diagram.nets:
         met: dict[int, tuple[list[End], list[End]]] = defaultdict(lambda: ([], []))
         for port in net.ports:
@@ -77,13 +77,13 @@ def layered(diagram: Diagram) -> Layers:
             met[column_of[port.node] + east][not east].append(End(slots[port.node], port))
         for k in range(min(met), max(met)):
             passing = Slot(net=net)
-            made.columns[k].append(passing)
+            layers.columns[k].append(passing)
             met[k][1].append(End(passing))
             met[k + 1][0].append(End(passing))
         for k, ends in met.items():
-            made.channels[k].nets[net] = ends
-    _order(made)
-    return made
+            layers.channels[k].nets[net] = ends
+    _order(layers)
+    return layers
 
 
 def _columns(diagram: Diagram) -> dict[Node, int]:
@@ -97,7 +97,7 @@ def _columns(diagram: Diagram) -> dict[Node, int]:
     steps: list[ca.SX] = []
     cost = ca.SX(0)
     spans: list[tuple[ca.SX, int]] = []
-    for net in sorted(diagram.nets, key=lambda one: -one.stroke.weight):
+    for net in sorted(diagram.nets, key=lambda w: -w.stroke.weight):
         west, east = ([port.node for port in net.ports if port.way == way] for way in ("E", "W"))
         for a in west:
             for b in east:
@@ -112,13 +112,13 @@ def _columns(diagram: Diagram) -> dict[Node, int]:
         bounds += [inside - low[k], high[k] - inside]
     for node in nodes:
         if node.border:
-            others = [place[one] for one in nodes if one.border != node.border]
+            others = [place[n] for n in nodes if n.border != node.border]
             steps += [(x[k] - x[place[node]]) * (1 if node.border == "W" else -1) for k in others]
     solution = solve_lp(
         ca.vertcat(x, low, high), cost + 1e-3 * ca.sum1(x), [(ca.vertcat(*steps), 1.0), (ca.vertcat(*bounds), 0.0)]
     )
-    found = [round(float(value)) for value in solution[: len(nodes)]]
-    return {node: value - min(found) for node, value in zip(nodes, found, strict=True)}
+    columns = [round(float(value)) for value in solution[: len(nodes)]]
+    return {node: value - min(columns) for node, value in zip(nodes, columns, strict=True)}
 
 
 def solve_lp(x: ca.SX, cost: ca.SX, least: list[tuple[ca.SX, float | ca.DM]]) -> list[float]:
@@ -133,8 +133,8 @@ def solve_lp(x: ca.SX, cost: ca.SX, least: list[tuple[ca.SX, float | ca.DM]]) ->
     low = ca.vertcat(*[ca.DM.ones(expression.shape[0]) * bound for expression, bound in least])
     problem = {"x": x, "f": cost, "g": g}
     options = {"highs": {"output_flag": False}, "print_time": False, "error_on_fail": True}
-    found = ca.qpsol("schematic", "highs", problem, options)(lbg=low, ubg=ca.inf, lbx=0)
-    return [float(value) for value in ca.vertsplit(found["x"])]
+    solution = ca.qpsol("schematic", "highs", problem, options)(lbg=low, ubg=ca.inf, lbx=0)
+    return [float(value) for value in ca.vertsplit(solution["x"])]
 
 
 def _reaches(after: dict[Node, set[Node]], start: Node, goal: Node) -> bool:
@@ -151,7 +151,7 @@ def _reaches(after: dict[Node, set[Node]], start: Node, goal: Node) -> bool:
 
 def _order(layers: Layers) -> None:
     """Order each column by the mean place of its neighbours, back and forth; keep the best order."""
-    found: list[tuple[float, list[list[Slot]]]] = []
+    orders: list[tuple[float, list[list[Slot]]]] = []
     given = [list(column) for column in layers.columns]
     for begin in (given, [sorted(column, key=_signals_first) for column in given]):
         layers.columns[:] = [list(column) for column in begin]
@@ -161,8 +161,10 @@ def _order(layers: Layers) -> None:
             for n in numbers if east else reversed(numbers):
                 _sort(layers, n, east)
             _swap(layers)
-            found.append((_crossings(layers), [list(column) for column in layers.columns]))
-    layers.columns[:] = min(found, key=lambda one: one[0])[1]
+            places = _places(layers)
+            crossings = sum(_crossings_in(channel, places) for channel in layers.channels)
+            orders.append((crossings, [list(column) for column in layers.columns]))
+    layers.columns[:] = min(orders, key=lambda candidate: candidate[0])[1]
 
 
 def _signals_first(slot: Slot) -> bool:
@@ -177,17 +179,16 @@ def _sort(layers: Layers, n: int, east: bool) -> None:
     channel = layers.channels[n if east else n + 1]
     wanted: dict[Slot, list[tuple[float, int]]] = defaultdict(list)
     for net, (before, after) in channel.nets.items():
-        own, others = (after, before) if east else (before, after)
-        for end in own:
-            near = others or [one for one in own if one is not end]
+        ends, others = (after, before) if east else (before, after)
+        for end in ends:
+            near = others or [e for e in ends if e is not end]
             for other in near:
                 # A port above the middle of its node wants its node lower.
                 offset = (end.port.along if end.port else 0.0) * 0.01
                 wanted[end.slot].append((places[other.slot] + _port_shift(other) - offset, net.stroke.weight))
     column = layers.columns[n]
     mean = {
-        slot: sum(place * weight for place, weight in found) / sum(weight for _, weight in found)
-        for slot, found in wanted.items()
+        slot: sum(place * weight for place, weight in h) / sum(weight for _, weight in h) for slot, h in wanted.items()
     }
     fixed = [slot for slot in column if slot not in mean]
     movable = sorted((slot for slot in column if slot in mean), key=lambda slot: mean[slot])
@@ -205,11 +206,6 @@ def _port_shift(end: End) -> float:
 
 def _places(layers: Layers) -> dict[Slot, float]:
     return {slot: float(k) for column in layers.columns for k, slot in enumerate(column)}
-
-
-def _crossings(layers: Layers) -> float:
-    places = _places(layers)
-    return sum(_crossings_in(channel, places) for channel in layers.channels)
 
 
 def _crossings_in(channel: Channel, places: dict[Slot, float]) -> float:

@@ -73,7 +73,7 @@ class Running:
                 key = y1, spelled(abs(power) * self.span, "J") if self.span else spelled(abs(power))
                 low, high, _ = stretches.get(key, (x1, x2, 0.0))
                 stretches[key] = min(low, x1, x2), max(high, x1, x2), abs(power)
-        for (y, text), (low, high, power) in sorted(stretches.items(), key=lambda one: one[1][0] - one[1][1]):
+        for (y, text), (low, high, power) in sorted(stretches.items(), key=lambda item: item[1][0] - item[1][1]):
             x = (low + high) / 2
             if high - low >= text_width(text, VALUE) and not self.span:
                 yield [Text(text, (x, y + 16.0), VALUE)]
@@ -84,7 +84,7 @@ class Running:
 
 def spelled(value: float, unit: str = "W") -> str:
     """Return a power, or an energy, with a suitable unit."""
-    size, prefix = next((one for one in _PREFIXES if abs(value) >= one[0]), _PREFIXES[-1])
+    size, prefix = next((p for p in _PREFIXES if abs(value) >= p[0]), _PREFIXES[-1])
     return f"{value / size:.3g} {prefix}{unit}"
 
 
@@ -93,9 +93,9 @@ def energy_notes(balance: EnergyBalance) -> Notes:
 
     def told(part: Component) -> list[str]:
         path = path_of(part)
-        own = [row for row in balance if row.component == path or row.component.startswith(f"{path}.")]
-        sums = {"in": 0.0, "out": 0.0, "stored": sum(row.stored for row in own), "lost": sum(row.lost for row in own)}
-        source = sum(row.source for row in own)
+        rows = [row for row in balance if row.component == path or row.component.startswith(f"{path}.")]
+        sums = {"in": 0.0, "out": 0.0, "stored": sum(row.stored for row in rows), "lost": sum(row.lost for row in rows)}
+        source = sum(row.source for row in rows)
         sums["in" if source > 0.0 else "out"] = abs(source)
         return [
             f"{what} {spelled(value, 'J')}, {value / balance.supply:.1%}"
@@ -126,9 +126,9 @@ def running(
     first, last = float(run.time[0]), float(run.time[-1])
     if at is not None and not first <= at <= last:
         raise ValueOutOfRange(f"There is nothing at {at:g} s: the run goes from {first:g} s to {last:g} s.")
-    made = Running(end=last, moving=moving)
+    result = Running(end=last, moving=moving)
     if balance is not None and balance.supply:
-        made.span, made.supply = last - first, balance.supply
+        result.span, result.supply = last - first, balance.supply
     for item in (item for _, item in drawn.everything()):
         if isinstance(item, Placed) and item.node.component is not None and balance is None:
             looks = list(_looks(item.node.component, run))
@@ -136,26 +136,26 @@ def running(
                 now = last if at is None else at
                 looks = [[look for look in looks if look[0] <= now][-1]]
             if looks:
-                made.modes[item.node] = looks
+                result.modes[item.node] = looks
         elif isinstance(item, Line) and flow and not item.stroke.dashed and (pieces := _pieces(item, run, at)):
-            made.powers[item] = pieces
-    _write(drawn, made)
-    return made
+            result.powers[item] = pieces
+    _write(drawn, result)
+    return result
 
 
-def _write(drawn: Sheet, made: Running) -> None:
+def _write(drawn: Sheet, result: Running) -> None:
     """Choose texts at lines that meet no other text, no ground and no other line."""
-    taken = [_moved(box, _sum(at, item.at)) for at, item in drawn.everything()
+    taken = [_moved(box, (at[0] + item.at[0], at[1] + item.at[1])) for at, item in drawn.everything()
              if isinstance(item, Placed) for box in [*(text.box for text in texts(item)), *_marks(item)]]  # fmt: skip
     lines = [(at, item) for at, item in drawn.everything() if isinstance(item, Line)]
     pieces = [(item if a[1] == b[1] else None, _moved((*min(a, b), *max(a, b)), at))
               for at, item in lines for path in item.paths for a, b in pairwise(path)]  # fmt: skip
     for at, line in lines:
         others = [*taken, *(box for other, box in pieces if other is not line)]
-        for said in made.texts(line):
+        for said in result.texts(line):
             boxes = [_moved(text.box, at) for text in said]
             if not any(meet(box, other) for box in boxes for other in others):
-                made.said[line] = said
+                result.said[line] = said
                 taken += boxes
                 break
 
@@ -168,23 +168,21 @@ def _marks(part: Placed) -> Iterator[Box]:
             yield x - MARK, y - MARK / 2, x + MARK, y + MARK
 
 
-def _sum(a: Point, b: Point) -> Point:
-    return a[0] + b[0], a[1] + b[1]
-
-
 def _moved(box: Box, by: Point) -> Box:
     return box[0] + by[0], box[1] + by[1], box[2] + by[0], box[3] + by[1]
 
 
 def _looks(part: Component, run: Trajectories) -> Iterator[tuple[float, str, str]]:
     """When the look of a part changes, to what look, and the mode's name."""
-    name = next((one for one, mode in part.modes.items() if mode.holds), None)
+    name = next((m for m, mode in part.modes.items() if mode.holds), None)
     if name is None:
         return
     path, mode = path_of(part), part.modes[name]
     values = run[f"{path}.{name}"].astype(int)
     # A hold knows its reaction only by the node of the flat system, and some have none.
-    held = next((one for one in getattr(run.model, "holds", ()) if one.component == path and one.reaction >= 0), None)
+    held = next(
+        (hold for hold in getattr(run.model, "holds", ()) if hold.component == path and hold.reaction >= 0), None
+    )
     carried = np.abs(run[run.model.flat_variables[held.reaction].path]) if held else np.ones(len(values))
     changes = [0, *(np.flatnonzero(np.diff(values)) + 1), len(values)]
     for k, end in pairwise(changes):
@@ -204,18 +202,18 @@ def path_of(part: Component) -> str:
 
 def _pieces(line: Line, run: Trajectories, at: float | None) -> list[Piece]:
     """Pieces of a line between its corners and branches, and what passes each: the powers of all parts beyond it."""
-    known = {_rounded(tip): power_into(port, run, at) for port, tip in line.tips.items()}
-    lacking = [tip for tip, power in known.items() if power is None]
-    if len(lacking) > 1 or len(known) < 2:
+    powers = {_rounded(tip): power_into(port, run, at) for port, tip in line.tips.items()}
+    lacking = [tip for tip, power in powers.items() if power is None]
+    if len(lacking) > 1 or len(powers) < 2:
         return []
-    into = {tip: power for tip, power in known.items() if power is not None}
+    into = {tip: power for tip, power in powers.items() if power is not None}
     into |= dict.fromkeys(lacking, -sum(into.values()))
     paths = [[_rounded(corner) for corner in path] for path in line.paths]
     corners = sorted({corner for path in paths for corner in path})
     edges = dict[frozenset[Point], None]()
     for path in paths:
         for a, b in pairwise(path):
-            there = [one for one in corners if _between(one, a, b)]
+            there = [corner for corner in corners if _between(corner, a, b)]
             edges |= dict.fromkeys(frozenset(pair) for pair in pairwise(there) if pair[0] != pair[1])
     return [(min(edge), max(edge), _beyond(edge, edges, into)) for edge in edges]
 
@@ -234,7 +232,7 @@ def _beyond(cut: frozenset[Point], edges: Iterable[frozenset[Point]], into: Mapp
     reached, pending = {start}, [start]
     while pending:
         here = pending.pop()
-        for other in (one for edge in edges if here in edge and edge != cut for one in edge if one not in reached):
+        for other in (v for edge in edges if here in edge and edge != cut for v in edge if v not in reached):
             reached.add(other)
             pending.append(other)
     return sum(power for tip, power in into.items() if tip in reached)
@@ -247,14 +245,14 @@ def power_into(port: Port, run: Trajectories, at: float | None = None) -> float 
     if part is None or connector is None:
         return None
     path = f"{path_of(part)}.{port.name}"
-    known: Mapping[str, np.ndarray] = {
+    columns: Mapping[str, np.ndarray] = {
         name: run[f"{path}.{name}"] for name in connector.fields if f"{path}.{name}" in run
     }
-    flows = [name for name in known if getattr(connector.fields[name], "is_flow", False)]
-    others = [name for name in known if name not in flows]
+    flows = [name for name in columns if getattr(connector.fields[name], "is_flow", False)]
+    others = [name for name in columns if name not in flows]
     if len(flows) != 1 or len(others) != 1:
         return None
-    flow, other = known[flows[0]], known[others[0]]
+    flow, other = columns[flows[0]], columns[others[0]]
     unit = connector.fields[flows[0]].unit
     if unit == _WATT:
         return _at(run.time, flow, at)
@@ -271,8 +269,8 @@ def power_into(port: Port, run: Trajectories, at: float | None = None) -> float 
 
 def used_connector(part: Component, name: str) -> Connector | None:
     """Return a connector of a part, if something is connected to it."""
-    found = part.connectors.get(name)
-    return found if found is not None and found.used else None
+    connector = part.connectors.get(name)
+    return connector if connector is not None and connector.used else None
 
 
 def _at(time: np.ndarray, values: np.ndarray, at: float | None) -> float:

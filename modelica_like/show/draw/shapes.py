@@ -62,12 +62,12 @@ def shapes(drawn: Sheet, modes: Modes, most: int) -> list[Shape]:
         name for _, item in drawn.everything() if isinstance(item, Placed)
         for port in item.node.ports.values() if (name := _motion(port, modes))
     )  # fmt: skip
-    found = list[Shape]()
+    result = list[Shape]()
     for k, mode in enumerate(modes):
-        if mode.oscillates and len(found) < most and (moves := _moves(modes, k, [*names])):
+        if mode.oscillates and len(result) < most and (moves := _moves(modes, k, [*names])):
             title = f"mode {k + 1}: {mode.frequency:.4g} Hz, damping {mode.damping:.3g}{_where(mode)}"
-            found.append(Shape(title, tuple(_stretches(drawn, modes, moves))))
-    return found
+            result.append(Shape(title, tuple(_stretches(drawn, modes, moves))))
+    return result
 
 
 def _where(mode: Mode) -> str:
@@ -109,9 +109,9 @@ def _stretches(drawn: Sheet, modes: Modes, moves: dict[str, float]) -> Iterator[
             continue
         there = {port: x + tip[0] for port, tip in item.tips.items()}
         tips |= there
-        known = next((name for port in there if (name := _motion(port, modes)) in moves), None)
-        if known and len(there) > 1:
-            low, high, value = min(there.values()), max(there.values()), moves[known]
+        mode = next((name for port in there if (name := _motion(port, modes)) in moves), None)
+        if mode and len(there) > 1:
+            low, high, value = min(there.values()), max(there.values()), moves[mode]
             text = f"{round(value, 2) + 0.0:g}".replace("-", "−")
             said = text if text_width(text, VALUE) < high - low else ""
             rigid.append(Stretch((low, value), (high, value), item.stroke, rigid=True, said=said))
@@ -119,9 +119,9 @@ def _stretches(drawn: Sheet, modes: Modes, moves: dict[str, float]) -> Iterator[
         if isinstance(item, Placed) and item.sheet is None:
             ports = [(port, name) for port in item.node.ports.values() if (name := _motion(port, modes)) in moves]
             side = {
-                one: [(tips.get(port, x + item.at[0] + way * item.half[0]), moves[name], port.stroke)
-                      for port, name in ports if name and (port.way == one)]
-                for one, way in (("W", -1.0), ("E", 1.0))
+                v: [(tips.get(port, x + item.at[0] + way * item.half[0]), moves[name], port.stroke)
+                      for port, name in ports if name and (port.way == v)]
+                for v, way in (("W", -1.0), ("E", 1.0))
             }  # fmt: skip
             for (x1, first, stroke), (x2, second, _) in product(side["W"], side["E"]):
                 yield Stretch((x1, first), (x2, second), stroke, rigid=False)

@@ -134,34 +134,34 @@ def sheet(diagram: Diagram) -> Sheet:
             _route(layers.channels[k], heights, placed, tracks, (x, x + width), lines)
             x += width
         there = [placed[slot.node] for slot in column if slot.node]
-        west, east = (max((side * one.room[k] for one in there), default=0.0) for k, side in ((0, -1.0), (2, 1.0)))
+        west, east = (max((side * t.room[k] for t in there), default=0.0) for k, side in ((0, -1.0), (2, 1.0)))
         for slot in column:
             if slot.node:
-                one = placed[slot.node]
-                one.at = x + west, heights[slot]
-                _lead(one, (x, x + west + east), line_of)
+                item = placed[slot.node]
+                item.at = x + west, heights[slot]
+                _lead(item, (x, x + west + east), line_of)
             elif slot.net:
                 lines[slot.net].paths.append([(x, heights[slot]), (x + west + east, heights[slot])])
         x += west + east
     return _fitted(Sheet(list(placed.values()), list(lines.values()), x, 0.0))
 
 
-def _fitted(made: Sheet) -> Sheet:
+def _fitted(drawing: Sheet) -> Sheet:
     """Move everything so that it begins at zero."""
-    tops = [part.at[1] + part.room[1] for part in made.parts]
-    tops += [y for line in made.lines for path in line.paths for _, y in path]
-    bottoms = [part.at[1] + part.room[3] for part in made.parts]
-    bottoms += [y for line in made.lines for path in line.paths for _, y in path]
+    tops = [part.at[1] + part.room[1] for part in drawing.parts]
+    tops += [y for line in drawing.lines for path in line.paths for _, y in path]
+    bottoms = [part.at[1] + part.room[3] for part in drawing.parts]
+    bottoms += [y for line in drawing.lines for path in line.paths for _, y in path]
     top = min(tops, default=0.0)
-    for part in made.parts:
+    for part in drawing.parts:
         part.at = part.at[0], part.at[1] - top
-    for line in made.lines:
+    for line in drawing.lines:
         line.paths = [[(x, y - top) for x, y in path] for path in line.paths]
         line.dots = [(x, y - top) for x, y in line.dots]
         line.tips = {port: (x, y - top) for port, (x, y) in line.tips.items()}
         line.arrows = [((x, y - top), way) for (x, y), way in line.arrows]
-    made.height = max(bottoms, default=0.0) - top
-    return made
+    drawing.height = max(bottoms, default=0.0) - top
+    return drawing
 
 
 def _measure(node: Node) -> Placed:
@@ -227,7 +227,7 @@ def _heights(layers: Layers, placed: dict[Node, Placed]) -> dict[Slot, float]:
     apart: list[tuple[ca.SX, float]] = []
     for column in layers.columns:
         for a, b in pairwise(column):
-            low, high = (placed[one.node].room if one.node else (0.0, 0.0, 0.0, 0.0) for one in (a, b))
+            low, high = (placed[end.node].room if end.node else (0.0, 0.0, 0.0, 0.0) for end in (a, b))
             gap = _GAP if a.node and b.node else _PASSING
             apart.append((y[place[b]] - y[place[a]], low[3] - high[1] + gap))
     spans: list[tuple[list[ca.SX], int]] = []
@@ -239,7 +239,7 @@ def _heights(layers: Layers, placed: dict[Node, Placed]) -> dict[Slot, float]:
             chain = 1 + all(_single(end) for end in (*before, *after))
             spans.append((ends, net.stroke.weight * (1 + passing) * chain))
             # Of several branches, the one that continues stays straight.
-            through = [one for one, end in zip(ends, (*before, *after), strict=True) if _goes_on(end)]
+            through = [other for other, end in zip(ends, (*before, *after), strict=True) if _goes_on(end)]
             if 1 < len(through) < len(ends):
                 spans.append((through, net.stroke.weight))
     low, high, off = (
@@ -253,8 +253,8 @@ def _heights(layers: Layers, placed: dict[Node, Placed]) -> dict[Slot, float]:
     least += [(off - (y - middle), 0.0), (off - (middle - y), 0.0)]
     # All unknowns are positive: add the space above.
     base = 1e4
-    found = solve_lp(ca.vertcat(y, middle, low, high, off), cost, [*least, (y - base, 0.0)])
-    return {slot: round(value, 3) for slot, value in zip(slots, found[: len(slots)], strict=True)}
+    solution = solve_lp(ca.vertcat(y, middle, low, high, off), cost, [*least, (y - base, 0.0)])
+    return {slot: round(value, 3) for slot, value in zip(slots, solution[: len(slots)], strict=True)}
 
 
 def _straighten(layers: Layers, heights: dict[Slot, float], placed: dict[Node, Placed]) -> None:
@@ -267,9 +267,9 @@ def _straighten(layers: Layers, heights: dict[Slot, float], placed: dict[Node, P
                 port = end.port
                 if port is None or port.side not in ("N", "S"):
                     continue
-                column = next(one for one in layers.columns if end.slot in one)
+                column = next(c for c in layers.columns if end.slot in c)
                 outermost = column[0 if port.side == "N" else -1] is end.slot
-                alone = sum(one.side == port.side for one in port.node.ports.values()) == 1
+                alone = sum(p.side == port.side for p in port.node.ports.values()) == 1
                 wanted = heights[other.slot] + _offset(other, placed) - heights[end.slot]
                 away = wanted < _offset(end, placed) if port.side == "N" else wanted > _offset(end, placed)
                 clear = port.side == "N" or placed[port.node].above
@@ -280,7 +280,7 @@ def _straighten(layers: Layers, heights: dict[Slot, float], placed: dict[Node, P
 def _single(end: End) -> bool:
     """Whether the part has one connector on this side."""
     ports = end.slot.node.ports.values() if end.slot.node else ()
-    return sum(not one.signal and end.port is not None and one.side == end.port.side for one in ports) <= 1
+    return sum(not port.signal and end.port is not None and port.side == end.port.side for port in ports) <= 1
 
 
 def _goes_on(end: End) -> bool:
@@ -323,8 +323,8 @@ def _cost(order: Sequence[Net], ends: dict[Net, tuple[list[float], ...]]) -> flo
         for other in order[k + 1 :]:
             low, high = min(map(min, filter(None, ends[other]))), max(map(max, filter(None, ends[other])))
             total += sum(low < y < high for y in after)
-            own = [*before, *after]
-            total += sum(min(own) < y < max(own) for y in ends[other][0])
+            all_ends = [*before, *after]
+            total += sum(min(all_ends) < y < max(all_ends) for y in ends[other][0])
             total += 100.0 * sum(abs(a - b) < 4.0 for a in after for b in ends[other][0])
     return total
 

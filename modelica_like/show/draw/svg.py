@@ -39,11 +39,14 @@ def svg(
     width, below = drawn.width + 2 * _MARGIN, drawn.height + 2 * _MARGIN
     height = below + _STRIP * len(shapes)
     strokes = {item.stroke.name: item.stroke for _, item in drawn.everything() if isinstance(item, Line)}
+    dark = _DARK | {name: colour for name, (_, colour) in _LOOKS.items() if run.modes}
+    rules = [f".{key}{{fill:{colour}}}.{key}-line{{stroke:{colour}}}" for key, colour in dark.items()]
+    rules += [f".{_css(s)}{{stroke:{s.dark}}}.{_css(s)}-dot{{fill:{s.dark}}}" for s in strokes.values()]
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{_n(width)}" height="{_n(height)}" '
         f'viewBox="0 0 {_n(width)} {_n(height)}" font-family="{_FONT}">',
         f"<title>{escape(title)}</title>",
-        _dark(strokes, looks=bool(run.modes)),
+        f"<style>@media (prefers-color-scheme: dark){{{''.join(rules)}}}</style>",
     ]
     if background:
         parts.append(f'<rect class="paper" width="{_n(width)}" height="{_n(height)}" fill="{_PAPER}"/>')
@@ -63,13 +66,6 @@ def svg(
 
 def _n(value: float) -> str:
     return f"{round(value, 2) + 0.0:g}"
-
-
-def _dark(strokes: dict[str, Stroke], *, looks: bool) -> str:
-    dark = _DARK | {name: colour for name, (_, colour) in _LOOKS.items() if looks}
-    rules = [f".{key}{{fill:{colour}}}.{key}-line{{stroke:{colour}}}" for key, colour in dark.items()]
-    rules += [f".{_css(one)}{{stroke:{one.dark}}}.{_css(one)}-dot{{fill:{one.dark}}}" for one in strokes.values()]
-    return f"<style>@media (prefers-color-scheme: dark){{{''.join(rules)}}}</style>"
 
 
 def _css(stroke: Stroke) -> str:
@@ -107,8 +103,8 @@ def _line(at: Point, line: Line, run: Running) -> Iterator[str]:
             f'<circle class="{_css(stroke)}-dot" cx="{_n(at[0] + x)}" cy="{_n(at[1] + y)}" '
             f'r="{_n(stroke.width + 1.0)}" fill="{stroke.colour}"/>'
         )
-    for one in run.said.get(line, ()):
-        yield _text(replace(one, at=(at[0] + one.at[0], at[1] + one.at[1])))
+    for text in run.said.get(line, ()):
+        yield _text(replace(text, at=(at[0] + text.at[0], at[1] + text.at[1])))
     for (x, y), way in line.arrows:
         turn = {"E": 0, "S": 90, "W": 180, "N": 270}[way]
         yield (
@@ -134,8 +130,8 @@ def _part(at: Point, part: Placed, run: Running) -> Iterator[str]:
     for port in node.ports.values():
         if port.mark:
             yield from _mark(part, port.side, port.along, port.mark, port.stroke)
-    for one in texts(part):
-        yield _text(one)
+    for text in texts(part):
+        yield _text(text)
     yield "</g>"
 
 
@@ -148,26 +144,27 @@ def _shape(shape: Shape, top: float, width: float) -> Iterator[str]:
         f'stroke-width="0.75" stroke-dasharray="2 3"/>'
     )
     written = list[Text]()
-    for one in shape.stretches:
-        (x1, y1), (x2, y2) = ((_MARGIN + x, zero - _SWING * y) for x, y in (one.begin, one.end))
+    for stretch in shape.stretches:
+        (x1, y1), (x2, y2) = ((_MARGIN + x, zero - _SWING * y) for x, y in (stretch.begin, stretch.end))
         yield (
-            f'<path class="{_css(one.stroke)}" d="M{_n(x1)} {_n(y1)} L{_n(x2)} {_n(y2)}" '
-            f'stroke="{one.stroke.colour}" stroke-width="{_n(3.5 if one.rigid else 1.25)}" stroke-linecap="round"/>'
+            f'<path class="{_css(stretch.stroke)}" d="M{_n(x1)} {_n(y1)} L{_n(x2)} {_n(y2)}" '
+            f'stroke="{stretch.stroke.colour}" stroke-width="{_n(3.5 if stretch.rigid else 1.25)}" '
+            'stroke-linecap="round"/>'
         )
-        said = Text(one.said, ((x1 + x2) / 2, y1 + (14.0 if y1 > zero else -5.0)), VALUE)
+        said = Text(stretch.said, ((x1 + x2) / 2, y1 + (14.0 if y1 > zero else -5.0)), VALUE)
         # Branches lie above one another: the first number stays.
-        if one.said and not any(meet(said.box, other.box) for other in written):
+        if stretch.said and not any(meet(said.box, other.box) for other in written):
             written.append(said)
             yield _text(said)
 
 
-def _text(one: Text, look: str = "") -> str:
-    kind = look or ("grey" if one.size == VALUE else "ink")
-    fill = _LOOKS[look][0] if look else _GREY if one.size == VALUE else _INK
-    bold = "" if one.size == VALUE else ' font-weight="bold"'
+def _text(text: Text, look: str = "") -> str:
+    kind = look or ("grey" if text.size == VALUE else "ink")
+    fill = _LOOKS[look][0] if look else _GREY if text.size == VALUE else _INK
+    bold = "" if text.size == VALUE else ' font-weight="bold"'
     return (
-        f'<text class="{kind}" x="{_n(one.at[0])}" y="{_n(one.at[1])}" fill="{fill}" '
-        f'font-size="{_n(one.size)}" text-anchor="{one.anchor}"{bold}>{escape(one.text)}</text>'
+        f'<text class="{kind}" x="{_n(text.at[0])}" y="{_n(text.at[1])}" fill="{fill}" '
+        f'font-size="{_n(text.size)}" text-anchor="{text.anchor}"{bold}>{escape(text.text)}</text>'
     )
 
 
@@ -193,7 +190,7 @@ def _looks(
     for look, name in dict.fromkeys((look, name) for _, look, name in looks):
         if run.moving:
             times = [0.0, *(min(time / run.end, 1.0) for time, *_ in looks[1:])]
-            shown = ["visible" if one[1:] == (look, name) else "hidden" for one in looks]
+            shown = ["visible" if x[1:] == (look, name) else "hidden" for x in looks]
             yield (
                 f'<g visibility="{shown[0]}"><animate attributeName="visibility" calcMode="discrete" '
                 f'values="{";".join(shown)}" keyTimes="{";".join(_n(time) for time in times)}" {_CYCLE}/>'

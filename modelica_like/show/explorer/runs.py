@@ -43,27 +43,27 @@ class Runs:
     def __init__(self, drive: Assembly, model: CompiledDae, options: Options) -> None:
         self._drive, self._model, self._options = drive, model, options
         self._instance = Instance(model)
-        self.references = {name: one.reference for name, one in self._instance.native.variables.items()}
+        self.references = {name: variable.reference for name, variable in self._instance.native.variables.items()}
         self._names = {reference: name for name, reference in self.references.items()}
-        self._settable = {self.references[one.path] for one in model.flat_parameters if one.tunable}
+        self._settable = {self.references[parameter.path] for parameter in model.flat_parameters if parameter.tunable}
         self._settable |= {self.references[model.flat_variables[k].path] for k in model.inputs}
         self._running, self._analysing = threading.Lock(), threading.Lock()
 
-    def values(self, asked: Mapping[str, Any]) -> list[tuple[int, float]]:
+    def values(self, request: Mapping[str, Any]) -> list[tuple[int, float]]:
         """Return the value references of parameters and inputs in a request, with what they are, in SI units.
 
         Raises:
             KeyError, TypeError, ValueError: the request is wrong.
         """
-        return [(_known(reference, self._settable), number(value)) for reference, value in asked["values"]]
+        return [(_known(reference, self._settable), number(value)) for reference, value in request["values"]]
 
-    def outputs(self, asked: Mapping[str, Any]) -> list[int]:
+    def outputs(self, request: Mapping[str, Any]) -> list[int]:
         """Return the value references of the outputs in a request.
 
         Raises:
             KeyError, TypeError, ValueError: the request is wrong.
         """
-        return [_known(reference, self._names) for reference in asked["references"]]
+        return [_known(reference, self._names) for reference in request["references"]]
 
     def run(
         self, values: Sequence[tuple[int, float]], references: Sequence[int], until: float, wanted: Callable[[], bool]
@@ -104,7 +104,9 @@ class Runs:
 
     def _begin(self, values: Sequence[tuple[int, float]], until: float) -> None:
         instance = self._instance
-        references, numbers = (np.array([one[k] for one in values], kind) for k, kind in ((0, np.uint32), (1, float)))
+        references, numbers = (
+            np.array([value[k] for value in values], kind) for k, kind in ((0, np.uint32), (1, float))
+        )
         instance.reset(0.0, until, self._options.rtol, self._options.atol)
         place = references.ctypes.data, numbers.ctypes.data
         instance.check(instance.library.set(instance.address, len(values), *place))
@@ -143,11 +145,11 @@ class Runs:
         """
         given = {self._names[reference]: value for reference, value in values}
         with self._analysing:
-            found = sensitivities(self._model, [output], until=until, parameters=given)
-        (end,) = found.outputs
+            sensitivity = sensitivities(self._model, [output], until=until, parameters=given)
+        (end,) = sensitivity.outputs
         rows = [
-            (one.name, relative if end.value else 0.01 * one.value * derivative)
-            for one, derivative, relative in found.ranking(output)
+            (quantity.name, relative if end.value else 0.01 * quantity.value * derivative)
+            for quantity, derivative, relative in sensitivity.ranking(output)
         ]
         rows = [row for row in rows if row[1]][:_MOST_BARS]
         caption = (
@@ -192,7 +194,7 @@ def number(value: Any) -> float:
     return float(value)
 
 
-def _known(reference: Any, known: Collection[int]) -> int:
-    if not isinstance(reference, int) or reference not in known:
+def _known(reference: Any, allowed: Collection[int]) -> int:
+    if not isinstance(reference, int) or reference not in allowed:
         raise ValueError(f"there is no reference {reference}")
     return reference

@@ -167,10 +167,10 @@ class _Handler(BaseHTTPRequestHandler):
         self.rfile = io.BufferedReader(_Arriving(self.connection, time.monotonic() + _PATIENCE))
 
     def do_GET(self) -> None:
-        asked = urlsplit(self.path)
-        if not self._known(parse_qs(asked.query).get("token", [""])[0]):
+        address = urlsplit(self.path)
+        if not self._known(parse_qs(address.query).get("token", [""])[0]):
             return
-        if asked.path == "/":
+        if address.path == "/":
             self._answer(HTTPStatus.OK, self.server.page, "text/html; charset=utf-8")
         else:
             self._answer(HTTPStatus.NOT_FOUND, b"There is nothing here.")
@@ -188,8 +188,8 @@ class _Handler(BaseHTTPRequestHandler):
             getattr(self, self._kinds[self.path])(json.loads(body))
         except ModelicaLikeError as error:
             # Told in the page, with an answer that browsers do not report as a failure.
-            told = " ".join(filter(None, (error.what, error.why, error.advice)))
-            self._answer(HTTPStatus.OK, told.encode(), refused=True)
+            message = " ".join(filter(None, (error.what, error.why, error.advice)))
+            self._answer(HTTPStatus.OK, message.encode(), refused=True)
         except _WRONG as error:
             self._answer(HTTPStatus.BAD_REQUEST, f"The request is wrong: {error!r}.".encode())
 
@@ -213,25 +213,27 @@ class _Handler(BaseHTTPRequestHandler):
         finally:
             self.connection.settimeout(_PATIENCE)
 
-    def _run(self, asked: Mapping[str, Any]) -> None:
+    def _run(self, request: Mapping[str, Any]) -> None:
         runs = self.server.runs
-        found = runs.run(runs.values(asked), runs.outputs(asked), number(asked["until"]), self._waits)
-        if found is None:
+        result = runs.run(runs.values(request), runs.outputs(request), number(request["until"]), self._waits)
+        if result is None:
             return
-        about, arrays = found
-        head = json.dumps(about | {"sizes": [one.size for one in arrays]}).encode()
+        about, arrays = result
+        head = json.dumps(about | {"sizes": [array.size for array in arrays]}).encode()
         head += b" " * (-len(head) % 8)
-        parts = [np.array([len(head)], "<i8"), *(np.asarray(one, "<f8") for one in arrays)]
-        self._answer(HTTPStatus.OK, b"".join((parts[0].tobytes(), head, *(one.tobytes() for one in parts[1:]))))
+        parts = [np.array([len(head)], "<i8"), *(np.asarray(array, "<f8") for array in arrays)]
+        self._answer(HTTPStatus.OK, b"".join((parts[0].tobytes(), head, *(part.tobytes() for part in parts[1:]))))
 
-    def _ranking(self, asked: Mapping[str, Any]) -> None:
-        rows = self.server.runs.ranking(self.server.runs.values(asked), number(asked["until"]), str(asked["output"]))
+    def _ranking(self, request: Mapping[str, Any]) -> None:
+        rows = self.server.runs.ranking(
+            self.server.runs.values(request), number(request["until"]), str(request["output"])
+        )
         self._answer(HTTPStatus.OK, json.dumps(rows).encode(), "application/json")
 
-    def _save(self, asked: Mapping[str, Any]) -> None:
-        runs, what, until = self.server.runs, str(asked["what"]), number(asked["until"])
+    def _save(self, request: Mapping[str, Any]) -> None:
+        runs, what, until = self.server.runs, str(request["what"]), number(request["until"])
         try:
-            said, refused = str(runs.save(what, runs.values(asked), until, self.server.folder)), False
+            said, refused = str(runs.save(what, runs.values(request), until, self.server.folder)), False
         except OSError as error:
             said, refused = str(error), True
         self._answer(HTTPStatus.OK, said.encode(), refused=refused)

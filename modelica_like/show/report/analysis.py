@@ -31,14 +31,14 @@ def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> Renderable
     """Return the powers of an operating point, its efficiency, and the values of variables."""
     model = point.model
     powers = point.powers
-    largest = max((abs(one) for pair in powers.values() for one in pair), default=0.0)
+    largest = max((abs(value) for pair in powers.values() for value in pair), default=0.0)
     rows = [
         (path or model.name, source, loss)
         for path, (source, loss) in powers.items()
         if max(abs(source), abs(loss)) > _SMALL * largest
     ]
-    made = table("powers in W", "component", "from outside>.6g", "lost>.6g", rows=rows)
-    parts: list[RenderableType] = [f"[bold]{escape(model.name)}[/]  steady state", "", made]
+    tables = table("powers in W", "component", "from outside>.6g", "lost>.6g", rows=rows)
+    parts: list[RenderableType] = [f"[bold]{escape(model.name)}[/]  steady state", "", tables]
     if np.isfinite(point.efficiency):
         parts.append(f"Efficiency {100 * point.efficiency:.4g} %.")
     if point.stuck:
@@ -47,7 +47,7 @@ def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> Renderable
 
 
 def _values(point: OperatingPoint, names: Sequence[str]) -> Listed:
-    units = {one.path: str(one.unit) for one in (*point.model.flat_variables, *point.model.flat_parameters)}
+    units = {v.path: str(v.unit) for v in (*point.model.flat_variables, *point.model.flat_parameters)}
     rows = ((name, point[name], units.get(name, "")) for name in names)
     return table("values", "name", "value>.8g", "unit", rows=rows)
 
@@ -65,12 +65,12 @@ def modes_report(modes: Modes) -> RenderableType:
     """Return eigenvalues, damping, and the components that store and lose the energy of each mode."""
     linear = modes.linear
     head = f"[bold]{escape(linear.model.name)}[/]  {len(linear.states)} states at t = {linear.time:g} s"
-    made = table(
+    tables = table(
         "modes", "mode>", "eigenvalue in rad/s>.5g", "frequency in Hz>.4g", "damping>.3g", "time constant in s>.3g",
         "energy in", "lost in",
         rows=[(k, *_numbers(mode), _shares(mode.stored), _shares(mode.lost)) for k, mode in enumerate(modes, 1)],
     )  # fmt: skip
-    parts: list[RenderableType] = [head, "", made]
+    parts: list[RenderableType] = [head, "", tables]
     if linear.held:
         parts.append(f"[dim]Held by modes that are active there: {escape(', '.join(linear.held))}.[/]")
     return Group(*parts)
@@ -84,13 +84,13 @@ def _numbers(mode: Mode) -> tuple[Any, ...]:
     return Shown(f"{value.real:.5g}", [value.real, 0.0]), nothing, nothing, mode.time_constant if value else nothing
 
 
-def _shares(found: dict[str, float]) -> Shown:
-    return Shown(shares(found), found)
+def _shares(share_of: dict[str, float]) -> Shown:
+    return Shown(shares(share_of), share_of)
 
 
-def shares(found: dict[str, float]) -> str:
+def shares(share_of: dict[str, float]) -> str:
     """Return the largest shares of components as text."""
-    shown = [(path, share) for path, share in found.items() if abs(share) >= _LEAST_SHARE][:_SHARES_SHOWN]
+    shown = [(path, share) for path, share in share_of.items() if abs(share) >= _LEAST_SHARE][:_SHARES_SHOWN]
     return ", ".join(f"{path} {100 * share:.0f} %" for path, share in shown)
 
 
@@ -100,8 +100,8 @@ def sensitivity_report(result: Sensitivities) -> RenderableType:
     for output in result.outputs:
         title, texts = result.table(output.name)
         rows = (
-            (name, Shown(value, one.value), unit, Shown(text, derivative), Shown(per_cent, relative))
-            for (name, value, unit, text, per_cent), (one, derivative, relative) in zip(
+            (name, Shown(value, quantity.value), unit, Shown(text, derivative), Shown(per_cent, relative))
+            for (name, value, unit, text, per_cent), (quantity, derivative, relative) in zip(
                 texts, result.ranking(output.name), strict=True
             )
         )
@@ -114,31 +114,33 @@ def sensitivity_report(result: Sensitivities) -> RenderableType:
     return Group(*parts)
 
 
-def sweep_report(found: xarray.Dataset) -> RenderableType:
+def sweep_report(dataset: xarray.Dataset) -> RenderableType:
     """Return smallest and largest value of every output with the parameters there, failures and differences."""
-    names = [str(name) for name in found.data_vars if name != "failure"]
-    told = found["failure"].to_numpy().ravel()
-    failed = int(np.sum(told != ""))
+    names = [str(name) for name in dataset.data_vars if name != "failure"]
+    failures = dataset["failure"].to_numpy().ravel()
+    failed = int(np.sum(failures != ""))
     rows: list[tuple[Any, ...]] = []
     for name in names:
-        values = found[name]
+        values = dataset[name]
         if not np.any(np.isfinite(values.to_numpy())):
             rows.append((name, values.attrs["units"], "none"))
             continue
         low, high = values.argmin(...), values.argmax(...)
         smallest, largest = float(values.min()), float(values.max())
-        rows.append((name, values.attrs["units"], smallest, _where(found, low), largest, _where(found, high)))
-    made = table("extremes", "output", "unit", "smallest>.6g", "smallest at", "largest>.6g", "largest at", rows=rows)
-    parts: list[RenderableType] = [f"[bold]{escape(found.attrs['model'])}[/]  {told.size} runs", "", made]
+        rows.append((name, values.attrs["units"], smallest, _where(dataset, low), largest, _where(dataset, high)))
+    tables = table("extremes", "output", "unit", "smallest>.6g", "smallest at", "largest>.6g", "largest at", rows=rows)
+    parts: list[RenderableType] = [f"[bold]{escape(dataset.attrs['model'])}[/]  {failures.size} runs", "", tables]
     if failed:
         parts.append(f"{failed} runs failed:")
-        parts += [f"  {escape(text.splitlines()[0])}" for text in dict.fromkeys(told[told != ""][:_FAILURES_TOLD])]
-    if found.attrs.get("notice"):
-        parts.append(escape(found.attrs["notice"]))
+        parts += [
+            f"  {escape(text.splitlines()[0])}" for text in dict.fromkeys(failures[failures != ""][:_FAILURES_TOLD])
+        ]
+    if dataset.attrs.get("notice"):
+        parts.append(escape(dataset.attrs["notice"]))
     return Group(*parts)
 
 
-def _where(found: xarray.Dataset, place: Mapping[Any, xarray.DataArray]) -> Shown:
-    point = found.isel({str(key): value.item() for key, value in place.items()})
+def _where(dataset: xarray.Dataset, place: Mapping[Any, xarray.DataArray]) -> Shown:
+    point = dataset.isel({str(key): value.item() for key, value in place.items()})
     values = {str(name): point[name].item() for name in point.coords}
     return Shown(", ".join(f"{name} = {value:.6g}" for name, value in values.items()), values)

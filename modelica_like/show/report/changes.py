@@ -42,20 +42,20 @@ class Change:
 
 def changes(run: Trajectories) -> list[Change]:
     """Return what happens at the events of a run, in their order."""
-    hidden = {one.path for one in run.model.flat_discretes if one.hidden}
-    found: list[Change] = []
+    hidden = {discrete.path for discrete in run.model.flat_discretes if discrete.hidden}
+    result: list[Change] = []
     for _, group in groupby(zip(run.events, reasons(run), strict=True), key=lambda pair: pair[0].time):
         pairs = list(group)
-        found += [_plain(event, why) for event, why in pairs if event.mode not in hidden]
+        result += [_plain(event, why) for event, why in pairs if event.mode not in hidden]
         first = pairs[0][0].round  # later rounds follow from it
         behind = [_plain(event, why) for event, why in pairs if event.mode in hidden and event.round == first]
-        found += _visible(run, behind, timed=all(_timed(run, event) for event, _ in pairs)) if behind else []
-    return found
+        result += _visible(run, behind, timed=all(_timed(run, event) for event, _ in pairs)) if behind else []
+    return result
 
 
 def reasons(run: Trajectories) -> list[str]:
     """Return in words why each of the events happened, parameters with their values; nothing where nobody knows."""
-    known: dict[tuple[str, int], str] = {}
+    texts: dict[tuple[str, int], str] = {}
 
     def valued(path: str) -> str:
         unit = str(run.model.units[path])
@@ -63,11 +63,11 @@ def reasons(run: Trajectories) -> list[str]:
 
     for event in run.events:
         key, (component, dot, _) = (event.mode, event.transition), event.mode.rpartition(".")
-        if key not in known:
+        if key not in texts:
             by_itself = "an impact" if event.source.file else ""  # FMUs do not tell why
             because = by_itself if event.transition < 0 else run.model.transitions[event.transition].because
-            known[key] = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: valued(owner + name[1]), because)
-    return [known[event.mode, event.transition] for event in run.events]
+            texts[key] = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: valued(owner + name[1]), because)
+    return [texts[event.mode, event.transition] for event in run.events]
 
 
 def _plain(event: Event, why: str) -> Change:
@@ -82,19 +82,21 @@ def _visible(run: Trajectories, behind: Sequence[Change], *, timed: bool) -> lis
     """What users see of events of relations and clocks: discrete variables that change, else the reasons themselves."""
     at = behind[0].time
     first, last = np.searchsorted(run.time, at), max(np.searchsorted(run.time, at, "right") - 1, 0)
-    found: list[Change] = []
+    result: list[Change] = []
     numbers: list[Change] = []
-    for one in (one for one in run.model.flat_discretes if not one.hidden and not one.names):
-        before, after = (float(run[one.path][side]) for side in (first, last))
+    for discrete in (d for d in run.model.flat_discretes if not d.hidden and not d.names):
+        before, after = (float(run[discrete.path][side]) for side in (first, last))
         if before != after:
-            owner = one.path.rpartition(".")[0]
-            own = [change for change in behind if change.owner == owner] or behind
-            why = ", ".join(dict.fromkeys(change.because for change in own if change.because))
-            told = Change(at, one.path, _value(one.kind, before), _value(one.kind, after), why, own[0].source)
-            (numbers if one.kind == "number" else found).append(told)
-    if timed or found:  # numbers change at every tick
-        return found
-    owners = (Change(at, one.owner or run.model.name, "", "", one.because, one.source) for one in behind)
+            owner = discrete.path.rpartition(".")[0]
+            causes = [change for change in behind if change.owner == owner] or behind
+            why = ", ".join(dict.fromkeys(change.because for change in causes if change.because))
+            visible = Change(
+                at, discrete.path, _value(discrete.kind, before), _value(discrete.kind, after), why, causes[0].source
+            )
+            (numbers if discrete.kind == "number" else result).append(visible)
+    if timed or result:  # numbers change at every tick
+        return result
+    owners = (Change(at, change.owner or run.model.name, "", "", change.because, change.source) for change in behind)
     return numbers or list(dict.fromkeys(owners))  # several relations of one line say the same
 
 

@@ -62,7 +62,14 @@ def _label(source: Source) -> str:
 
 def comparison_report(comparison: Comparison) -> RenderableType:
     """Return the deviations, the events and the largest of both."""
-    parts: list[RenderableType] = [_deviation_table(comparison)]
+    rows = [
+        (row.signal, float(row.largest), "" if row.unit == "1" else row.unit, float(row.relative), float(row.time))
+        for row in comparison.deviations
+    ]
+    parts: list[RenderableType] = [table(
+        " and ".join(comparison.labels), "signal", "largest deviation>.3e", "unit", "of the range>.1e",
+        "at time in s>.6g", rows=rows, name="deviations", most=_SHOWN, rest=", that deviate less",
+    )]  # fmt: skip
     if comparison.events:
         parts += ["", _event_table(comparison)]
     if starts := comparison.starts:
@@ -72,17 +79,6 @@ def comparison_report(comparison: Comparison) -> RenderableType:
     if comparison.interpolated:
         parts += ["", "[dim]Their results have different times; the second is interpolated linearly.[/]"]
     return Group(*parts)
-
-
-def _deviation_table(comparison: Comparison) -> Listed:
-    rows = [
-        (row.signal, float(row.largest), "" if row.unit == "1" else row.unit, float(row.relative), float(row.time))
-        for row in comparison.deviations
-    ]
-    return table(
-        " and ".join(comparison.labels), "signal", "largest deviation>.3e", "unit", "of the range>.1e",
-        "at time in s>.6g", rows=rows, name="deviations", most=_SHOWN, rest=", that deviate less",
-    )  # fmt: skip
 
 
 def _event_table(comparison: Comparison) -> Listed:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from modelica_like.language import Component, Connector, Discrete, Input, Output, Parameter, Variable
 from modelica_like.language.fields import Field
@@ -50,7 +50,7 @@ def filled(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> Li
 def declared(kind: type[Component], notation: Notation) -> list[Listing]:
     """Return listings of connectors, fields, structural fields and modes, without empty ones."""
     code, text = notation.code, notation.text
-    made = [
+    listings = [
         filled(
             "connectors", ("name", "type", "potential, flow", "may be", "description"),
             (_connector_row(name, connector, notation) for name, connector in kind._class_connectors.items()),
@@ -59,25 +59,24 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
     for title, sort in _SORTS.items():
         fields = [field for field in kind._class_fields.values() if sort is _sort_of(field)]
         head = ("name", "symbol", "unit", "default", "range", "description")
-        made.append(filled(title, head, (_field_row(field, notation) for field in fields)))
-    described = {name: one.description for name, one in kind._tables.items()}
+        listings.append(filled(title, head, (_field_row(field, notation) for field in fields)))
+    described = {name: table.description for name, table in kind._tables.items()}
     described |= {name: words for name, words in texts_of_fields(kind).items() if words}
     structure = (
-        (code(name), code(str(default)) if has_default(default) else "required", text(described.get(name, "")))
+        (
+            code(name),
+            code(str(default)) if isinstance(default, bool | int | float | str | tuple | None) else "required",
+            text(described.get(name, "")),
+        )
         for name, default in kind._structural.items()
     )
-    made.append(filled("structure", ("name", "default", "description"), structure))
+    listings.append(filled("structure", ("name", "default", "description"), structure))
     modes = (
-        (code(name), ", ".join(f"{one} ({k})" for k, one in enumerate(mode.names)), mode.start, text(mode.description))
+        (code(name), ", ".join(f"{n} ({k})" for k, n in enumerate(mode.names)), mode.start, text(mode.description))
         for name, mode in kind._class_modes.items()
     )
-    made.append(filled("modes", ("name", "one of (number)", "start", "description"), modes))
-    return [one for one in made if one.rows]
-
-
-def has_default(default: Any) -> bool:
-    """Return whether a structural field has a default."""
-    return isinstance(default, bool | int | float | str | tuple | None)
+    listings.append(filled("modes", ("name", "one of (number)", "start", "description"), modes))
+    return [listing for listing in listings if listing.rows]
 
 
 def _sort_of(field: Field) -> type[Field]:
@@ -86,7 +85,7 @@ def _sort_of(field: Field) -> type[Field]:
 
 def _connector_row(name: str, connector: Connector, notation: Notation) -> tuple[str, ...]:
     free = "optional" if connector.optional else "free" if connector.may_be_free else ""
-    flows = ", ".join(notation.flow(f"{name}.{one.name}", one.unit_text) for one in connector.fields.values())
+    flows = ", ".join(notation.flow(f"{name}.{field.name}", field.unit_text) for field in connector.fields.values())
     return notation.code(name), type(connector).__name__, flows, free, notation.text(connector.description)
 
 

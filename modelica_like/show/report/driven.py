@@ -48,7 +48,7 @@ def driven_notes(drawn: Diagram, run: Solution) -> Iterator[str]:
 def _moves(port: Port) -> bool:
     """Whether it is the end of a shaft or slide."""
     connector = port.node.component and used_connector(port.node.component, port.name)
-    return bool(connector) and any(str(one.unit) in ("rad", "m") for one in connector.fields.values())
+    return bool(connector) and any(str(field.unit) in ("rad", "m") for field in connector.fields.values())
 
 
 def _fall(part: Component, run: Solution) -> tuple[float, float] | None:
@@ -56,16 +56,16 @@ def _fall(part: Component, run: Solution) -> tuple[float, float] | None:
 
     Its stored energy is a force times its way, plus half a mass times its speed squared, and nothing else.
     """
-    ends = [(name, field.name) for name, one in part.connectors.items() if one.used for field in one.fields.values()
-            if str(field.unit) == "m"]  # fmt: skip
+    ends = [(name, field.name) for name, connector in part.connectors.items() if connector.used
+            for field in connector.fields.values() if str(field.unit) == "m"]  # fmt: skip
     path = path_of(part)
     if not ends or part.parts:
         return None
     way, stored = run[f"{path}.{'.'.join(ends[0])}"], run[f"{path}.stored_energy"]
     if np.ptp(stored) == 0.0 or np.ptp(way) == 0.0:
         return None
-    speeds = [one.path for one in run.model.flat_variables
-              if one.path.rpartition(".")[0] == path and str(one.unit) == "m/s"]  # fmt: skip
+    speeds = [variable.path for variable in run.model.flat_variables
+              if variable.path.rpartition(".")[0] == path and str(variable.unit) == "m/s"]  # fmt: skip
     terms = [np.ones_like(way), way - way[0], *(run[speed] ** 2 for speed in speeds[:1])]
     columns = np.column_stack([term / (np.max(np.abs(term)) or 1.0) for term in terms])
     factors, *_ = np.linalg.lstsq(columns, stored, rcond=None)
@@ -80,7 +80,7 @@ def _chains(drawn: Diagram) -> list[list[Node]]:
     chains: list[list[Node]] = []
     for net in drawn.nets:
         new = [port.node for port in net.ports if _moves(port)]
-        for old in [one for one in chains if any(node in one for node in new)]:
+        for old in [chain for chain in chains if any(node in chain for node in new)]:
             new = [*old, *(node for node in new if node not in old)]
             chains.remove(old)
         chains += [new] if new else []
@@ -89,15 +89,15 @@ def _chains(drawn: Diagram) -> list[list[Node]]:
 
 def _givers(group: list[Node], run: Solution, rows: tuple[EnergyRow, ...], least: float) -> list[Node]:
     """Return the parts at the ends of a chain that push it; none if something there takes energy out."""
-    span, found = float(run.time[-1] - run.time[0]), list[Node]()
+    span, nodes = float(run.time[-1] - run.time[0]), list[Node]()
     for node in group:
         ports = [port for port in node.ports.values() if _moves(port)]
         if len(ports) != 1 or node.component is None:
             continue
-        own = [row for row in rows if f"{row.component}.".startswith(f"{path_of(node.component)}.")]
+        powers = [row for row in rows if f"{row.component}.".startswith(f"{path_of(node.component)}.")]
         into = (power_into(ports[0], run) or 0.0) * span
-        if (into > least and sum(row.lost for row in own) > least) or sum(row.source for row in own) < -least:
+        if (into > least and sum(row.lost for row in powers) > least) or sum(row.source for row in powers) < -least:
             return []
-        if -into - max(0.0, -sum(row.stored for row in own)) > least:
-            found.append(node)
-    return found
+        if -into - max(0.0, -sum(row.stored for row in powers)) > least:
+            nodes.append(node)
+    return nodes

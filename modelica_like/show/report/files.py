@@ -69,11 +69,11 @@ def write_solution(
         UnknownName, UnitError: a variable cannot be shown in a unit.
         OSError: the file cannot be written.
     """
-    more = [one for one in read_signals(solution.model, show) if not one.plain]
-    columns = {one.name: one.values(solution) for one in more}
+    more = [signal for signal in read_signals(solution.model, show) if not signal.plain]
+    columns = {column.name: column.values(solution) for column in more}
 
     def dataset() -> xarray.Dataset:
-        named = {one.name: ("time", columns[one.name], {"units": one.unit}) for one in more}
+        named = {column.name: ("time", columns[column.name], {"units": column.unit}) for column in more}
         return solution.to_xarray().assign(named)
 
     _write(
@@ -82,14 +82,14 @@ def write_solution(
     )  # fmt: skip
 
 
-def write_dataset(found: xarray.Dataset, path: Path) -> None:
+def write_dataset(dataset: xarray.Dataset, path: Path) -> None:
     """Write a sweep as a table, one row per run, or as netCDF; see `write_solution`.
 
     Raises:
         NetlistError: no table has this ending.
         OSError: the file cannot be written.
     """
-    _write(path, lambda file: found.to_dataframe().to_csv(file), found.to_dataframe, lambda: found)
+    _write(path, lambda file: dataset.to_dataframe().to_csv(file), dataset.to_dataframe, lambda: dataset)
 
 
 def _write(
@@ -116,11 +116,11 @@ def _rows(
 ) -> None:
     signals = [*named(solution.model, solution.names), *more]
     values, shown = evaluated(solution, signals), Display(solution.model, display)
-    spelled = [one.shown_in(shown) if units else one.unit for one in signals]
-    columns = [shown.converted(values[one.name], one.unit, unit) for one, unit in zip(signals, spelled, strict=True)]
+    spelled = [signal.shown_in(shown) if units else signal.unit for signal in signals]
+    columns = [shown.converted(values[s.name], s.unit, unit) for s, unit in zip(signals, spelled, strict=True)]
     columns.insert(0, solution.time)
     writer = csv.writer(file)
-    writer.writerow(["time", *(one.name for one in signals)])
+    writer.writerow(["time", *(signal.name for signal in signals)])
     if units:
         writer.writerow(["s", *spelled])
     for row in np.column_stack(columns).tolist():

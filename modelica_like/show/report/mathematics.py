@@ -25,16 +25,19 @@ def mathematics(flat: FlatModel) -> str:
         flat: the model.
     """
     parts, places = dict[type[Component], dict[str, Component]](), dict[type[Component], dict[str, None]]()
-    for one in flat.instances:
-        if one.template.sources:
-            part = flat.components[one.path]
-            parts.setdefault(type(part), {})[one.path or flat.name] = part
-            places.setdefault(type(part), {}).update(dict.fromkeys(map(_place, one.template.sources)))
+    for instance in flat.instances:
+        if instance.template.sources:
+            part = flat.components[instance.path]
+            parts.setdefault(type(part), {})[instance.path or flat.name] = part
+            places.setdefault(type(part), {}).update(dict.fromkeys(map(_place, instance.template.sources)))
     lines = [f"## {flat.name}", f"{flat}."]
-    for kind, found in parts.items():
-        lines += [f"### {kind.__name__}: {', '.join(f'`{path}`' for path in found)}", _class(kind, [*found.values()])]
+    for kind, parts_of in parts.items():
+        lines += [
+            f"### {kind.__name__}: {', '.join(f'`{path}`' for path in parts_of)}",
+            _class(kind, [*parts_of.values()]),
+        ]
         lines.append(f"Source: {', '.join(places[kind])}.")
-    ends = dict.fromkeys((one.origin.path, one.origin.source) for one in flat.linear if one.origin.kind == "connection")
+    ends = dict.fromkeys((e.origin.path, e.origin.source) for e in flat.linear if e.origin.kind == "connection")
     joined = table("", ("joined", "source"), [(cell(path), _place(source)) for path, source in ends])
     if joined:
         lines += ["### Connections", "Potentials are equal, and flows add up to zero.", joined]
@@ -54,12 +57,12 @@ def _class(kind: type[Component], parts: Sequence[Component]) -> str:
 
 def _holds(said: Said, parts: Sequence[Component]) -> bool:
     """Whether an equation applies to one of the parts, as far as its condition tells it."""
-    found = _CONDITION.fullmatch(said.where) if isinstance(said, Term) else None
-    if found is None:
+    match = _CONDITION.fullmatch(said.where) if isinstance(said, Term) else None
+    if match is None:
         return True
-    word, name, what = found[1], found[2].replace(" ", "_"), found[3]
-    known = [part.connectors[name].used if what == "connected" else part.given(name) for part in parts]
-    return (word == "if") in known
+    word, name, what = match[1], match[2].replace(" ", "_"), match[3]
+    facts = [part.connectors[name].used if what == "connected" else part.given(name) for part in parts]
+    return (word == "if") in facts
 
 
 def _place(source: Place) -> str:

@@ -43,16 +43,16 @@ def html(shown: Any) -> str:
     tell = next(tell for kind, tell in make.items() if isinstance(shown, kind))
     console = Console(record=True, file=io.StringIO(), width=_WIDE, highlight=False, emoji=False)
     console.print(tell(shown))
-    told = console.export_html(inline_styles=True, code_format=_CODE)
-    return _picture(shown) + told if isinstance(shown, Trajectories) else told
+    text = console.export_html(inline_styles=True, code_format=_CODE)
+    return _picture(shown) + text if isinstance(shown, Trajectories) else text
 
 
 def _given(drive: Component) -> Iterator[tuple[str, str, str]]:
     """Yield path, value and description of each given parameter, and of the parameters of assemblies."""
     for part in drive.walk():
-        own: Container[str] = getattr(part, "_own_fields", ())
+        fields: Container[str] = getattr(part, "_own_fields", ())
         for name, field in part.fields.items():
-            value = part.value(name) if name in part._values or name in own else None
+            value = part.value(name) if name in part._values or name in fields else None
             if isinstance(field, Parameter) and value is not None:
                 yield f"{path_of(part)}.{name}".removeprefix("."), str(value.given), field.description
 

@@ -43,26 +43,26 @@ def overlay(
         UnitError: a measured column has another dimension than its variable, or a unit cannot be shown.
         ModelicaLikeError: a run fails.
     """
-    found = {label: trajectories(source) for label, source in runs.items()}
-    first = next((run for run in found.values() if not run.measured), next(iter(found.values())))
-    signals, left = (read_signals(first.model, patterns), []) if patterns else _common(first, list(found.values()))
-    shown, looks = Display(first.model, display), _looks(found)
+    sources = {label: trajectories(source) for label, source in runs.items()}
+    first = next((run for run in sources.values() if not run.measured), next(iter(sources.values())))
+    signals, left = (read_signals(first.model, patterns), []) if patterns else _common(first, list(sources.values()))
+    shown, looks = Display(first.model, display), _looks(sources)
     panels: list[Panel] = []
-    for one in signals:
-        curves = {label: curve for label, run in found.items() if (curve := _curve(one, run)) is not None}
+    for signal in signals:
+        curves = {label: curve for label, run in sources.items() if (curve := _curve(signal, run)) is not None}
 
-        def draw(axes: Any, one: Signal = one, curves: Mapping[str, Any] = curves) -> None:
+        def draw(axes: Any, one: Signal = signal, curves: Mapping[str, Any] = curves) -> None:
             for label, curve in curves.items():
                 values = one.driving * shown.converted(curve, one.unit, one.shown_in(shown))
-                axes.plot(found[label].time, values, label=label, **looks[label])
+                axes.plot(sources[label].time, values, label=label, **looks[label])
 
-        panels.append(Panel(one.label, one.shown_in(shown), [] if panels else list(curves), draw))
-    others = [run for run in found.values() if run is not first and not run.measured]
+        panels.append(Panel(signal.label, signal.shown_in(shown), [] if panels else list(curves), draw))
+    others = [run for run in sources.values() if run is not first and not run.measured]
     bands, notes = ([], []) if others else bands_of(first)
     marks, more = ([], []) if others else marks_of(first, [band.mode for band in bands])
-    told = ["Events differ from run to run; they are not drawn."] if others and first.events else []
-    told += [f"Not drawn: {listed(left)}; name them to draw them."] if left else []
-    return draw_panels(title or first.model.name, first.time, panels, bands, marks, [*told, *notes, *more])
+    remarks = ["Events differ from run to run; they are not drawn."] if others and first.events else []
+    remarks += [f"Not drawn: {listed(left)}; name them to draw them."] if left else []
+    return draw_panels(title or first.model.name, first.time, panels, bands, marks, [*remarks, *notes, *more])
 
 
 def _common(first: Trajectories, runs: Sequence[Trajectories]) -> tuple[list[Signal], list[str]]:
@@ -73,10 +73,10 @@ def _common(first: Trajectories, runs: Sequence[Trajectories]) -> tuple[list[Sig
             if name not in first:
                 read_signals(first.model, [name])
         return named(first.model, list(dict.fromkeys(measured))), []
-    signals = [one for one in usual(first, _USUAL) if all(one.name in run for run in runs)]
+    signals = [signal for signal in usual(first, _USUAL) if all(signal.name in run for run in runs)]
     if not signals:
         raise UnknownName("The runs have no signals in common.", advice="Name the signals to draw.")
-    return signals[:_MOST], [one.name for one in signals[_MOST:]]
+    return signals[:_MOST], [signal.name for signal in signals[_MOST:]]
 
 
 def _curve(signal: Signal, run: Trajectories) -> Any:

@@ -73,11 +73,11 @@ def notes(drive: Component, run: Trajectories, *, energy: bool = True) -> list[s
 
 
 def _neighbours(drawn: Diagram) -> Iterator[str]:
-    joined = {node: {port.node for net in drawn.nets if any(one.node is node for one in net.ports) for port in net.ports
+    joined = {node: {port.node for net in drawn.nets if any(p.node is node for p in net.ports) for port in net.ports
                      if not port.signal} for node in drawn.nodes}  # fmt: skip
     for unit, (what, slip) in _COMPARED.items():
-        sized = {node: found for node in joined if (part := node.component) and (found := _size(part, unit))}
-        told = set[frozenset[str]]()
+        sized = {node: amount for node in joined if (part := node.component) and (amount := _size(part, unit))}
+        pairs = set[frozenset[str]]()
         for node, (name, value) in sized.items():
             reached, pending = {node}, deque([node])
             while pending:
@@ -85,13 +85,13 @@ def _neighbours(drawn: Diagram) -> Iterator[str]:
                     reached.add(other)
                     if other not in sized:
                         # What else is in between, such as a gear or an assembly, may have a ratio.
-                        if other.component and any(_size(other.component, one) for one in _PASSED):
+                        if other.component and any(_size(other.component, kind) for kind in _PASSED):
                             pending.append(other)
                         continue
                     near, size = sized[other]
                     pair = frozenset((name, near))
-                    if value > _FAR * size and pair not in told:
-                        told.add(pair)
+                    if value > _FAR * size and pair not in pairs:
+                        pairs.add(pair)
                         yield (
                             f"{name} is {value / size:.2g} times {near}: is the {what} of one of them in the wrong "
                             f"unit ({slip})?"
@@ -140,7 +140,7 @@ def _idle(drive: Component, run: Solution, hold: HeldMotion) -> bool:
 
 
 def _unopened(drive: Component, run: Solution, hold: HeldMotion) -> Iterator[str]:
-    path, free = _input(drive, hold), {one.path for one in run.model.flat_parameters}
+    path, free = _input(drive, hold), {parameter.path for parameter in run.model.flat_parameters}
     if path in free and _holding(run, hold).all():
         value = f"{run[path][0]:g}"
         yield f"{hold.component} holds during the whole run: nothing drives {path}, which is {value} by default."
@@ -148,21 +148,21 @@ def _unopened(drive: Component, run: Solution, hold: HeldMotion) -> Iterator[str
 
 def _beyond(run: Solution) -> Iterator[str]:
     bounds = [
-        (one, bound, kind)
-        for one in run.model.flat_variables
-        for bound, kind in ((one.max, "max"), (one.min, "min"))
+        (variable, bound, kind)
+        for variable in run.model.flat_variables
+        for bound, kind in ((variable.max, "max"), (variable.min, "min"))
         if bound is not None
     ]
     try:
-        worst = [(float(number), number.time) for number in run.read(*(f"{k}({one.path})" for one, _, k in bounds))]
+        worst = [(float(number), number.time) for number in run.read(*(f"{k}({b.path})" for b, _, k in bounds))]
     except MissingValue:  # what lies beyond a bound among the results is told at least
-        places = [(run[one.path], int(getattr(np, f"arg{kind}")(run[one.path]))) for one, _, kind in bounds]
+        places = [(run[b.path], int(getattr(np, f"arg{kind}")(run[b.path]))) for b, _, kind in bounds]
         worst = [(float(values[k]), float(run.time[k])) for values, k in places]
-    for (one, bound, kind), (value, time) in zip(bounds, worst, strict=True):
+    for (variable, bound, kind), (value, time) in zip(bounds, worst, strict=True):
         beyond, verb = (value - bound, "exceeds") if kind == "max" else (bound - value, "falls below")
-        if beyond > _ROUNDING * max(abs(bound), one.nominal):
-            told = f"{value:.6g} {one.unit} at {time:.6g} s"
-            yield f"{one.path} {verb} its declared bound {bound:g} {one.unit}: it is {told}."
+        if beyond > _ROUNDING * max(abs(bound), variable.nominal):
+            extreme = f"{value:.6g} {variable.unit} at {time:.6g} s"
+            yield f"{variable.path} {verb} its declared bound {bound:g} {variable.unit}: it is {extreme}."
 
 
 def _is_source(part: Component) -> bool:
@@ -179,9 +179,9 @@ def _part(drive: Component, path: str) -> Component:
 
 def _resonances(drive: Component, run: Solution) -> Iterator[str]:
     excited = {
-        one.path: value
-        for one, value in zip(run.model.flat_parameters, run.model.p, strict=True)
-        if one.unit == _HERTZ and value > 0.0 and _is_source(_part(drive, one.path.rpartition(".")[0]))
+        parameter.path: value
+        for parameter, value in zip(run.model.flat_parameters, run.model.p, strict=True)
+        if parameter.unit == _HERTZ and value > 0.0 and _is_source(_part(drive, parameter.path.rpartition(".")[0]))
     }
     if not excited:
         return
@@ -189,7 +189,7 @@ def _resonances(drive: Component, run: Solution) -> Iterator[str]:
     from modelica_like.analyse.linear.linearize import linearize
 
     try:
-        modes = [one for one in linearize(run).modes() if one.oscillates and one.damping < _DAMPED]
+        modes = [mode for mode in linearize(run).modes() if mode.oscillates and mode.damping < _DAMPED]
     except ModelicaLikeError:  # there is no linear model at the end: then there is no note either
         return
     for path, frequency in excited.items():

@@ -59,8 +59,15 @@ def events_table(solution: Trajectories, *, debug: bool = False) -> Listed:
     """Return the mode changes; of many only the first and the last. `debug` shows the lines of their transitions."""
     columns = 6 if debug else 5
     rows = [
-        (float(one.time), one.path, one.before, one.after, one.because, f"{one.source}".partition(" `")[0])[:columns]
-        for one in changes(solution)
+        (
+            float(change.time),
+            change.path,
+            change.before,
+            change.after,
+            change.because,
+            f"{change.source}".partition(" `")[0],
+        )[:columns]
+        for change in changes(solution)
     ]
     heads = ("time in s>.9g", "mode", "from", "to", "because", "declared in")[:columns]
     return table(_mode_changes(len(rows)), *heads, rows=rows, name="events", most=_SHOWN, ends=True)
@@ -75,14 +82,14 @@ def values_table(solution: Trajectories, words: Sequence[str], display: Mapping[
     shown, signals = Display(solution.model, display), read_signals(solution.model, words)
     values, rows = evaluated(solution, signals), list[tuple[Any, ...]]()
     extremes = _extremes(solution, signals)
-    for one in signals:
-        unit = one.shown_in(shown)
-        first, last, *told = shown.converted(
-            np.array([*values[one.name][[0, -1]], *extremes[one.name][0]]), one.unit, unit
+    for signal in signals:
+        unit = signal.shown_in(shown)
+        first, last, *shown_values = shown.converted(
+            np.array([*values[signal.name][[0, -1]], *extremes[signal.name][0]]), signal.unit, unit
         )
-        low, high = extremes[one.name][1]
+        low, high = extremes[signal.name][1]
         named = "" if unit in ("1", "*") else unit
-        rows.append((one.name, named, *map(float, (first, last, told[0], low, told[1], high))))
+        rows.append((signal.name, named, *map(float, (first, last, shown_values[0], low, shown_values[1], high))))
     heads = "first>.6g", "last>.6g", "smallest>.6g", "smallest at s>.6g", "largest>.6g", "largest at s>.6g"
     title = "values" if isinstance(solution, Solution) else "values at the results"
     return table(title, "name", "unit", *heads, rows=rows, name="values", most=_SHOWN, rest=", which --csv writes")
@@ -92,9 +99,9 @@ def _extremes(solution: Trajectories, signals: Sequence[Signal]) -> dict[str, tu
     """Return smallest and largest value with their times; of runs without equations those of the results."""
     if isinstance(solution, Solution):
         kinds = ("min", "max")
-        numbers = solution.read(*(f"{kind}({one.name})" for one in signals for kind in kinds))
+        numbers = solution.read(*(f"{kind}({signal.name})" for signal in signals for kind in kinds))
         pairs = zip(signals, numbers[::2], numbers[1::2], strict=True)
-        return {one.name: ([low, high], [low.time, high.time]) for one, low, high in pairs}
+        return {signal.name: ([low, high], [low.time, high.time]) for signal, low, high in pairs}
     curves, time = evaluated(solution, signals), solution.time
     places = {name: [int(np.argmin(curve)), int(np.argmax(curve))] for name, curve in curves.items()}
     return {name: (curves[name][k].tolist(), time[k].tolist()) for name, k in places.items()}
@@ -106,15 +113,15 @@ def notices(solution: Trajectories) -> list[str]:
     Of inputs a sentence tells the largest value; of a run that has not kept what happens between its results, the
     least that it can be.
     """
-    told: dict[tuple[str, str], str] = {}
-    for event in (one for one in solution.events if one.transition >= 0):
+    notes: dict[tuple[str, str], str] = {}
+    for event in (e for e in solution.events if e.transition >= 0):
         notice, (component, dot, _) = solution.model.transitions[event.transition].notice, event.mode.rpartition(".")
         ends = solution.model.transitions[event.transition].ends
-        if notice and not ends and (component, notice) not in told:
+        if notice and not ends and (component, notice) not in notes:
             path = component + dot
             values = NAME_IN_NOTICE.sub(lambda name, path=path: _largest(solution, path + name[1]), notice)
-            told[component, notice] = f"At {event.time:.9g} s {component or solution.model.name} {values}."
-    return [*solution.notices, *told.values()]
+            notes[component, notice] = f"At {event.time:.9g} s {component or solution.model.name} {values}."
+    return [*solution.notices, *notes.values()]
 
 
 def _largest(solution: Trajectories, path: str) -> str:
@@ -141,7 +148,7 @@ def energy_table(solution: Trajectories, display: Mapping[str, str] | None = Non
     active = [name for name, values in rows.items() if any(values)]
     largest = sorted(active, key=lambda name: max(map(abs, rows[name])), reverse=True)
     # Those shown keep the order of the drive, and stand before those that are not.
-    active = [one for some in (largest[:_SHOWN], largest[_SHOWN:]) for one in active if one in some]
+    active = [name for some in (largest[:_SHOWN], largest[_SHOWN:]) for name in active if name in some]
     totals = [balance.source, balance.stored, balance.lost, *[sum(row.impact for row in balance)][: int(collides)]]
     return table(
         f"energy balance in {unit}", *columns, most=_SHOWN,
@@ -162,7 +169,7 @@ def _energy(value: float) -> Shown:
 
 def statistics_line(solution: Trajectories) -> str:
     """Return steps, evaluations, events and seconds in one sentence."""
-    counts, chosen = solution.statistics, sum(one.mode.endswith("].choice") for one in solution.events)
+    counts, chosen = solution.statistics, sum(event.mode.endswith("].choice") for event in solution.events)
     choices = f" ({chosen} of them choices of states)" if chosen else ""
     return (
         f"{counts.steps} steps, {counts.evaluations} evaluations, {counts.integrations} integrations, "
@@ -178,20 +185,16 @@ def cosimulation_report(solution: CosimSolution) -> RenderableType:
     """Return mode changes, energies at the couplings and communication steps of a run."""
     parts = _head(solution, solution.notices)
     if solution.couplings:
-        parts += ["", couplings_table(solution)]
+        rows = [
+            (coupling.name, float(coupling.throughput), float(coupling.residual),
+             float(coupling.residual / coupling.throughput) if coupling.throughput else Shown("", None),
+             float(coupling.mismatch))
+            for coupling in solution.couplings
+        ]  # fmt: skip
+        heads = "coupling", "through>.6g", "created>.3g", "share>.1e", "mismatch>.3g"
+        parts += ["", table("energy at the couplings in J", *heads, rows=rows)]
     parts += ["", f"[dim]{steps_line(solution)}[/]"]
     return Group(*parts)
-
-
-def couplings_table(solution: CosimSolution) -> Listed:
-    """Return the energies at the couplings; the difference of sent and received energy is lost in the coupling."""
-    rows = [
-        (one.name, float(one.throughput), float(one.residual),
-         float(one.residual / one.throughput) if one.throughput else Shown("", None), float(one.mismatch))
-        for one in solution.couplings
-    ]  # fmt: skip
-    heads = "coupling", "through>.6g", "created>.3g", "share>.1e", "mismatch>.3g"
-    return table("energy at the couplings in J", *heads, rows=rows)
 
 
 def steps_line(solution: CosimSolution) -> str:

@@ -51,21 +51,17 @@ def _check_tables(check: CheckedResult) -> Iterator[RenderableType]:
         yield f"[dim]{escape(check.note)}[/]"
     for title, rows in check.result.tables().items():
         yield ""
-        made = _rows(title, rows)
-        made.name = f"{check.name}: {title}"
-        yield made
+        tables = _rows(title, rows)
+        tables.name = f"{check.name}: {title}"
+        yield tables
 
 
 def _published(check: CheckedResult, line: str) -> list[str]:
     if line not in check.published:
         return ["", ""]
-    shown = _as_shown(check.result, line, check.published[line])
+    changed = dataclasses.replace(check.result, **{line: check.published[line]})
+    shown = next(other.value for other in changed.lines() if other.name == line)
     return [shown, f"{100 * check.deviation(line):+.3f} %"]
-
-
-def _as_shown(result: Any, line: str, value: float) -> str:
-    changed = dataclasses.replace(result, **{line: value})
-    return next(other.value for other in changed.lines() if other.name == line)
 
 
 def _rows(title: str, rows: tuple[Any, ...]) -> Listed:
@@ -110,11 +106,16 @@ def check_page(name: str, check: Check) -> RenderableType:
     text = inspect.cleandoc(check.__doc__ or "").partition("\nArgs:")[0].rstrip()
     described = dict(meanings(inspect.cleandoc(check.__doc__ or "")))
     rows = (
-        (one.name, _kind(one), "" if one.required else str(one.default), described.get(one.name, ""))
-        for one in arguments_of(check).values()
+        (
+            argument.name,
+            _kind(argument),
+            "" if argument.required else str(argument.default),
+            described.get(argument.name, ""),
+        )
+        for argument in arguments_of(check).values()
     )
-    made = table("arguments", "name*", "unit", "default", "meaning", rows=rows)
-    return Group(f"[bold]{name}[/]", escape(text), "", made)
+    tables = table("arguments", "name*", "unit", "default", "meaning", rows=rows)
+    return Group(f"[bold]{name}[/]", escape(text), "", tables)
 
 
 def _kind(argument: Argument) -> str:

@@ -75,8 +75,8 @@ def start_values(drive: Component, model: CompiledDae, kind: StartKind = "given"
             origins.setdefault(model.flat_variables[node].path, "rest")
     for state in plan.zero:
         origins.setdefault(model.states[state], "rest")
-    known = {*origins, *(model.states[state] for state, _ in plan.direct)}
-    follows = [k for k, name in enumerate(model.states) if name not in known]
+    determined = {*origins, *(model.states[state] for state, _ in plan.direct)}
+    follows = [k for k, name in enumerate(model.states) if name not in determined]
     origins |= dict(zip((model.states[k] for k in follows), _follows(model, plan, point, follows), strict=True))
     return [StartValueRow(path, *_value(model, point, variables, path), origin) for path, origin in origins.items()]
 

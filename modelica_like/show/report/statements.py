@@ -28,8 +28,8 @@ def statements(kind: type[Component]) -> dict[str, list[str]]:
         for name in ("equations", "initial_equations", "events", *_ENERGY)
         if (of := reader.source.method(name))
     }
-    made = {name: list(reader.body(of, of.code.body, {})) for name, of in said.items() if name not in _ENERGY}
-    made["energy"] = [line for name, of in said.items() if name in _ENERGY for line in reader.defined(of)]
+    by_method = {name: list(reader.body(of, of.code.body, {})) for name, of in said.items() if name not in _ENERGY}
+    by_method["energy"] = [line for name, of in said.items() if name in _ENERGY for line in reader.defined(of)]
     done: set[str] = set(_ENERGY)
     where: list[str] = []
     while missing := [name for name in reader.found if name not in done]:
@@ -37,7 +37,7 @@ def statements(kind: type[Component]) -> dict[str, list[str]]:
             done.add(name)
             where += reader.defined(reader.found[name], name)
     where += [f"{shown(name)} = {value}" for name, value in reader.constants.items()]
-    return {title.replace("_", " "): lines for title, lines in {**made, "where": where}.items() if lines}
+    return {title.replace("_", " "): lines for title, lines in {**by_method, "where": where}.items() if lines}
 
 
 def shown(name: str) -> str:
@@ -56,7 +56,7 @@ class _Reader:
 
     def defined(self, of: Function, name: str = "") -> list[str]:
         """Return the definition of a method or a function."""
-        arguments = ", ".join(one.arg for one in of.code.args.args if one.arg != "self")
+        arguments = ", ".join(argument.arg for argument in of.code.args.args if argument.arg != "self")
         head = shown(name or of.name)
         head += "" if isinstance(vars(of.owner or object).get(of.name), property) else f"({arguments})"
         lines = list(self.body(of, of.code.body, {}))
@@ -67,8 +67,8 @@ class _Reader:
     def body(self, of: Function, code: Sequence[ast.stmt], names: Names) -> Iterator[str]:
         """Yield the lines of statements, in which local names have a meaning."""
         names = dict(names)
-        for k, one in enumerate(code):
-            match one:
+        for k, statement in enumerate(code):
+            match statement:
                 case ast.Expr(value=ast.Constant()) | ast.Return(value=None) | ast.Raise():
                     pass
                 case ast.Return(value=ast.Call(func=ast.Name(id="iter"))):  # nothing is yielded
@@ -91,9 +91,9 @@ class _Reader:
                     pairs = [ast.Assign([a], b) for a, b in zip(targets, values, strict=True)]
                     yield from self._assigned(of, pairs, names)
                 case ast.Assign():
-                    yield from self._assigned(of, [one], names)
+                    yield from self._assigned(of, [statement], names)
                 case _:
-                    yield self.text(of, one, names)
+                    yield self.text(of, statement, names)
 
     def _either(
         self, of: Function, test: ast.expr, then: Sequence[ast.stmt], other: Sequence[ast.stmt], names: Names
@@ -106,38 +106,38 @@ class _Reader:
 
     def _assigned(self, of: Function, pairs: Sequence[ast.Assign], names: dict[str, ast.expr]) -> Iterator[str]:
         """Give local names to paths; others are lines."""
-        for one in pairs:
-            match one:
+        for pair in pairs:
+            match pair:
                 case ast.Assign(targets=[ast.Name(id=name)], value=ast.Attribute() as value) if _is_path(value):
                     names[name] = self._replaced(of, value, names)
                 case _:
-                    for target in one.targets:
+                    for target in pair.targets:
                         names.pop(ast.unparse(target), None)
-                    targets = " = ".join(self.text(of, target, names) for target in one.targets)
-                    yield f"{targets} = {self.text(of, one.value, names)}"
+                    targets = " = ".join(self.text(of, target, names) for target in pair.targets)
+                    yield f"{targets} = {self.text(of, pair.value, names)}"
 
     def _inlined(self, of: Function, call: ast.Call, names: Names) -> Iterator[str]:
         """Yield what another method yields, in the place of its call."""
         arguments = call.args
         match call.func:
             case ast.Attribute(value=ast.Call(func=ast.Name(id="super")), attr=name):
-                found = self.source.method(name, of.owner)
+                function = self.source.method(name, of.owner)
             case ast.Attribute(value=ast.Name(id="self"), attr=name):
-                found = self.source.method(name)
+                function = self.source.method(name)
             case ast.Attribute(value=ast.Name(id=base), attr=name) if isinstance(of.constants.get(base), type):
-                found, arguments = in_class(of.constants[base], name), arguments[1:]
+                function, arguments = in_class(of.constants[base], name), arguments[1:]
             case ast.Name(id=name) if _is_own(of.constants.get(name)):
-                found = plain_function(name, of.constants[name])
+                function = plain_function(name, of.constants[name])
             case ast.Attribute(value=ast.Call(), attr="equations" | "events"):
                 return  # of the language's own class
             case _:
                 yield self.text(of, call, names)
                 return
-        if found is not None:
-            formal = [one.arg for one in found.code.args.args if one.arg != "self"]
-            given = dict(zip(formal, arguments, strict=False)) | {one.arg or "": one.value for one in call.keywords}
+        if function is not None:
+            formal = [argument.arg for argument in function.code.args.args if argument.arg != "self"]
+            given = dict(zip(formal, arguments, strict=False)) | {k.arg or "": k.value for k in call.keywords}
             meant = {name: self._replaced(of, value, names) for name, value in given.items()}
-            yield from self.body(found, found.code.body, meant)
+            yield from self.body(function, function.code.body, meant)
 
     def text(self, of: Function, code: ast.AST, names: Names) -> str:
         """Return code as in formulas: without `self`, local names by what they mean."""
@@ -182,14 +182,14 @@ class _Replace(ast.NodeTransformer):
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         match node.value:
             case ast.Name(id="self"):
-                if (found := self._reader.source.method(node.attr)) is not None:
-                    self._reader.found.setdefault(node.attr, found)
+                if (method := self._reader.source.method(node.attr)) is not None:
+                    self._reader.found.setdefault(node.attr, method)
                 return ast.Name(shown(node.attr))
             case ast.Call(func=ast.Name(id="super")):
-                found = self._reader.source.method(node.attr, self._of.owner)
-                name = f"{found.owner.__name__}.{node.attr}" if found and found.owner else node.attr
-                if found is not None:
-                    self._reader.found.setdefault(name, found)
+                method = self._reader.source.method(node.attr, self._of.owner)
+                name = f"{method.owner.__name__}.{node.attr}" if method and method.owner else node.attr
+                if method is not None:
+                    self._reader.found.setdefault(name, method)
                 return ast.Name(shown(name))
             case _:
                 return self.generic_visit(node)  # type: ignore[return-value]

@@ -23,7 +23,12 @@ def structure_report(component: Component) -> RenderableType:
     reduced = reduce(flat)
     if any(instance.template.update_forms for instance in flat.instances):
         compile(reduced)  # finds loops among discrete variables
-    parts: list[RenderableType] = [_sizes(flat, reduced), "", _energy(flat)]
+    terms = (("stored", "stored_energy"), ("dissipated", "loss_power"), ("from outside", "source_power"))
+    rows: list[tuple[str, str]] = []
+    for what, term in terms:
+        names = [c.label for c in flat.components.values() if _is_there(getattr(c, term)())]
+        rows.append((what, listed(names) or "none"))
+    parts: list[RenderableType] = [_sizes(flat, reduced), "", table("energy", "what", "components", rows=rows)]
     parts += ["", *(f"[dim]{escape(notice)}[/]" for notice in reduced.notices)] if reduced.notices else []
     return Group(*parts)
 
@@ -34,6 +39,7 @@ def _sizes(flat: FlatModel, reduced: ReducedDae) -> Listed:
     declared = [discrete for discrete in flat.discretes if not discrete.hidden]
     modes = [discrete.path for discrete in declared if discrete.names]
     numbers = [discrete.path for discrete in declared if not discrete.names]
+    block_kinds = Counter((len(block.unknowns), block.kind) for block in reduced.blocks)
     sizes: list[tuple[str, int, str]] = [
         (
             "components",
@@ -48,30 +54,20 @@ def _sizes(flat: FlatModel, reduced: ReducedDae) -> Listed:
         ("states", len(reduced.states), listed(reduced.states)),
         ("implicit", len(reduced.implicit), listed(reduced.implicit)),
         ("index", reduced.index, ""),
-        ("blocks", len(reduced.blocks), _block_sizes(reduced)),
+        (
+            "blocks",
+            len(reduced.blocks),
+            ", ".join(f"{count} of size {size} ({kind})" for (size, kind), count in sorted(block_kinds.items())),
+        ),
     ]
     return table(f"{flat.name} can be simulated", "what", "number>", "which", rows=sizes, name="sizes")
 
 
 def listed(names: Iterable[str]) -> str:
     """Return the first names and the number of others."""
-    known = list(names)
-    more = f", … {len(known) - _SHOWN} more" if len(known) > _SHOWN else ""
-    return ", ".join(known[:_SHOWN]) + more
-
-
-def _block_sizes(reduced: ReducedDae) -> str:
-    kinds = Counter((len(block.unknowns), block.kind) for block in reduced.blocks)
-    return ", ".join(f"{count} of size {size} ({kind})" for (size, kind), count in sorted(kinds.items()))
-
-
-def _energy(flat: FlatModel) -> Listed:
-    terms = (("stored", "stored_energy"), ("dissipated", "loss_power"), ("from outside", "source_power"))
-    rows: list[tuple[str, str]] = []
-    for what, term in terms:
-        names = [one.label for one in flat.components.values() if _is_there(getattr(one, term)())]
-        rows.append((what, listed(names) or "none"))
-    return table("energy", "what", "components", rows=rows)
+    items = list(names)
+    more = f", … {len(items) - _SHOWN} more" if len(items) > _SHOWN else ""
+    return ", ".join(items[:_SHOWN]) + more
 
 
 def _is_there(term: Expr | float) -> bool:

@@ -68,22 +68,22 @@ def table(
     """
     heads, marks, formats = zip(*(column.rstrip("*").partition(">") for column in columns), strict=True)
     assert len(set(heads)) == len(heads), "a heading is a key of the rows as data"
-    known = list(rows)
-    records = [dict(zip(heads, map(_value, row, marks), strict=False)) for row in [*known, *filter(None, [total])]]
-    made = Listed(title, name or title.partition(" in ")[0], records)
+    listed = list(rows)
+    records = [dict(zip(heads, map(_value, row, marks), strict=False)) for row in [*listed, *filter(None, [total])]]
+    result = Listed(title, name or title.partition(" in ")[0], records)
     for column, head, mark in zip(columns, heads, marks, strict=True):
-        made.add_column(Text(head), justify="right" if mark else "left", style="bold" if column[-1:] == "*" else "")
-    lines = [tuple(map(_cell, row, formats)) for row in known]
+        result.add_column(Text(head), justify="right" if mark else "left", style="bold" if column[-1:] == "*" else "")
+    lines = [tuple(map(_cell, row, formats)) for row in listed]
     left_out = len(lines) - most
     if left_out > 0:
         at = most // 2 if ends else most
         lines[at : at + left_out] = [(Text("…" if ends else f"… {left_out} more{rest}"),)]
     for line in lines:
-        made.add_row(*line)
+        result.add_row(*line)
     if total:
-        made.add_section()
-        made.add_row(*map(_cell, total, formats), style="bold")
-    return made
+        result.add_section()
+        result.add_row(*map(_cell, total, formats), style="bold")
+    return result
 
 
 def _cell(cell: Any, spec: str) -> Text:
@@ -111,15 +111,15 @@ def as_data(*shown: Any) -> dict[str, Any]:
     """
     tables: dict[str, list[Any]] = {}
     texts: list[str] = []
-    for one in map(rich_cast, shown):
-        if isinstance(one, Group | Padding):
-            inner = as_data(*(one.renderables if isinstance(one, Group) else (one.renderable,)))
+    for item in map(rich_cast, shown):
+        if isinstance(item, Group | Padding):
+            inner = as_data(*(item.renderables if isinstance(item, Group) else (item.renderable,)))
             for name, records in inner["tables"].items():
                 tables.setdefault(name, []).extend(records)
             texts += inner["text"]
-        elif isinstance(one, Listed | Lines):
-            tables.setdefault(one.name, []).extend(one.records)
+        elif isinstance(item, Listed | Lines):
+            tables.setdefault(item.name, []).extend(item.records)
         else:
-            text = one if isinstance(one, Text) else Text.from_markup(str(one))
+            text = item if isinstance(item, Text) else Text.from_markup(str(item))
             texts += [text.plain] if text.plain.strip() else []
     return {"tables": tables, "text": texts}

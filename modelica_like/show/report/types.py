@@ -43,10 +43,10 @@ def library_table(types: Mapping[str, type[Component]], words: Sequence[str] = (
         UnknownName: there is no such group, or no such type.
     """
     groups = {name: kind.__module__.partition(".")[2] or kind.__module__ for name, kind in types.items()}
-    known = sorted({one for path in groups.values() for one in path.split(".")})
-    if group is not None and group not in known:
+    search = sorted({word for path in groups.values() for word in path.split(".")})
+    if group is not None and group not in search:
         raise UnknownName(
-            f"There is no group '{group}'{did_you_mean(group, known) or '.'}", advice=f"There are {', '.join(known)}."
+            f"There is no group '{group}'{did_you_mean(group, search) or '.'}", advice=f"There are {', '.join(search)}."
         )
     texts = {name: f"{name} {groups[name]} {kind.__doc__}".lower() for name, kind in types.items()}
     chosen = sorted((groups[name], name) for name, text in texts.items() if group in (None, *groups[name].split("."))
@@ -59,13 +59,13 @@ def library_table(types: Mapping[str, type[Component]], words: Sequence[str] = (
         )
     rows = ((name, home, summary(types[name])) for home, name in chosen)
     title = "1 component type" if len(chosen) == 1 else f"{len(chosen)} component types"
-    made = table(title, "type*", "group", "what it is", rows=rows, name="types")
+    result = table(title, "type*", "group", "what it is", rows=rows, name="types")
     # One line per type, so that the list can be searched; `describe` has the whole text.
-    for column in made.columns:
+    for column in result.columns:
         column.no_wrap = True
-    for column, k in zip(made.columns, (1, 0), strict=False):
-        column.min_width = max((len(one[k]) for one in chosen), default=0)
-    return made
+    for column, k in zip(result.columns, (1, 0), strict=False):
+        column.min_width = max((len(name[k]) for name in chosen), default=0)
+    return result
 
 
 def describe(kind: type[Component]) -> RenderableType:
@@ -76,16 +76,16 @@ def describe(kind: type[Component]) -> RenderableType:
     tables = declared(kind, _TERMINAL)
     parts = [row for name in kind._class_parts for row in _part_rows(kind, name)]
     tables += [filled("parts", ("name", "type", "values", "description"), parts)] if parts else []
-    made = [table(title, f"{first}*", *others, rows=rows) for title, (first, *others), rows in tables]
+    tables_shown = [table(title, f"{first}*", *others, rows=rows) for title, (first, *others), rows in tables]
     lists = [Lines(title, lines) for title, lines in _lines(kind).items()]
-    sections: list[RenderableType] = [heading, Text(text), *made, *lists]
+    sections: list[RenderableType] = [heading, Text(text), *tables_shown, *lists]
     return Group(*(Padding(section, (0, 0, 1, 0), expand=False) for section in sections))
 
 
 def describe_netlist(drive: Assembly) -> RenderableType:
     """Return a page about a netlist: its parameters, all parts of it and of its assemblies, and its connections."""
-    own = (name for name, field in drive.fields.items() if isinstance(field, Parameter))
-    parameters = [(name, str(value.given)) for name in own if (value := drive.value(name)) is not None]
+    names = (name for name, field in drive.fields.items() if isinstance(field, Parameter))
+    parameters = [(name, str(value.given)) for name in names if (value := drive.value(name)) is not None]
     inner = [part for part in drive.walk() if part is not drive]
     parts = ((part.path, type(part).__name__, _given(part), summary(type(part))) for part in inner)
     joined = {**{name: " - ".join(ends) for name, ends in drive.chains.items()},
@@ -104,7 +104,7 @@ def _part_rows(kind: type[Component], name: str) -> list[tuple[str, ...]]:
     part = kind._class_parts[name]
     which = "replaceable" if name in kind._replaceable else ""
     if isinstance(part, list):
-        return [(f"{name}[{k}]", type(one).__name__, _given(one), which) for k, one in enumerate(part, 1)]
+        return [(f"{name}[{k}]", type(element).__name__, _given(element), which) for k, element in enumerate(part, 1)]
     return [(name, type(part).__name__, _given(part), which)]
 
 

@@ -121,8 +121,8 @@ class Writer:
     def path(self, node: ast.expr) -> Path | None:
         """Return the path of a chain of names."""
         if isinstance(node, ast.Name):
-            known = self.local.get(node.id)
-            return Path("") if node.id == "self" else known if isinstance(known, Path) else None
+            value = self.local.get(node.id)
+            return Path("") if node.id == "self" else value if isinstance(value, Path) else None
         if not isinstance(node, ast.Attribute) or (owner := self.path(node.value)) is None:
             return None
         return Path(f"{owner.path}.{node.attr}".removeprefix("."), owner.own)
@@ -135,11 +135,11 @@ class Writer:
         return number(node.value)
 
     def _name(self, node: ast.Name) -> Written:
-        known = self.local.get(node.id)
-        if isinstance(known, Written):
-            return known
-        if isinstance(known, Path):
-            return self._at(known)
+        path = self.local.get(node.id)
+        if isinstance(path, Written):
+            return path
+        if isinstance(path, Path):
+            return self._at(path)
         value = self.constants.get(node.id)
         return number(value) if isinstance(value, int | float) else Written(names.name(node.id.strip("_")))
 
@@ -173,8 +173,8 @@ class Writer:
         return self.write(node.value)
 
     def _lambda(self, node: ast.Lambda) -> Written:
-        formal = [one.arg for one in node.args.args]
-        inner = replace(self, local={**self.local, **{one: Path(one, own=False) for one in formal}})
+        formal = [argument.arg for argument in node.args.args]
+        inner = replace(self, local={**self.local, **{argument: Path(argument, own=False) for argument in formal}})
         return Written(rf"{', '.join(map(names.name, formal))} \mapsto {inner.latex(node.body)}", CASES)
 
     # -- operators -----------------------------------------------------------------------------------------------------
@@ -202,15 +202,15 @@ class Writer:
         return Written(f"-{shown}", SUM)
 
     def _compare(self, node: ast.Compare) -> Written:
-        sides = [self.write(one).inside(SUM) for one in (node.left, *node.comparators)]
-        signs = [f" {_RELATIONS[type(one)]} " for one in node.ops]
+        sides = [self.write(side).inside(SUM) for side in (node.left, *node.comparators)]
+        signs = [f" {_RELATIONS[type(operator)]} " for operator in node.ops]
         return Written(sides[0] + "".join(map("".join, zip(signs, sides[1:], strict=True))), RELATION)
 
     def _boolop(self, node: ast.BoolOp) -> Written:
         return self._all(*_JOINED["all_of" if isinstance(node.op, ast.And) else "any_of"], node.values)
 
     def _all(self, binds: int, sign: str, conditions: Sequence[ast.expr]) -> Written:
-        return Written(sign.join(self.write(one).inside(binds + 1) for one in conditions), binds)
+        return Written(sign.join(self.write(condition).inside(binds + 1) for condition in conditions), binds)
 
     def _ifexp(self, node: ast.IfExp) -> Written:
         with self.under(node.test, holds=True):
@@ -236,7 +236,7 @@ class Writer:
         return self._application(_FUNCTIONS.get(function) or names.name(function.strip("_")), node)
 
     def _application(self, called: str, node: ast.Call) -> Written:
-        given = [*node.args, *(one.value for one in node.keywords if one.arg != "strict")]
+        given = [*node.args, *(keyword.value for keyword in node.keywords if keyword.arg != "strict")]
         return Written(rf"{called}\left({', '.join(map(self.latex, given))}\right)" if given else called)
 
     def _of_component(self, node: ast.Call, called: ast.Attribute) -> Written:
@@ -247,14 +247,14 @@ class Writer:
         if path is None:
             raise Unwritable
         if name == "is_":
-            chosen = " or ".join(str(one.value) for one in node.args if isinstance(one, ast.Constant))
+            chosen = " or ".join(str(argument.value) for argument in node.args if isinstance(argument, ast.Constant))
             return Written(rf"{names.text(path.path)} = {names.text(chosen)}", RELATION)
         if name == "choose":
             mode = self.which_mode(path.path)
-            rows = [(self.latex(one.value), "" if one.arg == "otherwise" else mode, one.arg) for one in node.keywords]
+            rows = [(self.latex(k.value), "" if k.arg == "otherwise" else mode, k.arg) for k in node.keywords]
             return cases([(value, names.text(f"{which}{name}")) for value, which, name in rows])
         if name == "given":
-            (parameter,) = (one.value for one in node.args if isinstance(one, ast.Constant))
+            (parameter,) = (argument.value for argument in node.args if isinstance(argument, ast.Constant))
             return Written(names.text(f"{parameter} is given"), RELATION)
         full = f"{path.path}.{name}".removeprefix(".")
         return self._application(self.member(full, 0), node)
@@ -296,11 +296,11 @@ class Writer:
 
     def _column_of(self, node: ast.expr) -> Column | None:
         """Return the column of a table for a name, or for `[row[0] for row in self.table]`."""
-        known = self.local.get(node.id) if isinstance(node, ast.Name) else None
+        column = self.local.get(node.id) if isinstance(node, ast.Name) else None
         if isinstance(node, ast.ListComp) and isinstance(node.elt, ast.Subscript):
             table = self.path(node.generators[0].iter)
-            known = Column(table.path, self.latex(node.elt.slice)) if table is not None else None
-        return known if isinstance(known, Column) else None
+            column = Column(table.path, self.latex(node.elt.slice)) if table is not None else None
+        return column if isinstance(column, Column) else None
 
 
 def number(value: float) -> Written:

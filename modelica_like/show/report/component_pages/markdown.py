@@ -43,8 +43,8 @@ def table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str
 
 def page_link(kind: type[Component]) -> str:
     """Return a link from one page to another."""
-    known = library_types().get(kind.__name__) is kind
-    return f"[{kind.__name__}](../{place(kind).as_posix()})" if known else kind.__name__
+    in_library = library_types().get(kind.__name__) is kind
+    return f"[{kind.__name__}](../{place(kind).as_posix()})" if in_library else kind.__name__
 
 
 def place(kind: type[Component]) -> Path:

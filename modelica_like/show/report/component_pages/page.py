@@ -60,12 +60,13 @@ def page(kind: type[Component], file: Path, examples: Sequence[Example] = ()) ->
     definitions = written(source.definitions())
     listings = {title: table("", head, rows) for title, head, rows in declared(kind, _notation(_optional(source)))}
     first = {title: listings.pop(title) for title in _FIRST if title in listings}
+    lines = [example.line for example in examples if example.line]
     sections = [
         f"# {kind.__name__}",
         f"[All components](../README.md) · {module_title(kind.__module__)} · {source_link(kind, file)}",
         f"![symbol of {kind.__name__}]({symbol_file(file).name})",
         markdown(inspect.cleandoc(kind.__doc__ or "")),
-        *_example_line(examples),
+        *([f"```toml\n{min(lines, key=simplicity)}\n```"] if lines else []),
         *(f"## {title.capitalize()}\n\n{text}" for title, text in {**first, **listings}.items()),
         *_parts(kind),
         _folded("Equations", equations and (f"{equations}\n\nwhere\n\n{definitions}" if definitions else equations)),
@@ -91,12 +92,6 @@ def _folded(title: str, text: str) -> str:
     return f'<details id="{name}" markdown="1"{opened}>\n<summary>{title}</summary>\n\n{text}\n\n</details>'
 
 
-def _example_line(examples: Sequence[Example]) -> list[str]:
-    """Return the shortest part that shows values of its own."""
-    lines = [one.line for one in examples if one.line]
-    return [f"```toml\n{min(lines, key=simplicity)}\n```"] if lines else []
-
-
 def simplicity(line: str) -> tuple[bool, bool, int]:
     """Plain values come before formulas, some values before none, and few before many."""
     formula = any(text and text[0].isalpha() for text in re.findall(r'= "([^"]*)"', line)[1:])
@@ -115,18 +110,18 @@ def _notation(optional: Mapping[str, str]) -> Notation:
 
 def _optional(source: Source) -> dict[str, str]:
     """Return the note on optional parameters and on alternatives."""
-    told = dict.fromkeys(source.asked, "optional")
+    notes = dict.fromkeys(source.asked, "optional")
     for name, uses in source.uses.items():
-        instead = [asked for asked in source.asked if all(use.get(asked) is False for use in uses)]
-        if instead and name not in told:
-            told[name] = "required without " + ", ".join(f"`{one}`" for one in instead)
-    return told
+        instead = [field for field in source.asked if all(use.get(field) is False for use in uses)]
+        if instead and name not in notes:
+            notes[name] = "required without " + ", ".join(f"`{x}`" for x in instead)
+    return notes
 
 
 def _parts(kind: type[Component]) -> list[str]:
     """Return the parts that the class declares, and how it builds others."""
-    found = {name: part if isinstance(part, list) else [part] for name, part in kind._class_parts.items()}
-    rows = ((f"`{name}`", page_link(type(one)), _values(one)) for name, part in found.items() for one in part)
+    by_name = {name: part if isinstance(part, list) else [part] for name, part in kind._class_parts.items()}
+    rows = ((f"`{name}`", page_link(type(e)), _values(e)) for name, part in by_name.items() for e in part)
     code = dedent(inspect.getsource(kind.build)).strip() if kind.build is not Component.build else ""
     parts = [table("", ("part", "type", "values"), rows), code and f"```python\n{code}\n```"]
     return ["## Parts", *parts] if any(parts) else []
@@ -150,7 +145,7 @@ def _bases(kind: type[Component], file: Path) -> list[str]:
 def _example_links(examples: Sequence[Example], file: Path) -> list[str]:
     if not examples:
         return []
-    links = [f"- [{one.path.name}]({relative(one.path, file)}): {cell(one.title)}" for one in examples]
+    links = [f"- [{example.path.name}]({relative(example.path, file)}): {cell(example.title)}" for example in examples]
     more = _folded(f"{len(links) - _FEW} more netlists", "\n".join(links[_FEW:]))
     return ["## In netlists", "\n".join(links[:_FEW]), more]
 
@@ -164,9 +159,9 @@ def written(says: Iterable[Said]) -> str:
     parts: list[str] = []
     for _, group in groupby(says, type):
         many = list(group)
-        parts += [one for one in many if isinstance(one, str) and one]
-        parts += filter(None, [_equations([one for one in many if isinstance(one, Term)])])
-        parts += filter(None, [_events([one for one in many if isinstance(one, Event)])])
+        parts += [item for item in many if isinstance(item, str) and item]
+        parts += filter(None, [_equations([item for item in many if isinstance(item, Term)])])
+        parts += filter(None, [_events([item for item in many if isinstance(item, Event)])])
     # Consecutive ends become one list, consecutive source texts one text.
     return "\n\n".join(parts).replace("`\n\n- `", "`\n- `").replace("\n```\n\n```python\n", "\n")
 

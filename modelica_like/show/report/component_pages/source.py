@@ -88,7 +88,7 @@ class Source:
 
     def energy(self) -> list[Said]:
         """Return the energy terms."""
-        terms = (_reader(self, one).definition(one.name) for name in _ENERGY if (one := self.method(name)))
+        terms = (_reader(self, method).definition(method.name) for name in _ENERGY if (method := self.method(name)))
         return [said for term in terms for said in term]
 
     def definitions(self) -> Iterator[Said]:
@@ -104,14 +104,14 @@ class Source:
 
     def symbol(self, name: str, dots: int = 0) -> str:
         """Return the symbol of a method or property: words if a connector has the same symbol."""
-        made = names.name(name.lstrip("_"), dots)
-        ends = (f"{end}.{one}" for end, connector in self.kind._class_connectors.items() for one in connector.fields)
-        return names.text(name) if made in map(names.name, ends) else made
+        letter = names.name(name.lstrip("_"), dots)
+        ends = (f"{end}.{q}" for end, connector in self.kind._class_connectors.items() for q in connector.fields)
+        return names.text(name) if letter in map(names.name, ends) else letter
 
     def method(self, name: str, after: type | None = None) -> Function | None:
         """Return a method or property of the class from a library, or the next one after a base."""
         line = self.kind.__mro__[self.kind.__mro__.index(after) + 1 if after else 0 :]
-        base = next((one for one in line if name in vars(one)), Component)
+        base = next((text for text in line if name in vars(text)), Component)
         return None if base in Component.__mro__ else in_class(base, name)
 
 
@@ -144,8 +144,8 @@ class _Reader(Writer):
     # -- what occurs ---------------------------------------------------------------------------------------------------
 
     def member(self, path: str, dots: int) -> str:
-        if (found := self.source.method(path)) is not None:
-            self.source.found.setdefault(path, found)
+        if (method := self.source.method(path)) is not None:
+            self.source.found.setdefault(path, method)
             return self.source.symbol(path, dots)
         if path in self.source.kind._class_fields:
             self.source.uses.setdefault(path, []).append(dict(self.source.conditions))
@@ -162,19 +162,19 @@ class _Reader(Writer):
         return f"{path}: " if len(self.source.kind._class_modes) > 1 else ""
 
     def inherited(self, name: str) -> str:
-        found = self.source.method(name, self.of.owner)
-        if found is None or found.owner is None:
+        method = self.source.method(name, self.of.owner)
+        if method is None or method.owner is None:
             raise Unwritable
-        title = f"{name} of {found.owner.__name__}"
-        self.source.found.setdefault(title, found)
+        title = f"{name} of {method.owner.__name__}"
+        self.source.found.setdefault(title, method)
         return title
 
     @contextmanager
     def under(self, test: ast.expr, *, holds: bool) -> Iterator[None]:
         before = dict(self.source.conditions)
         holds = holds != isinstance(test, ast.UnaryOp)
-        for one in ast.walk(test):
-            match one:
+        for node in ast.walk(test):
+            match node:
                 case ast.Call(func=ast.Attribute(attr="given"), args=[ast.Constant(value=str() as name)]):
                     self.source.asked[name] = None
                     self.source.conditions |= {} if isinstance(test, ast.BoolOp) else {name: holds}
@@ -216,7 +216,7 @@ class _Reader(Writer):
                 for word, branch in (("if", then), ("unless", other)):
                     where = rf"\text{{{word} }} {self.latex(test)}"
                     with self.under(test, holds=word == "if"):
-                        yield from (_where(where, one) for one in self._again().body(branch))
+                        yield from (_where(where, item) for item in self._again().body(branch))
             case _:
                 raise Unwritable
 
@@ -225,20 +225,20 @@ class _Reader(Writer):
         arguments = call.args
         match call.func:
             case ast.Attribute(value=ast.Call(), attr=name):
-                found = self.source.method(name, self.of.owner)
+                function = self.source.method(name, self.of.owner)
             case ast.Attribute(value=ast.Name(id="self"), attr=name):
-                found = self.source.method(name)
+                function = self.source.method(name)
             case ast.Attribute(value=ast.Name(id=base), attr=name):
-                found, arguments = in_class(self.constants[base], name), arguments[1:]
+                function, arguments = in_class(self.constants[base], name), arguments[1:]
             case ast.Name(id=name) if name in self.constants and name != "series":
-                found = plain_function(name, self.constants[name])
+                function = plain_function(name, self.constants[name])
             case _:
                 raise Unwritable
-        if found is not None:
-            formal = [one.arg for one in found.code.args.args if one.arg != "self"]
-            given = dict(zip(formal, arguments, strict=False)) | {one.arg or "": one.value for one in call.keywords}
-            local: dict[str, Meaning] = {name: self.path(one) or self.write(one) for name, one in given.items()}
-            yield from _reader(self.source, found, local).body(found.code.body)
+        if function is not None:
+            formal = [argument.arg for argument in function.code.args.args if argument.arg != "self"]
+            given = dict(zip(formal, arguments, strict=False)) | {k.arg or "": k.value for k in call.keywords}
+            local: dict[str, Meaning] = {name: self.path(value) or self.write(value) for name, value in given.items()}
+            yield from _reader(self.source, function, local).body(function.code.body)
 
     # -- what functions return -----------------------------------------------------------------------------------------
 
@@ -251,7 +251,7 @@ class _Reader(Writer):
         except Unwritable:
             return [f"```python\n{ast.unparse(self.of.code)}\n```"]
         if value is not None:
-            arguments = ", ".join(names.name(one) for one in formal)
+            arguments = ", ".join(names.name(argument) for argument in formal)
             left = self.source.symbol(name) + (rf"\left({arguments}\right)" if formal else "")
             lines.append(Term(left, value.latex, r"\Leftrightarrow" if OR <= value.binds <= RELATION else "="))
         return lines
@@ -309,7 +309,7 @@ class _Reader(Writer):
                     yield from self._assigned(one, other)
             case ast.Tuple(elts=targets), ast.Call(func=ast.Name(id="zip"), args=[ast.Starred(value=table)]):
                 path = self.path(table)
-                if path is None or not all(isinstance(one, ast.Name) for one in targets):
+                if path is None or not all(isinstance(t, ast.Name) for t in targets):
                     raise Unwritable
                 for k, one in enumerate(targets):
                     assert isinstance(one, ast.Name)
@@ -324,7 +324,7 @@ class _Reader(Writer):
                 yield from [] if right.latex == left else [Term(left, right.latex)]
             case ast.Tuple(elts=targets), _:
                 right = self.latex(value)
-                self.local.update({one.id: Path(one.id, own=False) for one in targets if isinstance(one, ast.Name)})
+                self.local.update({t.id: Path(t.id, own=False) for t in targets if isinstance(t, ast.Name)})
                 yield Term(self.latex(target), right)
             case _:
                 raise Unwritable
@@ -334,20 +334,20 @@ class _Reader(Writer):
             case ast.Compare(left=left, ops=[ast.Eq()], comparators=[right]):
                 return Term(self.latex(left), self.latex(right))
             case ast.Call(func=ast.Name(id="connect"), args=ends):
-                paths = [self.path(one) for one in ends]
+                paths = [self.path(end) for end in ends]
                 if None not in paths:
-                    return "- " + " = ".join(f"`{one.path}`" for one in paths if one)
+                    return "- " + " = ".join(f"`{path.path}`" for path in paths if path)
             case ast.Call(func=ast.Attribute(value=owner, attr="go" | "initially"), args=arguments, keywords=options):
                 mode = self.path(owner)
                 if mode is not None:
-                    return self._event(mode.path, arguments, {one.arg or "": one.value for one in options})
+                    return self._event(mode.path, arguments, {option.arg or "": option.value for option in options})
             case _:
                 pass
         raise Unwritable
 
     def _event(self, mode: str, arguments: Sequence[ast.expr], options: Mapping[str, ast.expr]) -> Event:
         try:
-            *sources, target = (ast.literal_eval(one) for one in arguments)
+            *sources, target = (ast.literal_eval(argument) for argument in arguments)
         except ValueError:  # not only words
             raise Unwritable from None
         source = ", ".join(sources[0]) if sources and isinstance(sources[0], tuple) else "".join(sources)
@@ -364,14 +364,19 @@ class _Reader(Writer):
 
 def _reader(source: Source, of: Function, local: dict[str, Meaning] | None = None) -> _Reader:
     """Return a reader of a function; without meanings, its arguments are symbols."""
-    formal = [one.arg for one in of.code.args.args if one.arg != "self"]
-    return _Reader(of.constants, {one: Path(one, own=False) for one in formal} if local is None else local, source, of)
+    formal = [argument.arg for argument in of.code.args.args if argument.arg != "self"]
+    return _Reader(
+        of.constants,
+        {argument: Path(argument, own=False) for argument in formal} if local is None else local,
+        source,
+        of,
+    )
 
 
 def _changed(statement: ast.stmt) -> Iterator[str]:
     """Yield names whose values a statement changes."""
-    for one in ast.walk(statement):
-        match one:
+    for node in ast.walk(statement):
+        match node:
             case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store()) | ast.AugAssign(target=ast.Name(id=name)):
                 yield name
             case _:

@@ -38,8 +38,8 @@ def design_checks(drive: Component, run: Solution) -> str:
     sizing = size(path, {Path(getattr(drive, "origin", "")).resolve(): run})
     lines = [(check.name, line) for check in sizing.checks for line in check.result.lines(check.limits)]
     judged, others = (
-        [(f"{name}.{one.name}", one.value, one.unit, one.verdict, one.description) for name, one in lines
-         if bool(one.verdict) is limited]
+        [(f"{name}.{line.name}", line.value, line.unit, line.verdict, line.description) for name, line in lines
+         if bool(line.verdict) is limited]
         for limited in (True, False)
     )  # fmt: skip
     judged.sort(key=lambda row: row[3] == "ok")
@@ -68,21 +68,24 @@ def ranking(run: Solution, ends: Sequence[str]) -> str:
     if not names or not len(run.model.p):
         return ""
     try:
-        found = sensitivities(run, names)
+        sensitivity = sensitivities(run, names)
     except NoGradient as error:
         return f"<p>{escape(' '.join(filter(None, (error.what, error.why, error.advice))))}</p>"
-    percents = np.nan_to_num(found.normalised)
+    percents = np.nan_to_num(sensitivity.normalised)
     largest = np.max(np.abs(percents), axis=0)
     order = [int(k) for k in np.argsort(-largest)[:_RANKED] if largest[k] > _MATTERS]
-    heads = ("one percent more of", "value>", "unit", *(f"{one.name}, %>" for one in found.outputs))
+    heads = ("one percent more of", "value>", "unit", *(f"{output.name}, %>" for output in sensitivity.outputs))
     rows = [
-        (one.name, f"{one.value:.6g}", one.unit_text, *(f"{round(value, 3) + 0.0:.3f}" for value in percents[:, k]))
-        for k in order for one in [found.parameters[k]]
+        (quantity.name, f"{quantity.value:.6g}", quantity.unit_text,
+         *(f"{round(value, 3) + 0.0:.3f}" for value in percents[:, k]))
+        for k in order for quantity in [sensitivity.parameters[k]]
     ]  # fmt: skip
-    at_the_end = ", ".join(f"{one.name} = {one.value:.5g} {one.unit_text}".rstrip() for one in found.outputs)
+    at_the_end = ", ".join(f"{o.name} = {o.value:.5g} {o.unit_text}".rstrip() for o in sensitivity.outputs)
     said = f"<p>Change in percent of what the run ends with: {escape(at_the_end)}.</p>"
-    left = "".join(f"<p>{escape(note)}</p>" for note in found.notes())
-    return (said + table(heads, rows) if rows else "") + details(left, f"{len(found.left_out)} without a derivative")
+    left = "".join(f"<p>{escape(note)}</p>" for note in sensitivity.notes())
+    return (said + table(heads, rows) if rows else "") + details(
+        left, f"{len(sensitivity.left_out)} without a derivative"
+    )
 
 
 def small_motions(drive: Component, run: Solution) -> str:

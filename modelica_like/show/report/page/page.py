@@ -8,23 +8,29 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.fmi.export import tool
 from modelica_like.language import Component
+from modelica_like.runs.display import Display
+from modelica_like.runs.signals import evaluated
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Trajectories
+from modelica_like.show.bands import mode_spans
 from modelica_like.show.browser.page import HELPERS, joined_scripts, script_hash
 from modelica_like.show.draw import schematic
+from modelica_like.show.plot import for_page, quantity_of
 from modelica_like.show.report.changes import Change, changes
 from modelica_like.show.report.page.assessed import design_checks, ranking, small_motions
-from modelica_like.show.report.page.curves import curves
 from modelica_like.show.report.page.tables import details, table
 from modelica_like.show.report.plausible import notes as plausible
 from modelica_like.show.report.run import notices, statistics_line
 from modelica_like.show.report.start import start_values
+from modelica_like.style import with_unit
 from modelica_like.writing import write_text
 
 _FIRST, _MOST_EVENTS = 25, 400
@@ -66,7 +72,7 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
     """
     folder, drawn = Path(__file__).parent, curves(run, show)
     # Of the parts that are not inside of others, the last one is closest to the load.
-    paths = ([one["path"] for one in panel["curves"] if one["path"]] for panel in drawn["panels"])
+    paths = ([curve["path"] for curve in panel["curves"] if curve["path"]] for panel in drawn["panels"])
     ends = [min(reversed(some), key=lambda path: path.count(".")) for some in paths if some]
     left = escape(drawn.pop("left")).replace("--show", "<code>--show</code>")
     hint = f"{_READ} {left}" if drawn["panels"] else _NO_CURVES
@@ -85,7 +91,7 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
         "script": script, "hash": script_hash(script),
     }  # fmt: skip
     page = (folder / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], page)
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], page)
 
 
 def _of_equations(drive: Component, run: Solution, ends: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -93,9 +99,14 @@ def _of_equations(drive: Component, run: Solution, ends: Sequence[str]) -> Itera
     yield "Design checks", _attempt(lambda: design_checks(drive, run))
     yield "What matters", _attempt(lambda: ranking(run, ends))
     yield "Small motions at the end", _attempt(lambda: small_motions(drive, run))
-    yield "Parameters", _parameters(run)
+    values = zip(run.model.flat_parameters, run.model.p, strict=True)
+    rows = [(parameter.path, f"{value:.6g}", str(parameter.unit), parameter.description) for parameter, value in values]
+    yield "Parameters", details(table(("parameter", "value>", "unit", "description"), rows))
     yield "Start", _attempt(lambda: _start(drive, run))
-    yield "How it was computed", _computed(run)
+    packages = f"{tool()}, CasADi {ca.__version__}, Python {platform.python_version()}"
+    options = f"rtol = {run.options.rtol:g}, atol = {run.options.atol:g}"
+    lines = run.model.summary, f"{statistics_line(run)}; {options}.", f"{packages}."
+    yield "How it was computed", "".join(f"<p>{escape(line)}</p>" for line in lines)
     yield "Netlist", _netlist(drive)
 
 
@@ -110,17 +121,17 @@ def _attempt(make: Callable[[], str]) -> str:
 def _happens(drive: Component | None, run: Trajectories) -> str:
     """Events in words, grouped by time, and the notices of the run."""
     instants: dict[float, dict[str, list[Change]]] = {}
-    for one in changes(run):
-        if one.before == one.after and one.after:  # a kink of a curve
+    for change in changes(run):
+        if change.before == change.after and change.after:  # a kink of a curve
             continue
-        instants.setdefault(one.time, {}).setdefault(one.path, []).append(one)
+        instants.setdefault(change.time, {}).setdefault(change.path, []).append(change)
     lines = [
         f"<li><b>{time:.6g} s</b> {'; '.join(escape(_told(run, some)) for some in paths.values())}.</li>"
         for time, paths in list(instants.items())[:_MOST_EVENTS]
     ]
     lines += [f"<li>… {len(instants) - _MOST_EVENTS} more instants</li>"] if len(instants) > _MOST_EVENTS else []
-    told = (*notices(run), *(plausible(drive, run) if drive else ()))
-    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in told)
+    notes = (*notices(run), *(plausible(drive, run) if drive else ()))
+    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in notes)
     if len(lines) > _FIRST + 5:
         rest = details(f"<ul>{''.join(lines[_FIRST:])}</ul>", f"{len(instants) - _FIRST} more instants")
         return f"{said}<ul>{''.join(lines[:_FIRST])}</ul>{rest}"
@@ -130,11 +141,11 @@ def _happens(drive: Component | None, run: Trajectories) -> str:
 def _told(run: Trajectories, some: Sequence[Change]) -> str:
     """Return the changes of one thing at an instant: `clutch becomes stuck (slip reached zero)`."""
     last = some[-1]
-    why = ", ".join(dict.fromkeys(filter(None, (*(one.because for one in some), _slid(run, last)))))
+    why = ", ".join(dict.fromkeys(filter(None, (*(change.because for change in some), _slid(run, last)))))
     if not last.after:
         return f"{last.path}: {why}"
-    known = next((one for one in run.model.flat_discretes if one.path == last.path), None)
-    name = (last.owner if known is None or known.names else last.path) or run.model.name
+    discrete = next((d for d in run.model.flat_discretes if d.path == last.path), None)
+    name = (last.owner if discrete is None or discrete.names else last.path) or run.model.name
     return f"{name} becomes {last.after.replace('_', ' ')}{f' ({why})' if why else ''}"
 
 
@@ -146,8 +157,8 @@ def _slid(run: Trajectories, change: Change) -> str:
     held = {(mode.path, mode.names[number]) for mode, number in modes}
     if (change.path, change.after) not in held:
         return ""
-    left = (one.time for one in run.events if one.time < change.time and (one.mode, one.before) in held and
-            one.mode == change.path)  # fmt: skip
+    left = (event.time for event in run.events if event.time < change.time and (event.mode, event.before) in held and
+            event.mode == change.path)  # fmt: skip
     begin = max(left, default=float(run.time[0]))
     lost = run.energy(begin, change.time)[change.owner].lost if change.time > begin else 0.0
     size, unit = (_KILO, "kJ") if lost >= 10.0 * _KILO else (1.0, "J")
@@ -186,25 +197,10 @@ def _energy(drive: Component | None, run: Trajectories) -> str:
     return f'{along}<table class="energy"><thead>{heads}</thead><tbody>{lines}</tbody></table><p>{closes}</p>{said}'
 
 
-def _parameters(run: Solution) -> str:
-    values = zip(run.model.flat_parameters, run.model.p, strict=True)
-    return details(table(
-        ("parameter", "value>", "unit", "description"),
-        [(one.path, f"{value:.6g}", str(one.unit), one.description) for one, value in values],
-    ))  # fmt: skip
-
-
 def _start(drive: Component, run: Solution) -> str:
     rows = start_values(drive, run.model, run.start)
     cells = [(row.path, f"{row.value:.6g}", row.unit, row.origin) for row in rows]
     return details(table(("variable", "value>", "unit", "where from"), cells))
-
-
-def _computed(run: Solution) -> str:
-    packages = f"{tool()}, CasADi {ca.__version__}, Python {platform.python_version()}"
-    options = f"rtol = {run.options.rtol:g}, atol = {run.options.atol:g}"
-    lines = run.model.summary, f"{statistics_line(run)}; {options}.", f"{packages}."
-    return "".join(f"<p>{escape(line)}</p>" for line in lines)
 
 
 def _netlist(drive: Component) -> str:
@@ -212,3 +208,50 @@ def _netlist(drive: Component) -> str:
     if not origin or not Path(origin).is_file():
         return ""
     return details(f"<pre>{escape(Path(origin).read_text('utf-8'))}</pre>", Path(origin).name)
+
+
+_POINTS = 1200
+"""Number of drawn results, including those at events."""
+_MOST_BANDS = 400
+
+
+def curves(run: Trajectories, patterns: Sequence[str] = ()) -> dict[str, Any]:
+    """Return times, panels of curves by unit, what is left out in words, modes as bands and events.
+
+    Args:
+        run: the run.
+        patterns: names, patterns or formulas of the curves; by default as `for_page` says.
+
+    Raises:
+        UnknownName: nothing matches a pattern.
+        UnitError: the units in a formula do not fit together.
+    """
+    signals, left = for_page(run, patterns)
+    # Evenly spread results, and both sides of every event.
+    count = len(run.time)
+    spread = np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(int))
+    times = np.unique([event.time for event in run.events][:_POINTS])
+    sides = np.concatenate([np.searchsorted(run.time, times, side) for side in ("left", "right")])
+    beside = np.clip(np.concatenate([sides, sides - 1]), 0, count - 1)
+    rows = np.unique(np.concatenate([spread, beside])).astype(np.intp)
+    shown, curve = Display(run.model), evaluated(run, signals)
+    panels: dict[str, dict[str, Any]] = {}
+    for signal in signals:
+        unit = signal.shown_in(shown)
+        title = with_unit(quantity_of(signal), unit)
+        values = signal.driving * shown.converted(curve[signal.name][rows], signal.unit, unit)
+        curve_data = {
+            "name": signal.label,
+            "path": signal.name if signal.plain else "",
+            "values": [float(f"{v:.6g}") for v in values],
+        }
+        panels.setdefault(title, {"title": title, "curves": []})["curves"].append(curve_data)
+    hidden = {discrete.path for discrete in run.model.flat_discretes if discrete.hidden}
+    modes = dict.fromkeys(event.mode for event in run.events if event.mode not in hidden)
+    return {
+        "times": [float(f"{t:.9g}") for t in run.time[rows]],
+        "panels": list(panels.values()),
+        "left": left,
+        "modes": [{"name": mode, "bands": mode_spans(run, mode)[:_MOST_BANDS]} for mode in modes],
+        "events": sorted({float(f"{event.time:.9g}") for event in run.events}),
+    }

@@ -20,8 +20,8 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         for row in rows
     ]
     body = "".join(f"<tr>{line}</tr>" for line in lines)
-    made = f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
-    return f'<div class="scroll">{made}</div>' if lines else ""
+    text = f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+    return f'<div class="scroll">{text}</div>' if lines else ""
 
 
 def details(inside: str, title: str = "show") -> str:
