@@ -135,7 +135,7 @@ typedef struct {
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
-        A(tuned, m->n_p), A(entered, holds), A(positive, guards), A(idle, m->n_transitions),  \
+        A(tuned, m->n_p), A(entered, holds), A(positive, guards), A(idle, m->n_transitions),                        \
         A(ticking, m->n_transitions), A(felt, n_d)
 
 typedef struct Gradient Gradient; /* see gradient.c */
@@ -262,7 +262,7 @@ Result renew(Instance *c);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before);
 /* delay.c */
-#define MOST_PAST 8192 /* rows */
+#define MOST_PAST 16384 /* rows */
 void keep_past(Instance *c, double t, const double *point, double order);
 void keep_piece(Instance *c, double end);
 void keep_before_change(Instance *c);

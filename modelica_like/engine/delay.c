@@ -5,13 +5,13 @@
 
 #define LAST 3 /* terms that must be below the tolerance */
 #define SHORTEST 1e-6
-#define NOISE_OF_RUN 100   /* last terms in tolerances that are errors of the run, if half the length */
-#define NOISE_OF_PIECES 10 /* of another integrator, in tolerances */
-#define SMOOTHER 0.6       /* leaves more than this part of them */
-#define SMOOTH 7           /* a kink that has come again so often is smooth */
-#define DEGREE 5           /* of the polynomial through rows */
-#define APART 1e-12        /* relative: nearer rows tell nothing but rounding */
-#define FEWEST 4           /* rows of a step */
+#define NOISE_OF_RUN 100  /* last terms in tolerances that are errors of the run, if half the length */
+#define NOISE_OF_PIECES 2 /* of another integrator, in tolerances */
+#define SMOOTHER 0.6      /* leaves more than this part of them */
+#define SMOOTH 7          /* a kink that has come again so often is smooth */
+#define DEGREE 5          /* of the polynomial through rows */
+#define APART 1e-12       /* relative: nearer rows tell nothing but rounding */
+#define FEWEST 4          /* rows of a step */
 #define MOST 256
 
 typedef struct { /* order: how often a jump or kink has been integrated that is at its begin, or -1 */
@@ -108,7 +108,7 @@ void keep_piece(Instance *c, double end) {
     if (c->model->n_delays == 0 || c->state.n_past == 0) return;
     begin = last_row(c)->t;
     if (!(begin + APART * fmax(1, fabs(end)) < end)) return;
-    for (int n = FEWEST; n <= MOST; n *= 2) {
+    for (int n = c->integrator != NULL ? FEWEST / 2 : FEWEST; n <= MOST; n *= 2) {
         for (int k = 1; k <= n; k++) {
             double t = k < n ? begin + (end - begin) * k / n : end;
             piece_at(c->model, c->piece, t, point);

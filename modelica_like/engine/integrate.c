@@ -6,6 +6,7 @@
 #define MAX_REJECTIONS 60
 #define LEAST_OVER_EDGE 10 /* of the least step: no error is asked of shorter ones at an edge */
 #define MAX_LANDINGS 8     /* on edges: what switches without end is integrated as it is written */
+#define SHRINKS 0.1        /* a piece of another integrator in which guards do not behave */
 #define SAME_POINT 1e-9    /* rounding of the importer's communication points */
 #define SAME_PART 1e-6     /* of a fixed step */
 #define LEAST_STEPS 50     /* per run, where time itself is in the equations: a pulse could hide between longer ones */
@@ -201,7 +202,7 @@ static Result take_given(Instance *c, double limit, double far) {
         if (!next_piece(c, limit, far)) break;
         if (c->model->n_guards == 0 || search_events(c)) return take_piece(c), RESULT_OK;
         s->panel_valid = 0;
-        far = limit = s->t + (c->whole->begin > c->panel.begin ? 1 : 0.25) * (c->whole->end - s->t);
+        far = limit = s->t + (c->whole->begin > c->panel.begin ? 1 : SHRINKS) * (c->whole->end - s->t);
     }
     leave_piece(c);
     return fail(c, STEP_TOO_SMALL, s->t);

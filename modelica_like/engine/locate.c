@@ -160,20 +160,22 @@ static int mark_wanting(Instance *c, const Look *look, double tolerance) {
     return any;
 }
 
-/* Is a candidate no more than the tolerances of the states make of it? Another integrator that began elsewhere may swing
- * by them, about what has decayed: where it begins anew, it does not. */
-static int is_doubtful(Instance *c, const Look *before, const Look *after) {
+/* Another integrator swings by the tolerances of the states about what has decayed, and about what begins: a guard is
+ * not positive before it is more than these make of it. Where it then crosses zero is known as well as the states are.
+ */
+static void drop_doubtful(Instance *c, const Look *before, const Look *after) {
     const Model *m = c->model;
     double *point = c->vector + m->n_z, *shaken = c->edge_guards;
-    if (c->integrator == NULL || !(c->whole->begin > c->panel.begin)) return 0;
     piece_at(m, c->whole, after->t, point);
-    for (int k = 0; k < m->n_x; k++) point[k] += c->state.tolerance * fabs(point[k]) + c->state.absolute * m->nominals[k];
+    for (int k = 0; k < m->n_x; k++)
+        point[k] += c->state.tolerance * fabs(point[k]) + c->state.absolute * m->nominals[k];
     evaluate_special(c, &m->tapes.guards, after->t, point, shaken);
     for (int g = 0; g < m->n_guards; g++) {
         double moved = fabs(shaken[g] - after->values[g]);
-        if (c->kinds[g] != QUIET && fabs(before->values[g]) <= moved && fabs(after->values[g]) <= moved) return 1;
+        if (c->kinds[g] == QUIET || !(fabs(before->values[g]) <= moved && fabs(after->values[g]) <= moved)) continue;
+        after->values[g] = fmin(after->values[g], 0);
+        c->kinds[g] = QUIET;
     }
-    return 0;
 }
 
 typedef enum { NOTHING, ENDED, TOO_LONG } Found;
@@ -193,7 +195,7 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
     Look found = room_for_look(c, DEPTH + 2);
     double step;
     if (!find_candidates(c, before, after)) return NOTHING;
-    if (is_doubtful(c, before, after)) return TOO_LONG;
+    if (c->integrator != NULL) drop_doubtful(c, before, after);
     if (locate(c, before, after, &found)) {
         c->state.event_pending = mark_wanting(c, &found, LOCATED * fmax(1, fabs(after->t)));
         if (c->state.event_pending) return ENDED;

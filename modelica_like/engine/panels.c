@@ -34,9 +34,7 @@ void piece_between(Instance *c, const Piece *whole, double begin, double end, Pi
     piece_through(m, rows, begin, end, piece);
 }
 
-static double begin_of(const Panel *panel) {
-    return panel->number > 0 ? panel->ends[panel->number - 1] : panel->begin;
-}
+static double begin_of(const Panel *panel) { return panel->number > 0 ? panel->ends[panel->number - 1] : panel->begin; }
 
 static void load_piece(Instance *c) {
     const Panel *panel = &c->panel;

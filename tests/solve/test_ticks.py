@@ -51,18 +51,18 @@ class Meter(Component):
 
 
 def test_a_meter_costs_no_restarts():
-    found = run(Meter(x=1.0, v=0.0), 1.5)
+    tight = {"rtol": 1e-11, "atol": 1e-13}  # the error of IDAS grows with the length of its calls
+    found = simulate(Meter(x=1.0, v=0.0), 1.5, **tight)
     exact = np.cos(20 * 0.005 * np.arange(301))
     assert (found.final["n"], len(found.events)) == (301, 301)
-    # IDAS itself is off by 1e-8 at worst where it goes through in one call.
-    assert found.final["total"] == pytest.approx(exact.sum(), abs=301 * 1e-9)
+    assert found.final["total"] == pytest.approx(exact.sum(), abs=1e-7)
     # Both sides of a tick are in the results: the sample is that of the time of its tick, from there on.
     begins = [one.times[0] for one in found.segments]
     assert begins == pytest.approx([0.005 * k for k in range(301)], abs=1e-12)
     samples = [one.d[found.model.discrete_position["last"]] for one in found.segments]
     assert samples == pytest.approx(exact, abs=1e-8)
     assert found["x"] == pytest.approx(np.cos(20 * found.time), abs=1e-8)
-    without = run(Meter(x=1.0, v=0.0, period=10.0), 1.5)
+    without = simulate(Meter(x=1.0, v=0.0, period=10.0), 1.5, **tight)
     assert found.statistics.integrations <= 12
     assert found.statistics.steps <= 2 * without.statistics.steps
 

@@ -25,7 +25,7 @@ from modelica_like.analyse.sweeps.workers import (
     on_cluster,
 )
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import ModelicaLikeError, ValueOutOfRange, extra_module
+from modelica_like.errors import ExportError, ModelicaLikeError, ValueOutOfRange, extra_module
 from modelica_like.simulation import Model, Solver, build
 
 if TYPE_CHECKING:
@@ -109,6 +109,8 @@ def _solvable(job: Job) -> tuple[Job, str]:
     try:
         if job.settings["solver"] == "native":
             Reference(job).native()
+    except ExportError:
+        raise  # there is no run-time: IDAS has its events, too
     except ModelicaLikeError as error:
         return replace(job, settings={**job.settings, "solver": "idas"}), f"IDAS did all runs: {error.what}"
     return job, ""
