@@ -43,7 +43,8 @@ FAILURE(CONTRADICTS,
     "At t = %g s %I contradicts the rest of the circuit: it is ideal and makes zero what the rest makes %g. Put a "
     "resistance in series or in parallel with it.")
 FAILURE(DELAY_NOT_POSITIVE, "The time of %D is %g s: it must be positive.")
-FAILURE(PAST_TOO_LONG, "Delays reach back over more than %g points of the past. Shorten them, or simulate with IDAS.")
+FAILURE(PAST_TOO_LONG,
+    "Delays reach back over more than %g points of the past. Shorten them, or ask for less precise results.")
 /* Values */
 FAILURE(BELOW_LEAST, "%V = %g is out of range: it must be at least %g.")
 FAILURE(ABOVE_MOST, "%V = %g is out of range: it must be at most %g.")

@@ -77,8 +77,8 @@ typedef struct {
 } Terms; /* of a motion that modes hold */
 
 typedef struct { /* of another integrator: where its pieces end, and five knots of each, shared with the next one */
-    double begin, longest;  /* longest: what pieces may have, as waves ask for */
-    int64_t pieces, number; /* number: of the present one */
+    double begin, longest, since; /* longest: what pieces may have, as waves ask for; since: the last instant */
+    int64_t pieces, number;       /* number: of the present one */
     const double *ends, *knots;
 } Panel;
 
@@ -305,7 +305,7 @@ int is_due(Instance *c);
 void piece_between(Instance *c, const Piece *whole, double begin, double end, Piece *piece);
 int next_piece(Instance *c, double limit, double far);
 /* locate.c */
-#define MOST_LOOKS 9 /* at guards, that there is room for */
+#define MOST_LOOKS 10 /* at guards, that there is room for */
 double cubic_guess(double g0, double r0, double g1, double r1);
 int search_events(Instance *c);
 /* edges.c */

@@ -300,6 +300,8 @@ static Result pass_event(Instance *c) {
     size_t size = (size_t)c->model->n_x * sizeof(double);
     double *rates = c->first_rates, step = s->step, events = s->n_events;
     int panel_valid = s->panel_valid;
+    double since = c->panel.since;
+    c->panel.since = s->t;
     if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
@@ -313,7 +315,10 @@ static Result pass_event(Instance *c) {
     if (!leave_instant(c, s->n_events != events)) return RESULT_ERROR;
     if (!ticks) return RESULT_OK;
     if (memcmp(c->first, c->x, size) != 0) return RESULT_OK;
-    if (was_idle(c)) s->panel_valid = panel_valid;
+    if (was_idle(c) && panel_valid) {
+        s->panel_valid = 1;
+        c->panel.since = since;
+    }
     evaluate_now(c, &c->model->tapes.rates, c->rhs);
     if (memcmp(rates, c->rhs, size) == 0) s->step = step; /* a tick without effect on what moves now */
     return RESULT_OK;

@@ -8,6 +8,8 @@
 #define LOCATED 1e-13
 #define MAX_TRIALS 60
 #define NEAR 0.1
+#define ROUNDING_OF_KNOT 1e-9 /* of the distance of knots */
+#define OF_NEWTON 0.03        /* of a tolerance, that steps of another integrator leave open */
 
 typedef struct { /* guards and their rates at a time within a step; behind them room for one more number per guard */
     double t, *values, *rates;
@@ -160,19 +162,25 @@ static int mark_wanting(Instance *c, const Look *look, double tolerance) {
     return any;
 }
 
-/* Another integrator swings by the tolerances of the states about what has decayed, and about what begins: a guard is
- * not positive before it is more than these make of it. Where it then crosses zero is known as well as the states are.
- */
+/* About what has decayed another integrator swings by the tolerances of the states: a guard is not positive before it
+ * is more than these make of it. In a panel that begins at an instant only its polynomials do: there knots decide, but
+ * for what is left of its Newton's method. */
 static void drop_doubtful(Instance *c, const Look *before, const Look *after) {
     const Model *m = c->model;
-    double *point = c->vector + m->n_z, *shaken = c->edge_guards;
-    piece_at(m, c->whole, after->t, point);
+    const Piece *whole = c->whole;
+    double *point = c->vector + m->n_z, *shaken = c->edge_guards, part = 0.25 * (whole->end - whole->begin);
+    Look knot = room_for_look(c, DEPTH + 3);
+    int at_instant = c->panel.begin == c->panel.since;
+    double number = ceil((after->t - whole->begin) / part - ROUNDING_OF_KNOT);
+    if (at_instant && !look_inside(c, whole->begin + part * number, &knot)) return;
+    piece_at(m, whole, after->t, point);
     for (int k = 0; k < m->n_x; k++)
         point[k] += c->state.tolerance * fabs(point[k]) + c->state.absolute * m->nominals[k];
     evaluate_special(c, &m->tapes.guards, after->t, point, shaken);
     for (int g = 0; g < m->n_guards; g++) {
         double moved = fabs(shaken[g] - after->values[g]);
         if (c->kinds[g] == QUIET || !(fabs(before->values[g]) <= moved && fabs(after->values[g]) <= moved)) continue;
+        if (at_instant && knot.values[g] > OF_NEWTON * moved) continue;
         after->values[g] = fmin(after->values[g], 0);
         c->kinds[g] = QUIET;
     }

@@ -127,10 +127,11 @@ class Instance:
         """Return views of states and implicit unknowns, and of d, which change with the instance."""
         places, unknowns = POINT(), len(self.model.states) + len(self.model.implicit)
         self.library.failure(self.address, places)
-        return tuple(
+        x, d = (
             np.ctypeslib.as_array(place, (size,)) if size else np.zeros(0)
-            for place, size in zip(places, (unknowns, self.model.discrete_size), strict=False)
+            for place, size in ((places[0], unknowns), (places[1], self.model.discrete_size))
         )
+        return x, d
 
     def limit(self, longest: float) -> None:
         """Limit steps from now on, in s."""

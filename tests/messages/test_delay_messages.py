@@ -130,7 +130,7 @@ REFUSED: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = 
     "long": (
         StepFailed,
         lambda: simulate(Swinging(), 3.0, solver="native"),
-        "Delays reach back over more than 8192 points of the past.\nShorten them, or simulate with IDAS.",
+        "Delays reach back over more than 16384 points of the past.\nShorten them, or ask for less precise results.",
     ),
     "fixed steps": (
         ExportError,

@@ -3,7 +3,7 @@
     python tests/mutants/mutants.py --record             which test runs which line; once, and after greater changes
     python tests/mutants/mutants.py --record tests/…     the same for files of tests that are new or changed
     python tests/mutants/mutants.py --sample 300         a random sample; `--seed 2` another one
-    python tests/mutants/mutants.py --in solve/guards.py [--at 63]    all changes of a file, or of a line
+    python tests/mutants/mutants.py --in solve/panels.py [--at 63]    all changes of a file, or of a line
     python tests/mutants/mutants.py --list …             only tells them
 
 The tests that run a changed line go one after the other, fastest first, for four minutes of the processor. A change is

@@ -125,7 +125,7 @@ ALONE: dict[Code, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
     ),
     Code.PAST_TOO_LONG: (
         StepFailed, native(Late(x=0.0, a=1.0)),
-        r"Delays reach back over more than 8192 points of the past\.\nShorten them, or simulate with IDAS\.",
+        r"Delays reach back over more than 16384 points of the past\.\nShorten them, or ask for less precise results\.",
     ),
     Code.COLUMN_FALLS: (
         ValueOutOfRange, lambda: restarted(build(coasting(tau_pos=TABLE), tables=["*"]), {"bearing.tau_pos[2,1]": 0.0}),

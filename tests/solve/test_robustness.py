@@ -28,7 +28,6 @@ from modelica_like.language import (
 )
 from modelica_like.show.report.run import notices
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.initialize import Point
 
 TOLERANCES = [1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10]
 
