@@ -106,7 +106,7 @@ class Panels:
         self._switched = sorted({transition.mode for transition in model.transitions})
         self._known: dict[bytes, _Segment] = {}
         self._modes, self._segment = b"", _Segment(begin, self._length)
-        self._graded = self._cut = False
+        self._graded = self._cut = self._begins = False
         self._begin, self._ends, self._wishes = begin, np.zeros(0), np.zeros(0)
         self._telling = np.zeros(0, bool)
         self._failures, self._failed_before, self._gave_up_at = 0, begin, -np.inf
@@ -209,6 +209,8 @@ class Panels:
         modes, ends, segment = now.d[self._switched].tobytes(), self._ends, self._segment
         if now.t >= self._failed_before:
             self._failures = 0
+        if len(ends) and now.t == self._begin and modes == self._modes:
+            return self._begins  # the run-time asks again, for a shorter one
         if len(ends):
             wishes = self._wishes[: int(np.searchsorted(ends, now.t)) + 1]
             recent = np.sort(wishes[len(wishes) // 2 :])
@@ -218,14 +220,15 @@ class Panels:
                 segment.finest = float(telling.min(initial=ends[len(wishes[:-1])] - self._begin))
             passed = float(ends[-1] - self._begin)
             self._span = _LONGER * (passed if self._cut else max(self._span, passed))
-        if begins := not len(ends) or now.t < ends[-1] - time_resolution(now.t) or modes != self._modes:
-            if len(ends):
+        self._begins = not len(ends) or now.t < ends[-1] - time_resolution(now.t) or modes != self._modes
+        if self._begins:
+            if now.t > segment.begin:
                 segment.lasted = now.t - segment.begin
                 self._known[self._modes] = segment
                 self._begin_like(self._known.get(modes, segment))
             self._segment = _Segment(now.t, self._length)
         self._modes = modes
-        return begins
+        return self._begins
 
     def _begin_like(self, last: _Segment) -> None:
         self._length = last.finest
@@ -248,7 +251,8 @@ class Panels:
         self._failed_before = max(self._failed_before, t + span)
         allowed = _MAX_FAILURES if self._guarded else _FEW_FAILURES
         if self._failures <= allowed and span > time_resolution(t):
-            self._span = _SHRINKS * span
+            # What does not converge in the shortest one may in a longer one.
+            self._span = span * (_SHRINKS if span > 2 * _SHORTEST * time_resolution(t) else _SHRINKS**-4)
             self._length, self._graded = self._span / _GRADED.pieces, True
             return
         self._relax(t)
