@@ -152,7 +152,7 @@ void piece_at(const Model *m, const Piece *piece, double t, double *point) {
         memcpy(point, last, (size_t)n * sizeof(double));
         return;
     }
-    for (int k = 0; k < n; k++) point[k] = r * first[k] + s * (last[k] + r * (a[k] + s * (b[k] + s * c[k])));
+    for (int k = 0; k < n; k++) point[k] = first[k] + s * (last[k] - first[k] + r * (a[k] + s * (b[k] + s * c[k])));
 }
 
 /* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4); states that are nothing but
@@ -300,8 +300,6 @@ static Result pass_event(Instance *c) {
     size_t size = (size_t)c->model->n_x * sizeof(double);
     double *rates = c->first_rates, step = s->step, events = s->n_events;
     int panel_valid = s->panel_valid;
-    double since = c->panel.since;
-    c->panel.since = s->t;
     if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
@@ -315,10 +313,7 @@ static Result pass_event(Instance *c) {
     if (!leave_instant(c, s->n_events != events)) return RESULT_ERROR;
     if (!ticks) return RESULT_OK;
     if (memcmp(c->first, c->x, size) != 0) return RESULT_OK;
-    if (was_idle(c) && panel_valid) {
-        s->panel_valid = 1;
-        c->panel.since = since;
-    }
+    if (was_idle(c)) s->panel_valid = panel_valid;
     evaluate_now(c, &c->model->tapes.rates, c->rhs);
     if (memcmp(rates, c->rhs, size) == 0) s->step = step; /* a tick without effect on what moves now */
     return RESULT_OK;

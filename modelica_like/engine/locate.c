@@ -162,17 +162,16 @@ static int mark_wanting(Instance *c, const Look *look, double tolerance) {
     return any;
 }
 
-/* About what has decayed another integrator swings by the tolerances of the states: a guard is not positive before it
- * is more than these make of it. In a panel that begins at an instant only its polynomials do: there knots decide, but
- * for what is left of its Newton's method. */
+/* Between knots of another integrator, its polynomials swing by the tolerances of the states about what begins or has
+ * decayed: there the next knot decides, as far as it is more than Newton's method leaves open. (What a relation of the
+ * user's sets at zero, such as the speed of a ball, must be set there.) */
 static void drop_doubtful(Instance *c, const Look *before, const Look *after) {
     const Model *m = c->model;
     const Piece *whole = c->whole;
     double *point = c->vector + m->n_z, *shaken = c->edge_guards, part = 0.25 * (whole->end - whole->begin);
     Look knot = room_for_look(c, DEPTH + 3);
-    int at_instant = c->panel.begin == c->panel.since;
     double number = ceil((after->t - whole->begin) / part - ROUNDING_OF_KNOT);
-    if (at_instant && !look_inside(c, whole->begin + part * number, &knot)) return;
+    if (!look_inside(c, whole->begin + part * number, &knot)) return;
     piece_at(m, whole, after->t, point);
     for (int k = 0; k < m->n_x; k++)
         point[k] += c->state.tolerance * fabs(point[k]) + c->state.absolute * m->nominals[k];
@@ -180,7 +179,8 @@ static void drop_doubtful(Instance *c, const Look *before, const Look *after) {
     for (int g = 0; g < m->n_guards; g++) {
         double moved = fabs(shaken[g] - after->values[g]);
         if (c->kinds[g] == QUIET || !(fabs(before->values[g]) <= moved && fabs(after->values[g]) <= moved)) continue;
-        if (at_instant && knot.values[g] > OF_NEWTON * moved) continue;
+        int hidden = m->modes[m->transitions[m->guard_transition[g]].mode].hidden;
+        if (knot.values[g] > (hidden ? 0 : OF_NEWTON * moved)) continue;
         after->values[g] = fmin(after->values[g], 0);
         c->kinds[g] = QUIET;
     }

@@ -38,7 +38,7 @@ class Dense:
         rows, nx = self._steps[pieces], len(self._model.states)
         s = ((times - rows[:, 1]) / (rows[:, 2] - rows[:, 1]))[:, None]
         first, last, a, b, c = np.split(rows[:, 3:], 5, axis=1)
-        y = ((1 - s) * first + s * (last + (1 - s) * (a + s * (b + s * c)))).T
+        y = (first + s * (last - first + (1 - s) * (a + s * (b + s * c)))).T
         return y[:nx], polished(self._model, times, y[:nx], y[nx:], self.d[:, pieces])
 
 

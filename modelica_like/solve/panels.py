@@ -31,7 +31,7 @@ _WORTH = 16
 """Pieces of a panel at least: a start of IDAS costs as much as ten of them."""
 _LARGEST = 2**22
 """Numbers in a call, limited by memory."""
-_PRECISE, _AIM = 1.0, 0.2
+_PRECISE, _AIM = 0.5, 0.1
 """Largest error of a polynomial in tolerances, and the one to aim at: the error of IDAS is about one."""
 _ORDER = 5
 """Of that error, in the length of a piece."""

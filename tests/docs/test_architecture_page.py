@@ -19,7 +19,7 @@ def test_files_that_the_page_names_exist() -> None:
 def test_tests_that_the_page_names_exist() -> None:
     rows = [row.split("|") for row in PAGE.splitlines() if row.startswith("| ")]
     named = [one for row in rows for one in re.findall(r"`((?:\w+/)?test_\w+(?:\*|\.py))`", row[-2])]
-    assert len(named) > 25
+    assert len(named) > 20
     tests = ROOT / "tests"
     assert [one for one in named if not [*tests.glob(one), *tests.glob(f"*/{one}")]] == []
 

@@ -75,10 +75,9 @@ def test_an_instance_without_memory(check_message: Check, monkeypatch: pytest.Mo
     check_message(NotEnoughMemory, lambda: simulate(Swing(), 1e-6, solver="native"), text)
 
 
-def test_without_a_library_nothing_happens_at_an_instant(check_message: Check, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_library_nothing_runs(check_message: Check, monkeypatch: pytest.MonkeyPatch) -> None:
     def none() -> None:
         raise ExportError("There is no C compiler.", advice="Install cc.")
 
     monkeypatch.setattr(model, "library", none)
     check_message(ExportError, lambda: simulate(Stopping(), 2.0), "There is no C compiler.\nInstall cc.")
-    assert simulate(Swing(), 1e-7).time[-1] == pytest.approx(1e-7)
