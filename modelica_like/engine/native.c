@@ -270,30 +270,6 @@ static int instant(Native *n, NativeRun *r, double width) {
     return write_point(n, r);
 }
 
-/* An instant for a program that integrates by itself: `located` transitions fire, and what follows. The point becomes
- * the one after it; `run` gets the events and impacts, all or, where they have no room, none. */
-EXPORTED int native_instant(
-    Native *n, double t, const unsigned char *located, double *x, double *z, double *d, NativeRun *run) {
-    Instance *c = n->c;
-    const Model *m = c->model;
-    run->n_events = run->n_impacts = n->strikes = 0;
-    n->run = run;
-    c->noted = note_event;
-    c->struck = note_impact;
-    c->state.phase = PHASE_STEP;
-    if (!state_copy_out(c, &n->before)) return NATIVE_FAILED;
-    c->state.t = t;
-    go_to(c, x, z, d);
-    Result result = settle(c) && pass_instant(c, memcpy(c->wishes, located, m->n_transitions), 1);
-    n->run = NULL;
-    if (run->n_events > run->room_events || run->n_impacts > run->room_impacts)
-        return code(state_copy_in(c, n->before)) == NATIVE_OK ? NATIVE_MORE : NATIVE_FAILED;
-    memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
-    memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
-    memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
-    return code(result);
-}
-
 /* Notes the step that has just been taken. */
 static void note_step(Native *n, NativeRun *r) {
     size_t size = 5 * (size_t)n->c->model->n_unknowns;

@@ -90,7 +90,6 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "drop": (None, [_POINTER, c.POINTER(_POINTER)]),
     "counts": (None, 2 * [_POINTER]),
     "run": (_CODE, [_POINTER, _NUMBER, _COUNT, c.POINTER(Run)]),
-    "instant": (_CODE, [_POINTER, _NUMBER, *4 * [_POINTER], c.POINTER(Run)]),
     "batch": (_COUNT, [_POINTER, c.POINTER(BatchArguments)]),
     "instance": (_POINTER, [_POINTER]),
 }

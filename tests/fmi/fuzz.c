@@ -88,7 +88,7 @@ static void use(const Model *m) {
         if (k % 7 == 2) output_rate(c, v->reference, 1 + k % 3, &value);
     }
     rosenbrock_step(c, 0, c->x, 1e-3, 0, c->piece);
-    next_moment(c);
+    next_moment(c, 1);
     state_copy_in(c, copy);
     state_release(c, &copy);
     free(rates);
