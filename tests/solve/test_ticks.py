@@ -63,8 +63,8 @@ def test_a_meter_costs_no_restarts():
     assert samples == pytest.approx(exact, abs=1e-8)
     assert found["x"] == pytest.approx(np.cos(20 * found.time), abs=1e-8)
     without = simulate(Meter(x=1.0, v=0.0, period=10.0), 1.5, **tight)
-    assert found.statistics.integrations <= 12
-    assert found.statistics.steps <= 2 * without.statistics.steps
+    assert found.statistics.integrations <= without.statistics.integrations + 2
+    assert found.statistics.steps <= 1.1 * without.statistics.steps
 
 
 class Watched(Meter):
