@@ -177,6 +177,7 @@ typedef struct Instance {
     Piece *whole;
     Integrator integrator; /* gives the panels; NULL: steps of the run-time */
     Panel panel;
+    int own_step, doubtful; /* in spite of an integrator; a search could not tell whether a guard is positive */
     Terms *terms, *strike_terms;
     Strike strike;
     int stopped; /* something has been stopped at the present instant */
@@ -302,12 +303,14 @@ Result move_to(Instance *c, double t);
 Result take_changes(Instance *c);
 int is_due(Instance *c);
 /* panels.c */
+static inline int takes_panels(const Instance *c) { return c->integrator != NULL && !c->own_step; }
 void piece_between(Instance *c, const Piece *whole, double begin, double end, Piece *piece);
 int next_piece(Instance *c, double limit, double far);
 /* locate.c */
-#define MOST_LOOKS 10 /* at guards, that there is room for */
+#define MOST_LOOKS 11 /* at guards, that there is room for */
 double cubic_guess(double g0, double r0, double g1, double r1);
 int search_events(Instance *c);
+const double *guards_moved(Instance *c, const Piece *piece, double t, double relative, double absolute);
 /* edges.c */
 double seen_length(Instance *c, double least, double *most);
 void keep_edges(Instance *c);

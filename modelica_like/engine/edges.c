@@ -10,8 +10,9 @@
 #define NEAR 0.1        /* an extremum that comes this close to zero is looked at */
 #define UNSEEN 10       /* error of a window between two edges, in tolerances, from which on the step ends before it */
 #define UNEXPLAINED 300 /* of a piece without edges: less is the error of another integrator */
-#define ALREADY 1e-9    /* of the step: edges at its beginning, on which it stands */
-#define FINE 0.9        /* of the advance of a phase that a step may have */
+#define ROUNDING_OF_STATES 1e-14
+#define ALREADY 1e-9 /* of the step: edges at its beginning, on which it stands */
+#define FINE 0.9     /* of the advance of a phase that a step may have */
 
 static double *edges_at(Instance *c, double t, double *point, double *values) {
     evaluate_special(c, &c->model->tapes.edges, t, point, values);
@@ -164,14 +165,21 @@ int stands_on_edge(Instance *c, unsigned char *zero) {
     return any | any_of(zero, m->n_guards);
 }
 
-/* Is a guard positive at a time inside the piece that is not at its ends? `positive` are those that are. */
-static int has_risen(Instance *c, double t, int inside) {
+/* Notes guards that are positive at an end of the piece, or cannot fire. */
+static void note_positive(Instance *c, double t) {
     const double *guards = guards_inside(c, t);
-    int any = 0;
-    for (int g = 0; g < c->model->n_guards; g++)
-        if (!inside) c->positive[g] |= guards[g] > 0 || !guard_active(c, g);
-        else any |= guards[g] > 0 && !c->positive[g];
-    return any;
+    for (int g = 0; g < c->model->n_guards; g++) c->positive[g] |= guards[g] > 0 || !guard_active(c, g);
+}
+
+/* Is a guard positive at a time inside the piece that is not at its ends, and is that more than rounding? */
+static int has_risen(Instance *c, double t) {
+    const double *guards = guards_inside(c, t), *rounding = NULL;
+    for (int g = 0; g < c->model->n_guards; g++) {
+        if (!(guards[g] > 0) || c->positive[g]) continue;
+        if (rounding == NULL) rounding = guards_moved(c, c->piece, t, ROUNDING_OF_STATES, 0);
+        if (guards[g] > rounding[g]) return 1;
+    }
+    return 0;
 }
 
 /* Goes through the windows of a step and returns the smaller length that it must have, or infinity. */
@@ -179,17 +187,17 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
     double begin = c->piece->begin, h = c->piece->end - begin, landing = h, *now = c->edges_middle;
     double resolved = begin + TIME_RESOLUTION * fmax(1, fabs(begin));
     int unseen = 0;
-    if (of_slopes && c->integrator != NULL && !factor_at(c, begin, c->piece->points, h)) return INFINITY;
+    if (of_slopes && takes_panels(c) && !factor_at(c, begin, c->piece->points, h)) return INFINITY;
     memcpy(now, c->edges, (size_t)c->model->tapes.edges.n_outputs * sizeof(double));
     for (double before = begin, edge = begin; edge < c->piece->end && !(unseen && landing < h); before = edge) {
         edge = fmin(next_edge(c, before, now, precisely), c->piece->end);
         double between = 0.5 * (before + edge);
-        if (of_guards && between > resolved && has_risen(c, between, 1)) return between - begin;
-        if (of_guards && edge > resolved && has_risen(c, edge, 1)) return edge - begin;
+        if (of_guards && between > resolved && has_risen(c, between)) return between - begin;
+        if (of_guards && edge > resolved && has_risen(c, edge)) return edge - begin;
         unseen |= of_slopes && window_error(c, before, edge, 1) > UNSEEN;
         if (landing == h && edge - begin > fmax(least, ALREADY * h)) landing = edge - begin;
     }
-    if (unseen && landing >= h && c->integrator != NULL) return 0.5 * h; /* the piece ends at its only edge */
+    if (unseen && landing >= h && takes_panels(c)) return 0.5 * h; /* the piece ends at its only edge */
     return unseen && landing < h ? landing * (1 + BEHIND) : INFINITY;
 }
 
@@ -197,7 +205,7 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
  * integrator may be longer than pieces: one that goes over a force shows it in pieces beside its edges, too. */
 static double explained_length(Instance *c) {
     double begin = c->piece->begin, end = c->piece->end;
-    if (c->integrator == NULL || c->model->settings->n_slope_edges == 0) return INFINITY;
+    if (!takes_panels(c) || c->model->settings->n_slope_edges == 0) return INFINITY;
     if (window_error(c, begin, end, 0) <= UNEXPLAINED) return INFINITY;
     if (!factor_at(c, begin, c->piece->points, end - begin)) return INFINITY;
     return window_error(c, begin, end, 1) > UNEXPLAINED ? 0.5 * (end - begin) : INFINITY;
@@ -236,7 +244,7 @@ double seen_length(Instance *c, double least, double *most) {
     of_guards = any_edge(m->settings->n_slope_edges, n_edges, first, middle, last);
     if (!of_slopes && !of_guards) return explained_length(c);
     memset(c->positive, 0, (size_t)m->n_guards);
-    if (of_guards) has_risen(c, begin, 0), has_risen(c, c->piece->end, 0);
+    if (of_guards) note_positive(c, begin), note_positive(c, c->piece->end);
     length = judge_windows(c, least, of_slopes, of_guards, 0);
     return isfinite(length) ? judge_windows(c, least, of_slopes, of_guards, 1) : INFINITY;
 }

@@ -194,20 +194,6 @@ static void take_piece(Instance *c) {
     keep_edges(c);
 }
 
-/* Takes the next piece of another integrator, shorter where an event asks for it. */
-static Result take_given(Instance *c, double limit, double far) {
-    State *s = &c->state;
-    for (int n = 0; n < MAX_REJECTIONS && limit - s->t >= least_step(s); n++) {
-        clear_pending(c);
-        if (!next_piece(c, limit, far)) break;
-        if (c->model->n_guards == 0 || search_events(c)) return take_piece(c), RESULT_OK;
-        s->panel_valid = 0;
-        far = limit = s->t + (c->whole->begin > c->panel.begin ? 1 : SHRINKS) * (c->whole->end - s->t);
-    }
-    leave_piece(c);
-    return fail(c, STEP_TOO_SMALL, s->t);
-}
-
 /* Takes one step from the present point towards `limit`, shorter where accuracy or an event asks for it. */
 static Result take_step(Instance *c, double limit) {
     State *s = &c->state;
@@ -247,6 +233,29 @@ static Result take_step(Instance *c, double limit) {
             report(c, LOG_INTEGRATOR, RESULT_OK, "t = %.12g s: step %.3e s, error %.2e of the tolerance, %d rejected",
                 c->piece->end, c->piece->end - c->piece->begin, error, rejected);
         return RESULT_OK;
+    }
+    leave_piece(c);
+    return fail(c, STEP_TOO_SMALL, s->t);
+}
+
+/* Takes the next piece of another integrator, shorter where an event asks for it; where only an own step can tell
+ * whether there is one, that. */
+static Result take_given(Instance *c, double limit, double far) {
+    State *s = &c->state;
+    double end = limit;
+    for (int n = 0; n < MAX_REJECTIONS && end - s->t >= least_step(s); n++) {
+        clear_pending(c);
+        c->doubtful = 0;
+        if (!next_piece(c, end, far)) break;
+        if (c->model->n_guards == 0 || search_events(c)) return take_piece(c), RESULT_OK;
+        leave_piece(c);
+        if (c->doubtful) {
+            c->own_step = 1;
+            Result result = take_step(c, limit);
+            c->own_step = 0;
+            return result;
+        }
+        far = end = s->t + (c->whole->begin > c->panel.begin ? 1 : SHRINKS) * (c->whole->end - s->t);
     }
     leave_piece(c);
     return fail(c, STEP_TOO_SMALL, s->t);

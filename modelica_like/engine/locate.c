@@ -8,8 +8,6 @@
 #define LOCATED 1e-13
 #define MAX_TRIALS 60
 #define NEAR 0.1
-#define ROUNDING_OF_KNOT 1e-9 /* of the distance of knots */
-#define OF_NEWTON 0.03        /* of a tolerance, that steps of another integrator leave open */
 
 typedef struct { /* guards and their rates at a time within a step; behind them room for one more number per guard */
     double t, *values, *rates;
@@ -44,7 +42,7 @@ static int step_to(Instance *c, double t, Look *look) {
     if (t <= whole->begin) {
         memcpy(c->piece, whole, piece_size(c->model));
         memcpy(last_of(c->model, c->piece), whole->points, (size_t)c->model->n_unknowns * sizeof(double));
-    } else if (c->integrator != NULL) piece_between(c, whole, whole->begin, t, c->piece);
+    } else if (takes_panels(c)) piece_between(c, whole, whole->begin, t, c->piece);
     else if (rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, c->piece) < 0) return 0;
     c->piece->end = t;
     return look_at(c, t, last_of(c->model, c->piece), look);
@@ -162,28 +160,33 @@ static int mark_wanting(Instance *c, const Look *look, double tolerance) {
     return any;
 }
 
-/* Between knots of another integrator, its polynomials swing by the tolerances of the states about what begins or has
- * decayed: there the next knot decides, as far as it is more than Newton's method leaves open. (What a relation of the
- * user's sets at zero, such as the speed of a ball, must be set there.) */
-static void drop_doubtful(Instance *c, const Look *before, const Look *after) {
+/* What changes of the states make of the guards at a point of a piece: all together, and any two apart. */
+const double *guards_moved(Instance *c, const Piece *piece, double t, double relative, double absolute) {
     const Model *m = c->model;
-    const Piece *whole = c->whole;
-    double *point = c->vector + m->n_z, *shaken = c->edge_guards, part = 0.25 * (whole->end - whole->begin);
-    Look knot = room_for_look(c, DEPTH + 3);
-    double number = ceil((after->t - whole->begin) / part - ROUNDING_OF_KNOT);
-    if (!look_inside(c, whole->begin + part * number, &knot)) return;
-    piece_at(m, whole, after->t, point);
-    for (int k = 0; k < m->n_x; k++)
-        point[k] += c->state.tolerance * fabs(point[k]) + c->state.absolute * m->nominals[k];
-    evaluate_special(c, &m->tapes.guards, after->t, point, shaken);
-    for (int g = 0; g < m->n_guards; g++) {
-        double moved = fabs(shaken[g] - after->values[g]);
-        if (c->kinds[g] == QUIET || !(fabs(before->values[g]) <= moved && fabs(after->values[g]) <= moved)) continue;
-        int hidden = m->modes[m->transitions[m->guard_transition[g]].mode].hidden;
-        if (knot.values[g] > (hidden ? 0 : OF_NEWTON * moved)) continue;
-        after->values[g] = fmin(after->values[g], 0);
-        c->kinds[g] = QUIET;
+    double *here = room_for_look(c, DEPTH + 3).values, *shaken = room_for_look(c, DEPTH + 4).values,
+           *moved = here + 2 * m->n_guards, *point = c->vector + m->n_z;
+    memset(moved, 0, (size_t)m->n_guards * sizeof(double));
+    piece_at(m, piece, t, point);
+    evaluate_special(c, &m->tapes.guards, t, point, here);
+    for (int bit = 1; bit < 2 * m->n_x; bit *= 2) {
+        piece_at(m, piece, t, point);
+        for (int k = 0; k < m->n_x; k++) {
+            double change = relative * fabs(point[k]) + absolute * m->nominals[k];
+            point[k] += k & (bit / 2) ? -change : change;
+        }
+        evaluate_special(c, &m->tapes.guards, t, point, shaken);
+        for (int g = 0; g < m->n_guards; g++) moved[g] = fmax(moved[g], fabs(shaken[g] - here[g]));
     }
+    return moved;
+}
+
+/* Is a candidate no more than the tolerances of the states make of it? About what begins, or has decayed, the points of
+ * another integrator swing by them: there an own step decides. */
+static int is_doubtful(Instance *c, const Look *before, const Look *after) {
+    const double *moved = guards_moved(c, c->whole, after->t, c->state.tolerance, c->state.absolute);
+    for (int g = 0; g < c->model->n_guards; g++)
+        if (c->kinds[g] != QUIET && fmax(fabs(before->values[g]), fabs(after->values[g])) <= moved[g]) return 1;
+    return 0;
 }
 
 typedef enum { NOTHING, ENDED, TOO_LONG } Found;
@@ -203,7 +206,10 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
     Look found = room_for_look(c, DEPTH + 2);
     double step;
     if (!find_candidates(c, before, after)) return NOTHING;
-    if (c->integrator != NULL) drop_doubtful(c, before, after);
+    if (takes_panels(c) && is_doubtful(c, before, after)) {
+        c->doubtful = 1;
+        return TOO_LONG;
+    }
     if (locate(c, before, after, &found)) {
         c->state.event_pending = mark_wanting(c, &found, LOCATED * fmax(1, fabs(after->t)));
         if (c->state.event_pending) return ENDED;

@@ -34,7 +34,7 @@ _FLAGS = {
     "IDA_ILL_INPUT": "an input was invalid",
 }
 
-_FIRST_STEP = 1e-6
+_FIRST_STEP = 1e-5
 """In scaled time. The first steps have a low order: longer ones cause errors of several tolerances at every event."""
 _SHORTENED = 1e-6
 """Largest factor by which IDAS shortens its first step before it gives up."""
@@ -119,16 +119,25 @@ class Integrator:
         options: tolerances.
         whole: whether intervals are whole runs: then large models get an instance for each length, which is faster.
         counted: whether to count steps and evaluations, which costs as much as five steps.
+        first: first step in scaled time.
 
     Attributes:
         tolerances: present relative one, and absolute ones of the states.
         reached: time in s at which IDAS gave up last.
     """
 
-    def __init__(self, model: CompiledDae, options: Options, *, whole: bool = False, counted: bool = True) -> None:
+    def __init__(
+        self,
+        model: CompiledDae,
+        options: Options,
+        *,
+        whole: bool = False,
+        counted: bool = True,
+        first: float = _FIRST_STEP,
+    ) -> None:
         self.model = model
         self.options = options
-        self.counted = counted
+        self.counted, self.first = counted, first
         self.calls = 0
         self.steps = 0
         self.evaluations = 0
@@ -260,7 +269,7 @@ class Integrator:
             KeyboardInterrupt: the run was interrupted; IDAS treats this as an error in the equations.
         """
         self._seconds = float(p[1]) if self._whole and not gentle else None
-        first = self._first_step(start, p[1]) if gentle else _FIRST_STEP
+        first = self._first_step(start, p[1]) if gentle else self.first
         longest = self._longest(p[1], gentle)
         instance, scaled = self._instance(grid, steps, gentle, first, longest), self._seconds is None
         known = self.model.fast(

@@ -31,7 +31,7 @@ _WORTH = 16
 """Pieces of a panel at least: a start of IDAS costs as much as ten of them."""
 _LARGEST = 2**22
 """Numbers in a call, limited by memory."""
-_PRECISE, _AIM = 0.5, 0.1
+_PRECISE, _AIM = 1.0, 0.3
 """Largest error of a polynomial in tolerances, and the one to aim at: the error of IDAS is about one."""
 _ORDER = 5
 """Of that error, in the length of a piece."""
@@ -45,6 +45,9 @@ _LONGER, _ROOM = 4.0, 1.5
 """Growth of panels without events; length of a panel over that of the last segment with its modes."""
 _SHORTEST = 100
 """Of a panel, in time resolutions."""
+_FIRST_STEPS = {True: 1e-5, False: 1e-6}
+"""Of a panel, in its length: of one that is a whole run, and of those that begin at events, about as long as their
+segments."""
 _FIRST = 256, 16
 """Pieces and panels of a run, as far as one knows at its begin."""
 _MAX_FAILURES, _FEW_FAILURES = 40, 6
@@ -86,7 +89,7 @@ class Panels:
         self.model, self.options = model, options
         self._guarded = any(not transition.timed for transition in model.transitions)
         whole = not (model.transitions or model.delay_parts or model.edges.count)
-        self.integrator = Integrator(model, options, whole=whole)
+        self.integrator = Integrator(model, options, whole=whole, first=_FIRST_STEPS[whole])
         self.notices: list[str] = []
         most = max(_LARGEST // (_LOOKS * (len(model.states) + len(model.implicit))), 1)
         self._grids = [grid for grid in _EVEN if grid.pieces <= most]

@@ -67,7 +67,7 @@ class Governed(Component):
 
 def test_a_component_with_a_mode() -> None:
     """Up by 2/0.5 rad/s²; while it acts, towards 2/0.1 rad/s with the time constant 0.5/0.1 s."""
-    run = simulate(Governed(), "30 s", rtol=1e-8)
+    run = simulate(Governed(), "30 s")
     begins = 60 / 4
     ends = begins + 5 * log((60 - 20) / (30 - 20))
     again = ends + (60 - 30) / 4

@@ -76,7 +76,7 @@ def test_a_wattmeter_and_heat_by_signals() -> None:
         "c": ["R.n", "source.n", "meter.nv", "earth.p"], "q": ["power.y", "heat.Q_flow"],
         "h": ["heat.port", "body.port", "wall.port_a"], "w": ["wall.port_b", "air.port"], "t": ["weather.y", "air.T"],
     }  # fmt: skip
-    run = simulate(Assembly("d", parts=parts, connect=connect), 2.0, rtol=1e-10, atol=1e-12)
+    run = simulate(Assembly("d", parts=parts, connect=connect), 2.0, **TIGHT)
     assert run.final["meter.power"] == pytest.approx(3 * 4**2, rel=1e-8)
     settled = 290 + 50 / 4
     assert run.final["body.T"] == pytest.approx(settled + (300 - settled) * exp(-4 * 2 / 200), rel=1e-9)

@@ -26,7 +26,7 @@ UNDECIDED = {
     },
 }
 """Mode changes that rounding decides; docs/native.md says why."""
-RTOL = 5e-11
+RTOL = 1e-10
 
 
 def ranges(run: Solution) -> np.ndarray:
