@@ -192,9 +192,9 @@ static int is_doubtful(Instance *c, const Look *before, const Look *after) {
 typedef enum { NOTHING, ENDED, TOO_LONG } Found;
 
 /* Go on by the time resolution; what crossed and is still positive then wants to fire, else the search begins anew. */
-static Found look_behind(Instance *c, double end, Look *look) {
+static Found look_behind(Instance *c, Look *look) {
     double due = c->piece->end + TIME_RESOLUTION * fmax(1, fabs(c->piece->end));
-    if (!step_to(c, fmin(due, end), look)) return TOO_LONG;
+    if (!step_to(c, fmin(due, c->whole->end), look)) return TOO_LONG;
     for (int g = 0; g < c->model->n_guards; g++)
         if (c->kinds[g] == CROSSING && fmin(look->values[g], look->values[g] + (due - look->t) * look->rates[g]) > 0)
             c->state.event_pending = c->wanting[c->model->guard_transition[g]] = 1;
@@ -214,7 +214,7 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
         c->state.event_pending = mark_wanting(c, &found, LOCATED * fmax(1, fabs(after->t)));
         if (c->state.event_pending) return ENDED;
         /* Positive for less than the time resolution: what the last event left is on its way down. */
-        if (memchr(c->kinds, CROSSING, (size_t)c->model->n_guards) != NULL) return look_behind(c, after->t, &found);
+        if (memchr(c->kinds, CROSSING, (size_t)c->model->n_guards) != NULL) return look_behind(c, &found);
     } else if (newton(c, after, &step)) return TOO_LONG;
     memcpy(c->piece, c->whole, piece_size(c->model));
     return NOTHING;
@@ -254,5 +254,5 @@ int search_events(Instance *c) {
     Found found = look_into(c, &before, &after, DEPTH);
     if (found == NOTHING) memcpy(before.values, after.values, 2 * (size_t)c->model->n_guards * sizeof(double));
     else if (found == ENDED) c->look_valid = 0;
-    return found != TOO_LONG;
+    return found != TOO_LONG && (c->piece->end > c->piece->begin || c->state.event_pending);
 }

@@ -155,15 +155,13 @@ class EngineLoop:
 
     @property
     def _stuck(self) -> bool:
-        return (
-            bool(self.model.states) and self._idas is None and self.counts[0] - self._passed[1] > self.options.max_steps
-        )
+        return bool(self.model.states) and self._instance.counts()[0] - self._passed[1] > self.options.max_steps
 
     def _reached(self, time: float) -> bool:
         if self.progress is not None:
             self.progress(time)
         if time - self._passed[0] >= self._part * (1 - _ROUNDING):
-            self._passed = time, self.counts[0]
+            self._passed = time, self._instance.counts()[0]
         return not (self._crowded or self._stuck)
 
     def _read(self) -> None:

@@ -33,8 +33,12 @@ _LARGEST = 2**22
 """Numbers in a call, limited by memory."""
 _PRECISE, _AIM = 1.0, 0.3
 """Largest error of a polynomial in tolerances, and the one to aim at: the error of IDAS is about one."""
+_FINEST = 1e-12
+"""Relative tolerance below which IDAS makes more noise than errors."""
 _ORDER = 5
 """Of that error, in the length of a piece."""
+_HALVED = 8.0
+"""Largest error of a piece that becomes precise in halves: what is smooth is 32 times as precise there."""
 _TELLING = 0.02
 """Smaller errors are rounding and noise, and tell nothing about lengths."""
 _SHRINKS, _GROWS = 0.1, 30.0
@@ -101,7 +105,7 @@ class Panels:
         self._modes, self._segment = b"", _Segment(begin, self._length)
         self._graded = self._cut = self._begins = False
         self._begin, self._ends, self._wishes = begin, np.zeros(0), np.zeros(0)
-        self._telling = np.zeros(0, bool)
+        self._telling = self._halved = np.zeros(0, bool)
         self._failures, self._failed_before, self._gave_up_at = 0, begin, -np.inf
 
     @property
@@ -126,11 +130,24 @@ class Panels:
             looks = self._looks(now, span, grid)
             good = self._judge(now, span, grid, looks)
             if good:
-                self._begin, self._ends = now.t, now.t + span * grid.ends[:good]
+                ends = now.t + span * grid.ends[:good]
                 if span == limit - now.t and good == grid.pieces:
-                    self._ends[-1] = limit
-                return self._ends, looks[: good * _LOOKS + 1 : 2].copy()
+                    ends[-1] = limit
+                self._begin, (self._ends, knots) = now.t, self._pieces(now.t, ends, looks)
+                return self._ends, knots
             begins = True
+
+    def _pieces(self, t: float, ends: Vector, looks: Vector) -> tuple[Vector, Vector]:
+        """Return ends and knots of the pieces; those that are not precise have become two, with all looks as knots."""
+        halved = self._halved[: len(ends)]
+        taken = np.ones((len(ends), _LOOKS), bool)
+        taken[~halved, 1::2] = False
+        middles = 0.5 * (np.append(t, ends[:-1]) + ends)
+        both = np.stack([middles, ends], axis=1)
+        kept = np.stack([halved, np.ones(len(ends), bool)], axis=1)
+        self._wishes = np.repeat(self._wishes[: len(ends)], 1 + halved)
+        self._telling = np.repeat(self._telling[: len(ends)], 1 + halved)
+        return both[kept], looks[: len(ends) * _LOOKS + 1][np.append(taken.ravel(), True)]
 
     def _plan(self, left: float, least: float, *, begins: bool) -> tuple[float, Grid]:
         """Return length in s and grid of a panel; of time there is so much left, and a panel has so much at least."""
@@ -170,7 +187,8 @@ class Panels:
         with np.errstate(divide="ignore"):  # a straight line has none
             self._telling = errors > _TELLING
             self._wishes = lengths * np.clip((_AIM / errors) ** (1 / _ORDER), _SHRINKS, _GROWS)
-        precise = errors <= _PRECISE
+        precise = errors <= _HALVED
+        self._halved = errors > _PRECISE
         rough = ~precise & (lengths > time_resolution(t))  # what happens in a shorter time is a jump
         good = int(np.argmax(rough)) if rough.any() else count
         if good and not precise[:good].any():
@@ -190,6 +208,7 @@ class Panels:
         shape = count, _LOOKS + 1, len(self.model.states)
         pieces = np.lib.stride_tricks.as_strided(looks, shape, (_LOOKS * stride, stride, width), writeable=False)
         relative, absolute = self.integrator.tolerances
+        relative, absolute = (one * max(1.0, _FINEST / relative) for one in (relative, absolute))
         weights = 0.5 * relative * (np.abs(pieces[:, 0]) + np.abs(pieces[:, -1])) + absolute
         # Term by term: a product of matrices would depend on the processor.
         between = sum(_BETWEEN[:, k, None] * pieces[:, 2 * k, None] for k in range(_PARTS + 1))
