@@ -182,12 +182,19 @@ static int has_risen(Instance *c, double t) {
     return 0;
 }
 
+/* The matrix of a step over a piece of another integrator, at one of its ends. */
+static int factor_piece(Instance *c, int at_end) {
+    Piece *piece = c->piece;
+    double t = at_end ? piece->end : piece->begin;
+    return factor_at(c, t, at_end ? last_of(c->model, piece) : piece->points, piece->end - piece->begin);
+}
+
 /* Goes through the windows of a step and returns the smaller length that it must have, or infinity. */
-static double judge_windows(Instance *c, double least, int of_slopes, int of_guards, int precisely) {
+static double judge_windows(Instance *c, double least, int of_slopes, int of_guards, int precisely, int at_end) {
     double begin = c->piece->begin, h = c->piece->end - begin, landing = h, *now = c->edges_middle;
     double resolved = begin + TIME_RESOLUTION * fmax(1, fabs(begin));
     int unseen = 0;
-    if (of_slopes && takes_panels(c) && !factor_at(c, begin, c->piece->points, h)) return INFINITY;
+    if (of_slopes && takes_panels(c) && !factor_piece(c, at_end)) return INFINITY;
     memcpy(now, c->edges, (size_t)c->model->tapes.edges.n_outputs * sizeof(double));
     for (double before = begin, edge = begin; edge < c->piece->end && !(unseen && landing < h); before = edge) {
         edge = fmin(next_edge(c, before, now, precisely), c->piece->end);
@@ -207,8 +214,9 @@ static double explained_length(Instance *c) {
     double begin = c->piece->begin, end = c->piece->end;
     if (!takes_panels(c) || c->model->settings->n_slope_edges == 0) return INFINITY;
     if (window_error(c, begin, end, 0) <= UNEXPLAINED) return INFINITY;
-    if (!factor_at(c, begin, c->piece->points, end - begin)) return INFINITY;
-    return window_error(c, begin, end, 1) > UNEXPLAINED ? 0.5 * (end - begin) : INFINITY;
+    for (int at_end = 0; at_end < 2; at_end++)
+        if (factor_piece(c, at_end) && window_error(c, begin, end, 1) > UNEXPLAINED) return 0.5 * (end - begin);
+    return INFINITY;
 }
 
 /* Are all edges farther away than they come by their changes in this step, and in the one before? */
@@ -227,7 +235,7 @@ static int out_of_reach(const Instance *c, double h) {
 double seen_length(Instance *c, double least, double *most) {
     const Model *m = c->model;
     int n = m->tapes.edges.n_outputs, n_edges = m->settings->n_edges, of_slopes, of_guards;
-    double begin = c->piece->begin, h = c->piece->end - begin, advance = 0, length;
+    double begin = c->piece->begin, h = c->piece->end - begin, advance = 0;
     double *first = c->edges, *last = c->edges + n, *middle = c->edges_middle;
     if (!c->edges_valid) edges_at(c, begin, c->piece->points, first), c->edges_kept = 0;
     c->edges_valid = 1;
@@ -245,8 +253,11 @@ double seen_length(Instance *c, double least, double *most) {
     if (!of_slopes && !of_guards) return explained_length(c);
     memset(c->positive, 0, (size_t)m->n_guards);
     if (of_guards) note_positive(c, begin), note_positive(c, c->piece->end);
-    length = judge_windows(c, least, of_slopes, of_guards, 0);
-    return isfinite(length) ? judge_windows(c, least, of_slopes, of_guards, 1) : INFINITY;
+    /* A piece that begins on the edge of a stiff window, or ends there, takes it all for what decays. */
+    for (int at_end = 0; at_end <= (of_slopes && takes_panels(c)); at_end++)
+        if (isfinite(judge_windows(c, least, of_slopes, of_guards, 0, at_end)))
+            return judge_windows(c, least, of_slopes, of_guards, 1, at_end);
+    return INFINITY;
 }
 
 /* Is there an edge within the piece? Where slopes jump, no step is short enough for its error to be small. */

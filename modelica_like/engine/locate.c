@@ -109,27 +109,30 @@ static int newton(const Instance *c, const Look *look, double *step) {
     return positive;
 }
 
-/* A time at which a guard that rises and falls again is positive; infinite if none is. */
+/* The first time at which a guard that rises and falls again is positive; infinite if none is. */
 static double positive_top(Instance *c, const Look *before, const Look *after, Look *look) {
+    double first = INFINITY;
     for (int g = 0; g < c->model->n_guards; g++) {
-        double low = before->t, high = after->t, t = c->kinds[g] == HUMP ? guess(before, after, g) : low;
-        for (int n = 0; n < MAX_TRIALS && c->kinds[g] == HUMP; n++) {
+        double low = before->t, high = after->t, t = c->kinds[g] == HUMP ? guess(before, after, g) : low, top = INFINITY;
+        for (int n = 0; n < MAX_TRIALS && c->kinds[g] == HUMP && isinf(top); n++) {
             if (!look_inside(c, t, look)) return INFINITY;
-            if (look->values[g] > 0) return t;
+            if (look->values[g] > 0) top = t;
             *(look->rates[g] > 0 ? &low : &high) = t;
             if (look->values[g] + fabs(look->rates[g]) * (high - low) < 0 || high - low < 1e-12) break;
             t = 0.5 * (low + high);
         }
-        if (c->kinds[g] == HUMP) c->kinds[g] = QUIET;
+        if (c->kinds[g] == HUMP && isinf(top)) c->kinds[g] = QUIET;
+        first = fmin(first, top);
     }
-    return INFINITY;
+    return first;
 }
 
 /* Finds the earliest zero of a candidate between two looks, first roughly; the piece then ends there, `look` tells the
  * guards there. */
 static int locate(Instance *c, const Look *before, const Look *after, Look *look) {
     double step, t = after->t, last = t, tolerance = LOCATED * fmax(1, fabs(before->t));
-    if (!newton(c, after, &step)) last = positive_top(c, before, after, look);
+    int positive = newton(c, after, &step);
+    last = fmin(positive ? last : INFINITY, positive_top(c, before, after, look));
     if (!isfinite(last)) return 0;
     for (int g = 0; g < c->model->n_guards; g++)
         if (c->kinds[g] != QUIET) t = fmin(t, guess(before, after, g));
