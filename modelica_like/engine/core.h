@@ -124,7 +124,7 @@ typedef struct {
         A(d_begun, n_d), A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),        \
         A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(impact_d, n_d),         \
         A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), \
-        A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n),      \
+        A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n),      \
         A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; idle:
@@ -177,7 +177,7 @@ typedef struct Instance {
     Piece *whole;
     Integrator integrator; /* gives the panels; NULL: steps of the run-time */
     Panel panel;
-    int own_step, doubtful; /* in spite of an integrator; a search could not tell whether a guard is positive */
+    int own_steps, doubts; /* left, in spite of an integrator; of a search that could not tell a guard's sign */
     Terms *terms, *strike_terms;
     Strike strike;
     int stopped; /* something has been stopped at the present instant */
@@ -303,14 +303,14 @@ Result move_to(Instance *c, double t);
 Result take_changes(Instance *c);
 int is_due(Instance *c);
 /* panels.c */
-static inline int takes_panels(const Instance *c) { return c->integrator != NULL && !c->own_step; }
+static inline int takes_panels(const Instance *c) { return c->integrator != NULL && c->own_steps == 0; }
 void piece_between(Instance *c, const Piece *whole, double begin, double end, Piece *piece);
 int next_piece(Instance *c, double limit, double far);
 /* locate.c */
 #define MOST_LOOKS 11 /* at guards, that there is room for */
 double cubic_guess(double g0, double r0, double g1, double r1);
 int search_events(Instance *c);
-const double *guards_moved(Instance *c, const Piece *piece, double t, double relative, double absolute);
+const double *rounding_of_guards(Instance *c, const Piece *piece, double t);
 /* edges.c */
 double seen_length(Instance *c, double least, double *most);
 void keep_edges(Instance *c);

@@ -10,7 +10,6 @@
 #define NEAR 0.1        /* an extremum that comes this close to zero is looked at */
 #define UNSEEN 10       /* error of a window between two edges, in tolerances, from which on the step ends before it */
 #define UNEXPLAINED 300 /* of a piece without edges: less is the error of another integrator */
-#define ROUNDING_OF_STATES 1e-14
 #define ALREADY 1e-9 /* of the step: edges at its beginning, on which it stands */
 #define FINE 0.9     /* of the advance of a phase that a step may have */
 
@@ -176,7 +175,7 @@ static int has_risen(Instance *c, double t) {
     const double *guards = guards_inside(c, t), *rounding = NULL;
     for (int g = 0; g < c->model->n_guards; g++) {
         if (!(guards[g] > 0) || c->positive[g]) continue;
-        if (rounding == NULL) rounding = guards_moved(c, c->piece, t, ROUNDING_OF_STATES, 0);
+        if (rounding == NULL) rounding = rounding_of_guards(c, c->piece, t);
         if (guards[g] > rounding[g]) return 1;
     }
     return 0;

@@ -7,6 +7,7 @@
 #define LEAST_OVER_EDGE 10 /* of the least step: no error is asked of shorter ones at an edge */
 #define MAX_LANDINGS 8     /* on edges: what switches without end is integrated as it is written */
 #define SHRINKS 0.1        /* a piece of another integrator in which guards do not behave */
+#define OWN_STEPS 8        /* where a guard is within the tolerances of another integrator: it asks again soon */
 #define SAME_POINT 1e-9    /* rounding of the importer's communication points */
 #define SAME_PART 1e-6     /* of a fixed step */
 #define LEAST_STEPS 50     /* per run, where time itself is in the equations: a pulse could hide between longer ones */
@@ -200,6 +201,7 @@ static Result take_step(Instance *c, double limit) {
     double *first = c->first, wished = s->step > 0 ? s->step : first_step(c);
     double least = least_step(s), most = INFINITY;
     int rejected = 0, landings = 0;
+    c->doubts = 0;
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
     wished = fmin(wished, largest_step(c));
     for (int n = 0; n < MAX_REJECTIONS; n++) {
@@ -209,6 +211,7 @@ static Result take_step(Instance *c, double limit) {
         clear_pending(c);
         if (h < least || !isfinite(h)) break;
         error = rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece);
+        memcpy(c->step_error, c->stages + (size_t)(STAGES - 1) * c->model->n_unknowns, c->model->n_x * sizeof(double));
         if (!(error >= 0 && isfinite(error))) error = 1e30;
         else if (error > 1 && h < LEAST_OVER_EDGE * least && is_over_edge(c)) error = 1;
         if (cut) c->piece->end = limit;
@@ -238,22 +241,27 @@ static Result take_step(Instance *c, double limit) {
     return fail(c, STEP_TOO_SMALL, s->t);
 }
 
-/* Takes the next piece of another integrator, shorter where an event asks for it; where only an own step can tell
- * whether there is one, that. */
+static Result take_own(Instance *c, double limit) {
+    Result result = take_step(c, limit);
+    c->own_steps--;
+    return result;
+}
+
+/* Takes the next piece of another integrator, shorter where an event asks for it; where only own steps can tell
+ * whether there is one, the first of these. */
 static Result take_given(Instance *c, double limit, double far) {
     State *s = &c->state;
     double end = limit;
+    if (c->own_steps > 0) return take_own(c, limit);
     for (int n = 0; n < MAX_REJECTIONS && end - s->t >= least_step(s); n++) {
         clear_pending(c);
-        c->doubtful = 0;
+        c->doubts = 0;
         if (!next_piece(c, end, far)) break;
         if (c->model->n_guards == 0 || search_events(c)) return take_piece(c), RESULT_OK;
         leave_piece(c);
-        if (c->doubtful) {
-            c->own_step = 1;
-            Result result = take_step(c, limit);
-            c->own_step = 0;
-            return result;
+        if (c->doubts > 0) {
+            c->own_steps = OWN_STEPS;
+            return take_own(c, limit);
         }
         far = end = s->t + (c->whole->begin > c->panel.begin ? 1 : SHRINKS) * (c->whole->end - s->t);
     }

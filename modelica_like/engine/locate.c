@@ -8,6 +8,8 @@
 #define LOCATED 1e-13
 #define MAX_TRIALS 60
 #define NEAR 0.1
+#define ROUNDING_OF_STATES 1e-14
+#define MOST_DOUBTS 8 /* of a step, each of which makes it four times as short: then its error is not the reason */
 
 typedef struct { /* guards and their rates at a time within a step; behind them room for one more number per guard */
     double t, *values, *rates;
@@ -164,7 +166,7 @@ static int mark_wanting(Instance *c, const Look *look, double tolerance) {
 }
 
 /* What changes of the states make of the guards at a point of a piece: all together, and any two apart. */
-const double *guards_moved(Instance *c, const Piece *piece, double t, double relative, double absolute) {
+static const double *guards_moved(Instance *c, const Piece *piece, double t, const double *changes) {
     const Model *m = c->model;
     double *here = room_for_look(c, DEPTH + 3).values, *shaken = room_for_look(c, DEPTH + 4).values,
            *moved = here + 2 * m->n_guards, *point = c->vector + m->n_z;
@@ -173,22 +175,46 @@ const double *guards_moved(Instance *c, const Piece *piece, double t, double rel
     evaluate_special(c, &m->tapes.guards, t, point, here);
     for (int bit = 1; bit < 2 * m->n_x; bit *= 2) {
         piece_at(m, piece, t, point);
-        for (int k = 0; k < m->n_x; k++) {
-            double change = relative * fabs(point[k]) + absolute * m->nominals[k];
-            point[k] += k & (bit / 2) ? -change : change;
-        }
+        for (int k = 0; k < m->n_x; k++) point[k] += k & (bit / 2) ? -changes[k] : changes[k];
         evaluate_special(c, &m->tapes.guards, t, point, shaken);
         for (int g = 0; g < m->n_guards; g++) moved[g] = fmax(moved[g], fabs(shaken[g] - here[g]));
     }
     return moved;
 }
 
+static const double *moved_relatively(Instance *c, const Piece *piece, double t, double relative, double absolute) {
+    const Model *m = c->model;
+    double *point = c->vector + m->n_z;
+    piece_at(m, piece, t, point);
+    for (int k = 0; k < m->n_x; k++) c->changes[k] = relative * fabs(point[k]) + absolute * m->nominals[k];
+    return guards_moved(c, piece, t, c->changes);
+}
+
+const double *rounding_of_guards(Instance *c, const Piece *piece, double t) {
+    return moved_relatively(c, piece, t, ROUNDING_OF_STATES, 0);
+}
+
 /* Is a candidate no more than the tolerances of the states make of it? About what begins, or has decayed, the points of
- * another integrator swing by them: there an own step decides. */
-static int is_doubtful(Instance *c, const Look *before, const Look *after) {
-    const double *moved = guards_moved(c, c->whole, after->t, c->state.tolerance, c->state.absolute);
+ * another integrator swing by them: there own steps decide. */
+static int is_within_tolerance(Instance *c, const Look *before, const Look *after) {
+    const double *moved = moved_relatively(c, c->whole, after->t, c->state.tolerance, c->state.absolute);
     for (int g = 0; g < c->model->n_guards; g++)
         if (c->kinds[g] != QUIET && fmax(fabs(before->values[g]), fabs(after->values[g])) <= moved[g]) return 1;
+    return 0;
+}
+
+/* Is a guard positive by less than the error of the step, which is more than rounding? What decays does not change its
+ * sign, but long steps swing about zero. */
+static int is_within_error(Instance *c, const Look *after) {
+    const double *moved = guards_moved(c, c->whole, after->t, c->step_error);
+    int any = 0;
+    for (int g = 0; g < c->model->n_guards; g++)
+        any |= c->kinds[g] == CROSSING && after->values[g] <= moved[g];
+    if (!any) return 0;
+    double *errors = memcpy(room_for_look(c, DEPTH + 2).values, moved, (size_t)c->model->n_guards * sizeof(double));
+    const double *rounding = rounding_of_guards(c, c->whole, after->t);
+    for (int g = 0; g < c->model->n_guards; g++)
+        if (c->kinds[g] == CROSSING && after->values[g] <= errors[g] && errors[g] > rounding[g]) return 1;
     return 0;
 }
 
@@ -209,8 +235,8 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
     Look found = room_for_look(c, DEPTH + 2);
     double step;
     if (!find_candidates(c, before, after)) return NOTHING;
-    if (takes_panels(c) && is_doubtful(c, before, after)) {
-        c->doubtful = 1;
+    if (takes_panels(c) ? is_within_tolerance(c, before, after) : c->doubts < MOST_DOUBTS && is_within_error(c, after)) {
+        c->doubts++;
         return TOO_LONG;
     }
     if (locate(c, before, after, &found)) {
