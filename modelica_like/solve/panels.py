@@ -261,13 +261,15 @@ class Panels:
         """
         # Without events, nothing but a tolerance can help across the same place.
         place, self._gave_up_at = self._gave_up_at, self.integrator.reached
-        same = not self._guarded and abs(self._gave_up_at - place) <= _SAME * span
+        at_once = self._gave_up_at - t <= _SAME * span  # its first steps are too long
+        same = not self._guarded and not at_once and abs(self._gave_up_at - place) <= _SAME * span
         self._failures += _FEW_FAILURES if same else 1
         self._failed_before = max(self._failed_before, t + span)
         allowed = _MAX_FAILURES if self._guarded else _FEW_FAILURES
         if self._failures <= allowed and span > time_resolution(t):
             # What does not converge in the shortest one may in a longer one.
-            self._span = span * (_SHRINKS if span > 2 * _SHORTEST * time_resolution(t) else _SHRINKS**-4)
+            shrinks = _SHRINKS**3 if at_once else _SHRINKS
+            self._span = span * (shrinks if span > 2 * _SHORTEST * time_resolution(t) else _SHRINKS**-4)
             self._length, self._graded = self._span / _GRADED.pieces, True
             return
         self._relax(t)
