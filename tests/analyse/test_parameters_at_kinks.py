@@ -117,7 +117,7 @@ def test_what_does_not_jump_may_begin_with_the_run() -> None:
     assert result["sum.y", "command.start_time"] == pytest.approx(-1.5)
 
 
-QUICK = ("filters", "lepelletier_gears", "two_mass", "winch")
+QUICK = ("filters", "lepelletier_gears", "two_mass")
 OFTEN = ("gears_and_losses", "planetary_sets", "servo_axis", "CoupledClutches", "Backlash", "LossyGearDemo1")
 """Examples of continuous integration; the others by hand, with EVERY_EXAMPLE in the environment."""
 STEPS = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)

@@ -57,6 +57,7 @@ def test_a_model_that_is_compiled_in(tmp_path: Path) -> None:
     assert [name for name in names if name.startswith("binaries/")]
 
 
+@pytest.mark.slow
 def test_run_times_are_listed_and_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MODELICA_LIKE_CACHE", str(tmp_path))
     monkeypatch.setattr("modelica_like.fmi.runtime.SHIPPED", tmp_path / "none")

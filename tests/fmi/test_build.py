@@ -97,7 +97,7 @@ def newest_glibc(library):
     return max(tuple(map(int, m.split(b"."))) for m in re.findall(rb"GLIBC_(\d+\.\d+)", library.read_bytes()))
 
 
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("version", ["2.0", pytest.param("3.0", marks=pytest.mark.slow)])
 def test_the_compiler_of_this_machine_does_so_too(tmp_path, version, example):
     """Also where its own glibc has newer versions of exp, log, pow and hypot."""
     model = build_model(example)
@@ -108,7 +108,7 @@ def test_the_compiler_of_this_machine_does_so_too(tmp_path, version, example):
     assert newest_glibc(library) <= (2, 17)
 
 
-@pytest.mark.parametrize(("version", "count"), [("2.0", 44), ("3.0", 75)])
+@pytest.mark.parametrize(("version", "count"), [pytest.param("2.0", 44, marks=pytest.mark.slow), ("3.0", 75)])
 def test_zig_exports_the_fmi_functions_only_and_needs_an_old_glibc(monkeypatch, tmp_path, version, count, example):
     model = build_model(example)
     sources = generate(model, interface(model), version, token="{t}")

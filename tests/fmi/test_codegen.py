@@ -99,13 +99,14 @@ def inside(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Any], Inside]:
 
 
 DRIVES = ["msl/rotational/CoupledClutches.toml", "msl/rotational/LossyGearDemo1.toml", "dc_bench.toml"]
+MOST_SLOW = [DRIVES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in DRIVES[1:])]
 FUNCTIONS = (
     "alg", "variables", "guards_soon", "moments", "resets", "start_conditions", "start_values", "discrete_starts",
     "determinants", "derived",
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("drive", [DRIVES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in DRIVES[1:])])
+@pytest.mark.parametrize("drive", MOST_SLOW)
 def test_tapes_give_the_bits_of_casadi(inside, drive):
     code = inside(drive)
     for seed in range(5):
@@ -125,7 +126,7 @@ def rates_function(code: Inside) -> tuple[ca.Function, list[Any]]:
     return ca.Function("rates", everything, [rates], list(a), ["rates"]), everything
 
 
-@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize("drive", MOST_SLOW)
 def test_tangents_and_adjoints_are_those_of_casadi(inside, drive):
     code = inside(drive)
     function, everything = rates_function(code)

@@ -146,6 +146,7 @@ def test_a_run_that_nobody_waits_for_ends(explorer: Explorer, capfd: pytest.Capt
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_connections_without_a_request_hold_few_threads(explorer: Explorer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server, "_PATIENCE", 1.0)
     with contextlib.ExitStack() as stack:

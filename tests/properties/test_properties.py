@@ -95,6 +95,7 @@ def hash_of(name: str, seed: int) -> int:
     return sum(ord(letter) * (seed + k) for k, letter in enumerate(name)) % 97
 
 
+@pytest.mark.slow
 @given(trees())
 @every_drive
 def test_the_other_way_round(tree: Tree) -> None:
@@ -104,6 +105,7 @@ def test_the_other_way_round(tree: Tree) -> None:
     assert_same(speeds(run(tree.mirrored), tree), -speeds(plain, tree), plain, tree)
 
 
+@pytest.mark.slow
 @given(trees(), st.floats(0.05, 0.95))
 @every_drive
 def test_an_inertia_in_two_and_a_shaft_in_series(tree: Tree, part: float) -> None:

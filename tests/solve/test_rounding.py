@@ -27,7 +27,6 @@ from modelica_like.structure import reduce
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NEEDS = {"Prescott": "pni", "Haswell": "avx2", "Zen": "avx2", "SkylakeX": "avx512f"}
-SLOW = pytest.mark.slow
 SECTIONS = ("parts", "series", "connect", "start", "guess")
 # PreLoad begins with four contacts that just touch; how they tremble is below the tolerance of a run (72, 46, 40 events
 # at rtol = 1e-6, 1e-8, 1e-10).
@@ -106,6 +105,7 @@ def plain() -> dict[str, Told]:
     return json.loads(json.dumps(everything()))
 
 
+@pytest.mark.slow
 def test_the_examples_have_modes_and_events(plain: dict[str, Told]) -> None:
     assert len(plain) > 80
     assert sum(len(one["modes"]) for one in plain.values()) > 100
@@ -125,9 +125,8 @@ def test_every_blas_kernel_gives_the_same_modes_and_events(plain: dict[str, Told
     assert_same(json.loads(run.stdout), plain)
 
 
-@pytest.mark.parametrize(
-    ("seed", "moved"), [(1, 1e-13), pytest.param(2, 0.0, marks=SLOW), pytest.param(0, 1e-13, marks=SLOW)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "moved"), [(1, 1e-13), (2, 0.0), (0, 1e-13)])
 def test_neither_the_order_of_lines_nor_the_thirteenth_digit_counts(
     plain: dict[str, Told], seed: int, moved: float
 ) -> None:

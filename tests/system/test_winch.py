@@ -86,6 +86,7 @@ def test_cut_below_the_rope(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_gradient_is_the_slope_of_runs() -> None:
     found = sensitivities(WINCH, of=["load.s", "max(rope.tension)"], to=["mass", "drum.radius"])
     for name, value, step in (("mass", 300.0, 0.3), ("drum.radius", 0.08, 8e-5)):
