@@ -299,13 +299,13 @@ Result pass_instant(Instance *c, unsigned char *wanting, int located) {
     return whens && memcmp(c->first, c->x, size) != 0 ? check_turned_back(c, c->looks) : RESULT_OK;
 }
 
-/* Have the ticks of this instant changed nothing that equations of motion read? Of ticks that fall together, those have
- * that did before. */
-static int was_idle(Instance *c) {
-    int idle = 1, known = 0;
+/* Has this instant changed nothing that equations of motion read? Of ticks that fall together, those have that did
+ * before. */
+static int was_idle(Instance *c, int ticks) {
+    int idle = memcmp(c->first, c->x, (size_t)c->model->n_x * sizeof(double)) == 0, known = 0;
     for (int k = 0; k < c->model->n_d && idle; k++) idle = !c->felt[k] || c->d[k] == c->d_begun[k];
     for (int k = 0; k < c->model->n_transitions; k++) known |= c->ticking[k] && !c->idle[k];
-    for (int k = 0; k < c->model->n_transitions; k++)
+    for (int k = 0; k < c->model->n_transitions && ticks; k++)
         if (c->ticking[k] && (idle || !known)) c->idle[k] = (unsigned char)idle;
     return idle;
 }
@@ -328,9 +328,8 @@ static Result pass_event(Instance *c) {
     if (!pass_instant(c, wanting, located)) return RESULT_ERROR;
     s->z_valid = 1;
     if (!leave_instant(c, s->n_events != events)) return RESULT_ERROR;
-    if (!ticks) return RESULT_OK;
-    if (memcmp(c->first, c->x, size) != 0) return RESULT_OK;
-    if (was_idle(c)) s->panel_valid = panel_valid;
+    if (c->integrator != NULL && was_idle(c, ticks)) s->panel_valid = panel_valid;
+    if (!ticks || memcmp(c->first, c->x, size) != 0) return RESULT_OK;
     evaluate_now(c, &c->model->tapes.rates, c->rhs);
     if (memcmp(rates, c->rhs, size) == 0) s->step = step; /* a tick without effect on what moves now */
     return RESULT_OK;

@@ -42,13 +42,14 @@ static void load_piece(Instance *c) {
     piece_through(c->model, rows, begin_of(panel), panel->ends[panel->number], c->piece);
 }
 
-/* Behind an event, equations of the old modes are not valid. */
+/* Behind an event that moves something, equations of the old modes are not valid. */
 static int is_behind_event(Instance *c) {
     const double *guards = c->looks;
     if (c->model->n_guards == 0) return 0;
     evaluate_special(c, &c->model->tapes.guards, c->piece->end, last_of(c->model, c->piece), c->looks);
     for (int g = 0; g < c->model->n_guards; g++)
-        if (guards[g] > 0 && guard_active(c, g)) return 1;
+        if (guards[g] > 0 && guard_active(c, g) && c->felt[c->model->transitions[c->model->guard_transition[g]].mode])
+            return 1;
     return 0;
 }
 

@@ -100,7 +100,7 @@ class Panels:
         self._length, self._span = ((end - begin) / count for count in _FIRST)
         if not self._guarded:
             self._span = np.inf
-        self._switched = sorted({transition.mode for transition in model.transitions})
+        self._switched = sorted({one.mode for one in model.transitions if self.felt[one.mode]})
         self._known: dict[bytes, _Segment] = {}
         self._modes, self._segment = b"", _Segment(begin, self._length)
         self._graded = self._cut = self._begins = False
@@ -110,7 +110,7 @@ class Panels:
 
     @property
     def felt(self) -> Any:
-        """Marks of the entries of d that equations of motion read: ticks that change no other are passed over."""
+        """Marks of the entries of d that equations of motion read: events that change no other end no panel."""
         return self.model.once("felt", lambda: _felt(self.model))
 
     def go_on(self, now: Point, limit: float, longest: float = np.inf) -> tuple[Vector, Vector]:
@@ -286,9 +286,14 @@ class Panels:
 
 
 def _felt(model: CompiledDae) -> Any:
-    """Mark entries of d that continuous equations, state events and delays read, and the modes of these events."""
+    """Mark entries of d that continuous equations and delays read.
+
+    Where edges of guards have been looked at in a whole panel, also what guards read.
+    """
     felt = np.zeros(model.discrete_size, np.uint8)
-    felt[[one.mode for one in model.transitions if not one.timed]] = 1
-    for function in (model.ode, model.alg, model.guards, model.delays, model.edges.function):
+    looked_at = (model.guards,) if model.edges.count > model.edges.slopes else ()
+    for function in (model.ode, model.alg, model.delays, model.edges.function, *looked_at):
         felt[function.jac_sparsity(0, function.index_in("d")).get_triplet()[1]] = 1
+    if looked_at:
+        felt[[one.mode for one in model.transitions if not one.timed]] = 1
     return felt

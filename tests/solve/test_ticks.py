@@ -186,3 +186,30 @@ def test_quiet_ticks_between_those_of_a_controller_cost_nothing():
     assert found.final["n"] == 201
     assert found.final["x"] == pytest.approx(0.75**40, abs=1e-9)
     assert found.statistics.integrations <= 42  # 41 ticks of the controller
+
+
+class Passages(Component):
+    """Counts the passages of an oscillation through a height, which nothing that moves reads."""
+
+    k: Parameter = param("1/s2", "square of the frequency", default=400.0)
+    height: Parameter = param("m", "height", default=0.25)
+    x: Variable = var("m", "position", state="always")
+    v: Variable = var("m/s", "speed", state="always")
+    n: Discrete = integer("passages")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.v
+        yield der(self.v) == -self.k * self.x
+
+    def events(self) -> Events:
+        yield when(self.x > self.height, {self.n: pre(self.n) + 1})
+
+
+def test_what_is_only_counted_costs_no_restarts():
+    found, without = run(Passages(x=0.0, v=20.0), 10.0), run(Passages(x=0.0, v=20.0, height=2.0), 10.0)
+    rises = np.arcsin(0.25) / 20 + 2 * np.pi / 20 * np.arange(32)
+    assert found.final["n"] == len(rises)
+    assert [one.time for one in found.events if one.after == "true"] == pytest.approx(rises, abs=1e-8)
+    assert found["x"] == pytest.approx(np.sin(20 * found.time), abs=1e-7)  # its phase drifts for 32 periods
+    assert found.statistics.integrations <= without.statistics.integrations + 2
+    assert found.statistics.steps <= 1.1 * without.statistics.steps
