@@ -28,8 +28,9 @@ __asm__(OLD(exp) OLD(log) OLD(pow) OLD(hypot) OLD(fmod));
 #define TIME_RESOLUTION 1e-10 /* as in guards_soon */
 #define JUST_TRUE 1e-300      /* as in conditions.py */
 #define AT_EDGE 1e-12         /* an edge or guard so close to zero rests there: rounding of values of about one */
-#define NOISE 1e-30           /* a decaying signal ends by swinging around zero with such values; that is no event */
-#define CROWD 24              /* further instants in a short time follow each other ever faster */
+#define MOST_DOUBTS 8 /* of a step, each of which makes it four times as short: then its error is not the reason */
+#define NOISE 1e-30   /* a decaying signal ends by swinging around zero with such values; that is no event */
+#define CROWD 24      /* further instants in a short time follow each other ever faster */
 
 /* Zero is failure: results are asked for and joined like conditions. */
 typedef enum { RESULT_ERROR, RESULT_OK, RESULT_DISCARD } Result;
@@ -124,8 +125,8 @@ typedef struct {
         A(d_begun, n_d), A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),        \
         A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(impact_d, n_d),         \
         A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), \
-        A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n),      \
-        A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d))
+        A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n),      \
+        A(changes, n), A(step_error, n), A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; idle:
  * time events that changed nothing of d that is felt by what moves when they came last */

@@ -201,7 +201,7 @@ static Result take_step(Instance *c, double limit) {
     double *first = c->first, wished = s->step > 0 ? s->step : first_step(c);
     double least = least_step(s), most = INFINITY;
     int rejected = 0, landings = 0;
-    c->doubts = 0;
+    if (c->doubts < MOST_DOUBTS) c->doubts = 0; /* else the next event ends what cannot be told */
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
     wished = fmin(wished, largest_step(c));
     for (int n = 0; n < MAX_REJECTIONS; n++) {
@@ -319,7 +319,7 @@ static Result pass_event(Instance *c) {
     int panel_valid = s->panel_valid;
     if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
-    s->at_event = 0;
+    s->at_event = c->doubts = 0;
     s->step = 0;
     s->z_valid = 0;
     if (!settle(c) || !reach_instant(c)) return RESULT_ERROR;

@@ -9,7 +9,6 @@
 #define MAX_TRIALS 60
 #define NEAR 0.1
 #define ROUNDING_OF_STATES 1e-14
-#define MOST_DOUBTS 8 /* of a step, each of which makes it four times as short: then its error is not the reason */
 
 typedef struct { /* guards and their rates at a time within a step; behind them room for one more number per guard */
     double t, *values, *rates;
@@ -115,7 +114,8 @@ static int newton(const Instance *c, const Look *look, double *step) {
 static double positive_top(Instance *c, const Look *before, const Look *after, Look *look) {
     double first = INFINITY;
     for (int g = 0; g < c->model->n_guards; g++) {
-        double low = before->t, high = after->t, t = c->kinds[g] == HUMP ? guess(before, after, g) : low, top = INFINITY;
+        double low = before->t, high = after->t, t = c->kinds[g] == HUMP ? guess(before, after, g) : low,
+               top = INFINITY;
         for (int n = 0; n < MAX_TRIALS && c->kinds[g] == HUMP && isinf(top); n++) {
             if (!look_inside(c, t, look)) return INFINITY;
             if (look->values[g] > 0) top = t;
@@ -206,10 +206,11 @@ static int is_within_tolerance(Instance *c, const Look *before, const Look *afte
 /* Is a guard positive by less than the error of the step, which is more than rounding? What decays does not change its
  * sign, but long steps swing about zero. */
 static int is_within_error(Instance *c, const Look *after) {
+    double begin = c->whole->begin, least = 4 * TIME_RESOLUTION * fmax(1, fabs(begin));
+    if (c->doubts >= MOST_DOUBTS || c->whole->end - begin < least) return 0;
     const double *moved = guards_moved(c, c->whole, after->t, c->step_error);
     int any = 0;
-    for (int g = 0; g < c->model->n_guards; g++)
-        any |= c->kinds[g] == CROSSING && after->values[g] <= moved[g];
+    for (int g = 0; g < c->model->n_guards; g++) any |= c->kinds[g] == CROSSING && after->values[g] <= moved[g];
     if (!any) return 0;
     double *errors = memcpy(room_for_look(c, DEPTH + 2).values, moved, (size_t)c->model->n_guards * sizeof(double));
     const double *rounding = rounding_of_guards(c, c->whole, after->t);
@@ -235,7 +236,7 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
     Look found = room_for_look(c, DEPTH + 2);
     double step;
     if (!find_candidates(c, before, after)) return NOTHING;
-    if (takes_panels(c) ? is_within_tolerance(c, before, after) : c->doubts < MOST_DOUBTS && is_within_error(c, after)) {
+    if (takes_panels(c) ? is_within_tolerance(c, before, after) : is_within_error(c, after)) {
         c->doubts++;
         return TOO_LONG;
     }

@@ -102,30 +102,34 @@ class _Written:
             key = node.element_hash()
             if key in self._known:
                 continue
-            if mark := silence(node):
-                condition = node.dep(0)
+            mark = silence(node)
+            if mark and (mark != CONTINUOUS or node.dep(0).op() not in _EVENTS):
                 if mark != CONTINUOUS:
-                    self._hide(condition)
-                self._known[key] = node, condition
+                    self._hide(node.dep(0))
+                self._known[key] = node, node.dep(0)
                 continue
-            parts = operands(node)
+            # Branches that meet are chosen by the argument that they have: steps in it are those of its value.
+            parts = operands(node.dep(0) if mark else node)
             if missing := [part for part in parts if part.element_hash() not in self._known]:
                 pending += [node, *missing]
             else:
-                self._known[key] = node, self._of_node(node, parts)
+                self._known[key] = node, self._with(node.dep(0), parts) if mark else self._of_node(node, parts)
         return self._known[root.element_hash()][1]
 
-    def _of_node(self, node: Any, parts: list[Any]) -> Any:
+    def _with(self, node: Any, parts: list[Any]) -> Any:
+        """Return a node with its operands as they are written."""
         olds = [part.element_hash() for part in parts]
         news = [self._known[x][1] for x in olds]
+        if olds == [new.element_hash() for new in news]:
+            return node
+        return ca.SX.unary(node.op(), *news) if len(news) == 1 else ca.SX.binary(node.op(), *news)
+
+    def _of_node(self, node: Any, parts: list[Any]) -> Any:
         operation = node.op()
         if operation == ca.OP_SIGN and moves(node):
-            key, (old,), (new,) = node.element_hash(), parts, news
+            key, (old,), (new,) = node.element_hash(), parts, [self._known[part.element_hash()][1] for part in parts]
             return self._step((key, 0), old > 0, new > 0) - self._step((key, 1), old < 0, new < 0)
-        if olds != [n.element_hash() for n in news]:
-            whole = ca.SX.unary(operation, *news) if len(news) == 1 else ca.SX.binary(operation, *news)
-        else:
-            whole = node
+        whole = self._with(node, parts)
         if operation in _EVENTS:
             return self._step((node.element_hash(), 0), node, whole)
         if operation in _SILENT:
