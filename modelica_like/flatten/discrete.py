@@ -199,6 +199,8 @@ class DiscreteEquations:
                     advice = f"Elsewhere write {_PLAIN[marker.kind].format(marker.of)}."
                     raise LanguageError(what, where=source, advice=advice)
                 seen.add(id(marker))
+                if marker.kind == "floor":  # what is counted has the steps of its value, not others beside them
+                    marker.of = with_events(marker.of)
                 counts[marker.kind] = counts.get(marker.kind, 0) + 1
                 counts_up = marker.kind in ("floor", "clock")
                 marker.name = f"{'count of ' * counts_up}{marker.kind}[{counts[marker.kind]}]"

@@ -9,18 +9,19 @@ import pytest
 from laws import END, clear
 
 from modelica_like import Assembly, export_fmu, load, simulate
-from modelica_like.errors import Chattering, FmuFailed
+from modelica_like.errors import Chattering, FmuFailed, StepFailed
 from modelica_like.fmi.run import run_fmu
 from modelica_like.netlist.modelica.write import modelica_text
 
 NEAR = 2e-4
 """The reference has 3e-5 s for a jump of at most 2, a few times in a run."""
-FEW = [*range(24), 473]
-"""In the last one, two looks are so near that their times are equal."""
+FEW = [*range(24), 473, 707, 3648]
+"""Of the last three, one has looks that are so near that their times are equal, two have steps within steps and tables."""
 LAWS = int(os.environ.get("RANDOM_LAWS", "100"))
 MANY = [range(first, first + 50) for first in range(24, 24 + LAWS, 50)]
 REFUSED = 0.05
-"""Share of laws whose rate vanishes at its own jump: they may be refused as chattering, but not be wrong."""
+"""Share of laws whose rate vanishes at its own jump: they may be refused, but not be wrong. In a sample it is exceeded by
+less than twice the root of what is expected."""
 
 
 def agree(run: Any, end: dict[str, float], inside: str = "") -> bool:
@@ -34,13 +35,14 @@ def check(numbers: Sequence[int]) -> None:
         for solver in ("idas", "native"):
             try:
                 run = simulate(drive, END, solver=solver)
-            except Chattering:
+            except (Chattering, StepFailed):
                 refused.add(number)
                 continue
             wrong += [] if agree(run, end) else [(number, solver)]
     assert not wrong
     assert len(cases) > 0.7 * len(numbers)
-    assert len(refused) <= max(1, REFUSED * len(numbers)), refused
+    expected = REFUSED * len(numbers)
+    assert len(refused) <= expected + 2 * expected**0.5, refused
 
 
 def test_a_few_random_laws() -> None:
