@@ -16,12 +16,12 @@ from modelica_like.netlist.modelica.write import modelica_text
 NEAR = 2e-4
 """The reference has 3e-5 s for a jump of at most 2, a few times in a run."""
 FEW = [*range(24), 473, 707, 3648]
-"""Of the last three, one has looks that are so near that their times are equal, two have steps within steps and tables."""
+"""In the first of the last three, two looks are so near that their times are equal; two have steps in steps and tables."""
 LAWS = int(os.environ.get("RANDOM_LAWS", "100"))
 MANY = [range(first, first + 50) for first in range(24, 24 + LAWS, 50)]
 REFUSED = 0.05
-"""Share of laws whose rate vanishes at its own jump: they may be refused, but not be wrong. In a sample it is exceeded by
-less than twice the root of what is expected."""
+"""Share of laws whose rate vanishes at its own jump: they may be refused, but not be wrong. A sample exceeds it by less
+than twice the root of what is expected."""
 
 
 def agree(run: Any, end: dict[str, float], inside: str = "") -> bool:
