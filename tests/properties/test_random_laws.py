@@ -16,7 +16,7 @@ from modelica_like.netlist.modelica.write import modelica_text
 NEAR = 2e-4
 """The reference has 3e-5 s for a jump of at most 2, a few times in a run."""
 FEW = [*range(24), 473, 707, 3648]
-"""In the first of the last three, two looks are so near that their times are equal; two have steps in steps and tables."""
+"""Of the last three, the first has looks so near that their times are equal, the others steps in steps and tables."""
 LAWS = int(os.environ.get("RANDOM_LAWS", "100"))
 MANY = [range(first, first + 50) for first in range(24, 24 + LAWS, 50)]
 REFUSED = 0.05
