@@ -10,8 +10,8 @@
 #define NEAR 0.1        /* an extremum that comes this close to zero is looked at */
 #define UNSEEN 10       /* error of a window between two edges, in tolerances, from which on the step ends before it */
 #define UNEXPLAINED 300 /* of a piece without edges: less is the error of another integrator */
-#define ALREADY 1e-9 /* of the step: edges at its beginning, on which it stands */
-#define FINE 0.9     /* of the advance of a phase that a step may have */
+#define ALREADY 1e-9    /* of the step: edges at its beginning, on which it stands */
+#define FINE 0.9        /* of the advance of a phase that a step may have */
 
 static double *edges_at(Instance *c, double t, double *point, double *values) {
     evaluate_special(c, &c->model->tapes.edges, t, point, values);

@@ -140,22 +140,6 @@ double rosenbrock_step(Instance *c, double t, const double *first, double h, int
 /* Of the matrix of a step of length h. */
 double step_diagonal(double h) { return 1 / (h * GAMMA); }
 
-double *last_of(const Model *m, Piece *piece) { return piece->points + m->n_unknowns; }
-
-size_t piece_size(const Model *m) { return sizeof(Piece) + 5 * (size_t)m->n_unknowns * sizeof(double); }
-
-/* Dense output. */
-void piece_at(const Model *m, const Piece *piece, double t, double *point) {
-    double s = (t - piece->begin) / (piece->end - piece->begin), r = 1 - s;
-    int n = m->n_unknowns;
-    const double *first = piece->points, *last = first + n, *a = last + n, *b = a + n, *c = b + n;
-    if (t >= piece->end) {
-        memcpy(point, last, (size_t)n * sizeof(double));
-        return;
-    }
-    for (int k = 0; k < n; k++) point[k] = first[k] + s * (last[k] - first[k] + r * (a[k] + s * (b[k] + s * c[k])));
-}
-
 /* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4); states that are nothing but
  * rounding tell nothing about it. */
 double first_step(Instance *c) {

@@ -1,8 +1,25 @@
-/* Pieces of another integrator: it goes ahead in panels, whose knots four parts of equal width take together. */
+/* Pieces, and those of another integrator: it goes ahead in panels, whose knots four parts of equal width take
+ * together. */
 #include "core.h"
 
 #define PARTS_OF_PIECE 4
 #define MOST_PANELS 20 /* tried: what switches without end is integrated as it is written */
+
+double *last_of(const Model *m, Piece *piece) { return piece->points + m->n_unknowns; }
+
+size_t piece_size(const Model *m) { return sizeof(Piece) + 5 * (size_t)m->n_unknowns * sizeof(double); }
+
+/* Dense output. */
+void piece_at(const Model *m, const Piece *piece, double t, double *point) {
+    double s = (t - piece->begin) / (piece->end - piece->begin), r = 1 - s;
+    int n = m->n_unknowns;
+    const double *first = piece->points, *last = first + n, *a = last + n, *b = a + n, *c = b + n;
+    if (t >= piece->end) {
+        memcpy(point, last, (size_t)n * sizeof(double));
+        return;
+    }
+    for (int k = 0; k < n; k++) point[k] = first[k] + s * (last[k] - first[k] + r * (a[k] + s * (b[k] + s * c[k])));
+}
 
 /* The polynomials of degree four through five rows at equal distances, as `piece_at` wants them. */
 static void piece_through(const Model *m, const double *rows, double begin, double end, Piece *piece) {
