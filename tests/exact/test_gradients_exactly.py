@@ -84,7 +84,9 @@ def gradient(drive: Drive, method: Method) -> np.ndarray:
     return result.derivatives * [one.value for one in result.parameters] / (max(run_exactly(drive).largest) or 1.0)
 
 
-@pytest.mark.parametrize("number", SMOOTH + TIES)
+@pytest.mark.parametrize(
+    "number", [*(SMOOTH + TIES)[::2], *(pytest.param(n, marks=pytest.mark.slow) for n in (SMOOTH + TIES)[1::2])]
+)
 def test_a_gradient_is_exact(number):
     drive = random_drive(number)
     above, below = exactly(drive)

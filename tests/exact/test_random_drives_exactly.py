@@ -7,7 +7,7 @@ import pytest
 from drive_runs import DRIVES, judge, judged, summary
 from random_drives import random_drive
 
-ORDINARY = 150
+ORDINARY = 75
 BLOCK = 50
 HARD = (450, 475, 1546, 1862, 1883, 1991)
 """Drives that were the last to be right: loops at rest, ties between torque and capacity, slips held for minutes."""

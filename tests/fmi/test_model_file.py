@@ -115,7 +115,8 @@ def fuzzer(tmp_path_factory) -> Path:
 
 
 @pytest.mark.parametrize("netlist", DRIVES)
-@pytest.mark.parametrize("count", [100, pytest.param(5000, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [100, 5000])
 def test_damaged_files_with_a_right_checksum_do_no_harm(fuzzer, netlist, count, tmp_path):
     (tmp_path / "model.bin").write_bytes(written(netlist))
     command = [str(fuzzer), str(tmp_path / "model.bin"), str(count), "1"]

@@ -48,7 +48,7 @@ def driver(drive: str | Component, version: str, folder: Path) -> Path:
 
 CASES = [
     pytest.param("msl/rotational/CoupledClutches.toml", "2.0", marks=pytest.mark.slow),
-    ("msl/rotational/CoupledClutches.toml", "3.0"),
+    pytest.param("msl/rotational/CoupledClutches.toml", "3.0", marks=pytest.mark.slow),
     pytest.param("dc_bench.toml", "3.0", marks=pytest.mark.slow),
     pytest.param(Echo(), "2.0", marks=pytest.mark.slow),
 ]

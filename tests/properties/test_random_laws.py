@@ -15,10 +15,10 @@ from modelica_like.netlist.modelica.write import modelica_text
 
 NEAR = 2e-4
 """The reference has 3e-5 s for a jump of at most 2, a few times in a run."""
-FEW = [*range(24), 473, 707, 3648]
+FEW = [*range(12), 473, 707, 3648]
 """Of the last three, the first has looks so near that their times are equal, the others steps in steps and tables."""
 LAWS = int(os.environ.get("RANDOM_LAWS", "100"))
-MANY = [range(first, first + 50) for first in range(24, 24 + LAWS, 50)]
+MANY = [range(first, first + 50) for first in range(12, 12 + LAWS, 50)]
 REFUSED = 0.05
 """Share of laws whose rate vanishes at its own jump: they may be refused, but not be wrong. A sample exceeds it by less
 than twice the root of what is expected."""
