@@ -30,11 +30,12 @@ class Options:
     """Tolerances and limits of a simulation.
 
     Attributes:
-        rtol: relative tolerance of the integrator, per step.
+        rtol: relative tolerance of a run. The compiled run-time keeps it in each step, IDAS three tenths of it, because
+            the errors of its steps add up.
         atol: absolute tolerance, in units of each variable's nominal value.
         points: number of equal intervals of the results.
-        max_steps: largest number of integrator steps between two results, with the compiled run-time in a hundredth of
-            the run (or between two of fewer results).
+        max_steps: largest number of steps of the run-time, or of pieces of IDAS, in a hundredth of the run (or between
+            two of fewer results).
         max_events: largest number of events in a run.
         iterations: largest number of event rounds at one instant.
         on_chattering: what happens where events follow each other without end: `stop` with an error; `slide`: two modes
