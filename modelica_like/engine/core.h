@@ -28,9 +28,9 @@ __asm__(OLD(exp) OLD(log) OLD(pow) OLD(hypot) OLD(fmod));
 #define TIME_RESOLUTION 1e-10 /* as in guards_soon */
 #define JUST_TRUE 1e-300      /* as in conditions.py */
 #define AT_EDGE 1e-12         /* an edge or guard so close to zero rests there: rounding of values of about one */
-#define MOST_DOUBTS 8 /* of a step, each of which makes it four times as short: then its error is not the reason */
-#define NOISE 1e-30   /* a decaying signal ends by swinging around zero with such values; that is no event */
-#define CROWD 24      /* further instants in a short time follow each other ever faster */
+#define MOST_DOUBTS 200 /* between two events, each of which makes a step shorter: a signal has decayed with fewer */
+#define NOISE 1e-30     /* a decaying signal ends by swinging around zero with such values; that is no event */
+#define CROWD 24        /* further instants in a short time follow each other ever faster */
 
 /* Zero is failure: results are asked for and joined like conditions. */
 typedef enum { RESULT_ERROR, RESULT_OK, RESULT_DISCARD } Result;
@@ -178,7 +178,8 @@ typedef struct Instance {
     Piece *whole;
     Integrator integrator; /* gives the panels; NULL: steps of the run-time */
     Panel panel;
-    int own_steps, doubts; /* left, in spite of an integrator; of a search that could not tell a guard's sign */
+    int own_steps, doubts,
+        doubtful; /* left, in spite of an integrator; of steps, since the last event, and of a piece */
     Terms *terms, *strike_terms;
     Strike strike;
     int stopped; /* something has been stopped at the present instant */

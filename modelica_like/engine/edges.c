@@ -6,12 +6,14 @@
 #define BEHIND 1e-12  /* of a step that ends at an edge: the next one begins behind it */
 #define ROUNDS 60
 #define REACH 2
-#define ROUGHLY 1e-8    /* of a part: edges that stand alone and are smooth need no better */
-#define NEAR 0.1        /* an extremum that comes this close to zero is looked at */
-#define UNSEEN 10       /* error of a window between two edges, in tolerances, from which on the step ends before it */
-#define UNEXPLAINED 300 /* of a piece without edges: less is the error of another integrator */
-#define ALREADY 1e-9    /* of the step: edges at its beginning, on which it stands */
-#define FINE 0.9        /* of the advance of a phase that a step may have */
+#define ROUGHLY 1e-8     /* of a part: edges that stand alone and are smooth need no better */
+#define NEAR 0.1         /* an extremum that comes this close to zero is looked at */
+#define UNSEEN 10        /* error of a window between two edges, in tolerances, from which on the step ends before it */
+#define UNEXPLAINED 300  /* of a piece without edges: less is the error of another integrator */
+#define ALREADY 1e-9     /* of the step: edges at its beginning, on which it stands */
+#define MOST_NOISE 16    /* windows shorter than the time resolution: what stays at an edge goes over it by rounding */
+#define MOST_WINDOWS 200 /* of a step: with more, it becomes shorter */
+#define FINE 0.9         /* of the advance of a phase that a step may have */
 
 static double *edges_at(Instance *c, double t, double *point, double *values) {
     evaluate_special(c, &c->model->tapes.edges, t, point, values);
@@ -192,11 +194,14 @@ static int factor_piece(Instance *c, int at_end) {
 static double judge_windows(Instance *c, double least, int of_slopes, int of_guards, int precisely, int at_end) {
     double begin = c->piece->begin, h = c->piece->end - begin, landing = h, *now = c->edges_middle;
     double resolved = begin + TIME_RESOLUTION * fmax(1, fabs(begin));
-    int unseen = 0;
+    int unseen = 0, noise = 0, windows = 0;
     if (of_slopes && takes_panels(c) && !factor_piece(c, at_end)) return INFINITY;
     memcpy(now, c->edges, (size_t)c->model->tapes.edges.n_outputs * sizeof(double));
     for (double before = begin, edge = begin; edge < c->piece->end && !(unseen && landing < h); before = edge) {
         edge = fmin(next_edge(c, before, now, precisely), c->piece->end);
+        noise += edge - before < resolved - begin;
+        if (noise > MOST_NOISE) break;
+        if (++windows > MOST_WINDOWS) return 0.5 * h;
         double between = 0.5 * (before + edge);
         if (of_guards && between > resolved && has_risen(c, between)) return between - begin;
         if (of_guards && edge > resolved && has_risen(c, edge)) return edge - begin;

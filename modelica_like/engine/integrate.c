@@ -185,7 +185,6 @@ static Result take_step(Instance *c, double limit) {
     double *first = c->first, wished = s->step > 0 ? s->step : first_step(c);
     double least = least_step(s), most = INFINITY;
     int rejected = 0, landings = 0;
-    if (c->doubts < MOST_DOUBTS) c->doubts = 0; /* else the next event ends what cannot be told */
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
     wished = fmin(wished, largest_step(c));
     for (int n = 0; n < MAX_REJECTIONS; n++) {
@@ -239,11 +238,11 @@ static Result take_given(Instance *c, double limit, double far) {
     if (c->own_steps > 0) return take_own(c, limit);
     for (int n = 0; n < MAX_REJECTIONS && end - s->t >= least_step(s); n++) {
         clear_pending(c);
-        c->doubts = 0;
+        c->doubtful = 0;
         if (!next_piece(c, end, far)) break;
         if (c->model->n_guards == 0 || search_events(c)) return take_piece(c), RESULT_OK;
         leave_piece(c);
-        if (c->doubts > 0) {
+        if (c->doubtful) {
             c->own_steps = OWN_STEPS;
             return take_own(c, limit);
         }

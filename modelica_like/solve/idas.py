@@ -36,9 +36,9 @@ _FLAGS = {
 
 _FIRST_STEP = 1e-5
 """In scaled time. The first steps have a low order: longer ones cause errors of several tolerances at every event."""
-_STRICTER, _SMALLEST_RTOL = 0.3, 1e-14
+_STRICTER, _NOISY = 0.3, 1e-11
 """What IDAS is asked for, in tolerances: its errors of steps add up to several of them. It takes a fifth more steps and
-is three to ten times as precise; below the second number it gives up."""
+is three to ten times as precise; below the second number rounding makes more steps than tolerances do."""
 _SHORTENED = 1e-6
 """Largest factor by which IDAS shortens its first step before it gives up."""
 _SPARSE_FROM = 50
@@ -207,7 +207,7 @@ class Integrator:
     def _settings(self, steps: int, gentle: bool, first: float, longest: float) -> dict[str, Any]:
         nominal = self.model.nominals
         return {
-            "reltol": max(_STRICTER * self.rtol, _SMALLEST_RTOL),
+            "reltol": max(_STRICTER * self.rtol, min(self.rtol, _NOISY)),
             "abstol": _STRICTER * self.options.atol * self._relaxed * (float(np.min(nominal)) if nominal.size else 1.0),
             "max_num_steps": steps,
             # The implicit unknowns follow from the states and are polished; their part of the error test costs

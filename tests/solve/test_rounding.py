@@ -29,8 +29,9 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 NEEDS = {"Prescott": "pni", "Haswell": "avx2", "Zen": "avx2", "SkylakeX": "avx512f"}
 SECTIONS = ("parts", "series", "connect", "start", "guess")
 # PreLoad begins with four contacts that just touch; how they tremble is below the tolerance of a run (72, 46, 40 events
-# at rtol = 1e-6, 1e-8, 1e-10).
-TREMBLES = "PreLoad.toml"
+# at rtol = 1e-6, 1e-8, 1e-10). The speed of the clutch in OneWayClutch touches zero at 1.5 s: whether it sticks for the
+# last 50 µs before is less than the tolerance, too (docs/native.md).
+TREMBLES = ("PreLoad.toml", "OneWayClutch.toml")
 Told = dict[str, Any]
 
 
@@ -38,7 +39,7 @@ def netlists() -> list[Path]:
     """All examples that are models, in their order."""
     folders = [EXAMPLES, *(EXAMPLES / name for name in ("components", "dc_machines", "msl"))]
     found = {path for folder in folders for path in folder.glob("*.toml" if folder == EXAMPLES else "**/*.toml")}
-    return sorted(path for path in found if path.name != TREMBLES)
+    return sorted(path for path in found if path.name not in TREMBLES)
 
 
 def built(path: Path, seed: int = 0, moved: float = 0.0, **values: Any) -> CompiledDae:
