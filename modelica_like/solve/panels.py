@@ -46,7 +46,8 @@ _SHRINKS, _GROWS = 0.1, 30.0
 _MOST = 0.2
 """Of the last pieces of a panel, whose wishes for the next ones count less: IDAS makes some noise."""
 _LONGER, _ROOM = 4.0, 1.5
-"""Growth of panels without events; length of a panel over that of the last segment with its modes."""
+"""Growth of panels without events, unless a rough piece has cut them: what comes behind one is lost; length of a panel
+over that of the last segment with its modes."""
 _SHORTEST = 100
 """Of a panel, in time resolutions."""
 _FIRST_STEPS = {True: 1e-5, False: 1e-6}
@@ -234,7 +235,7 @@ class Panels:
                 telling = wishes[self._telling[: len(wishes)]]
                 segment.finest = float(telling.min(initial=ends[len(wishes[:-1])] - self._begin))
             passed = float(ends[-1] - self._begin)
-            self._span = _LONGER * (passed if self._cut else max(self._span, passed))
+            self._span = passed if self._cut else _LONGER * max(self._span, passed)
         self._begins = not len(ends) or now.t < ends[-1] - time_resolution(now.t) or modes != self._modes
         if self._begins:
             if now.t > segment.begin:
