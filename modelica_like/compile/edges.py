@@ -34,6 +34,7 @@ class Edges:
         slopes: how many of them, the first ones, are edges of the equations; the others are of guards.
         kinks: how many of these, the first ones, are not of smooth functions.
         phases: number of phases.
+        in_time: kinks of the equations depend on time.
     """
 
     function: ca.Function
@@ -41,6 +42,7 @@ class Edges:
     slopes: int
     kinks: int
     phases: int
+    in_time: bool
 
 
 def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, guards: ca.Function) -> Edges:
@@ -65,7 +67,8 @@ def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, gu
     phases = _different([one for _, (one, *_) in _operations(arguments, ca.vertcat(*edges, guards(*given)), _WAVES)])
     result = ca.densify(ca.vertcat(ca.SX(0, 1), *edges, *(one / PHASE_STEP for one in phases)))
     function = ca.Function("edges", list(arguments.values()), [result], list(arguments), ["edges"])
-    return Edges(function, len(edges), slopes, len(kinks), len(phases))
+    in_time = ca.depends_on(ca.vertcat(ca.SX(0, 1), *kinks), arguments["t"])
+    return Edges(function, len(edges), slopes, len(kinks), len(phases), in_time)
 
 
 def _edge(code: int, operands: list[Any]) -> Any:

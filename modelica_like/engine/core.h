@@ -178,8 +178,8 @@ typedef struct Instance {
     Piece *whole;
     Integrator integrator; /* gives the panels; NULL: steps of the run-time */
     Panel panel;
-    int own_steps, doubts,
-        doubtful; /* left, in spite of an integrator; of steps, since the last event, and of a piece */
+    int own_steps;        /* left, in spite of an integrator */
+    int doubts, doubtful; /* about the sign of a guard: of steps since the last event; of the present piece */
     Terms *terms, *strike_terms;
     Strike strike;
     int stopped; /* something has been stopped at the present instant */

@@ -9,10 +9,11 @@
 #define ROUGHLY 1e-8     /* of a part: edges that stand alone and are smooth need no better */
 #define NEAR 0.1         /* an extremum that comes this close to zero is looked at */
 #define UNSEEN 10        /* error of a window between two edges, in tolerances, from which on the step ends before it */
-#define UNEXPLAINED 300  /* of a piece without edges: less is the error of another integrator */
+#define UNEXPLAINED 300  /* of a piece of another integrator: less is the error of its steps, which are longer */
+#define CURVED 4         /* parts of a window whose slopes may be curved: their error is 256 times as small */
 #define ALREADY 1e-9     /* of the step: edges at its beginning, on which it stands */
-#define MOST_NOISE 16    /* windows shorter than the time resolution: what stays at an edge goes over it by rounding */
 #define MOST_WINDOWS 200 /* of a step: with more, it becomes shorter */
+#define MOST_NOISE 16    /* windows shorter than the time resolution: what stays at an edge has them by rounding */
 #define FINE 0.9         /* of the advance of a phase that a step may have */
 
 static double *edges_at(Instance *c, double t, double *point, double *values) {
@@ -116,20 +117,29 @@ int leads_off_edge(Instance *c, double least) {
     return any;
 }
 
-/* What the states change in a window otherwise than by their slopes, in tolerances. The matrix of the step takes away
- * what decays in it, as from the estimate of its error, but costs more than the rest. */
-static double window_error(Instance *c, double begin, double end, int with_matrix) {
+/* Adds what slopes on the piece's path change from one time to another, by Gauss's rule of order four. */
+static int add_slopes(Instance *c, double begin, double end, double *change) {
     const Model *m = c->model;
-    double *point = c->vector + m->n_z, *slopes = c->edge_slopes, *change = c->edge_change,
-           h = c->piece->end - c->piece->begin;
-    memset(change, 0, (size_t)m->n_unknowns * sizeof(double));
-    for (int g = -1; g <= 1; g += 2) { /* Gauss's rule of order four */
+    double *point = c->vector + m->n_z, *slopes = c->edge_slopes;
+    for (int g = -1; g <= 1; g += 2) {
         double t = 0.5 * (begin + end) + g * 0.28867513459481287 * (end - begin);
         piece_at(m, c->piece, t, point);
         if (!solve_implicit(c, t, point, 1)) return 0;
         evaluate_special(c, &m->tapes.rates, t, point, slopes);
         for (int k = 0; k < m->n_x; k++) change[k] += 0.5 * (end - begin) * slopes[k];
     }
+    return 1;
+}
+
+/* What the states change in a window otherwise than by their slopes, in tolerances. The matrix of the step takes away
+ * what decays in it, as from the estimate of its error, but costs more than the rest. */
+static double window_error(Instance *c, double begin, double end, int parts, int with_matrix) {
+    const Model *m = c->model;
+    double *point = c->vector + m->n_z, *change = c->edge_change, h = c->piece->end - c->piece->begin;
+    memset(change, 0, (size_t)m->n_unknowns * sizeof(double));
+    for (int k = 0; k < parts; k++)
+        if (!add_slopes(c, begin + (end - begin) * k / parts, begin + (end - begin) * (k + 1) / parts, change))
+            return 0;
     piece_at(m, c->piece, begin, point);
     for (int k = 0; k < m->n_x; k++) change[k] += point[k];
     piece_at(m, c->piece, end, point);
@@ -139,6 +149,14 @@ static double window_error(Instance *c, double begin, double end, int with_matri
         qr_solve(&m->step, c, change);
     }
     return error_norm(c, c->piece->points, last_of(m, c->piece), change);
+}
+
+/* Is it more than a step, or another integrator in a part of a piece, explains? Where it seems so, the window is taken
+ * in parts: its slopes may be curved. */
+static int is_unseen(Instance *c, double begin, double end, int with_matrix) {
+    double h = c->piece->end - c->piece->begin, most = UNSEEN + takes_panels(c) * UNEXPLAINED * (end - begin) / h;
+    return window_error(c, begin, end, 1, with_matrix) > most &&
+           window_error(c, begin, end, CURVED, with_matrix) > most;
 }
 
 /* Guards at a time of the piece. */
@@ -199,13 +217,15 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
     memcpy(now, c->edges, (size_t)c->model->tapes.edges.n_outputs * sizeof(double));
     for (double before = begin, edge = begin; edge < c->piece->end && !(unseen && landing < h); before = edge) {
         edge = fmin(next_edge(c, before, now, precisely), c->piece->end);
-        noise += edge - before < resolved - begin;
-        if (noise > MOST_NOISE) break;
+        if (edge - before < resolved - begin && ++noise > MOST_NOISE) { /* windows become twice as long, each time */
+            edge = fmin(before + ldexp(resolved - begin, noise - MOST_NOISE), c->piece->end);
+            edges_inside(c, edge, now);
+        }
         if (++windows > MOST_WINDOWS) return 0.5 * h;
         double between = 0.5 * (before + edge);
         if (of_guards && between > resolved && has_risen(c, between)) return between - begin;
         if (of_guards && edge > resolved && has_risen(c, edge)) return edge - begin;
-        unseen |= of_slopes && window_error(c, before, edge, 1) > UNSEEN;
+        unseen |= of_slopes && is_unseen(c, before, edge, 1);
         if (landing == h && edge - begin > fmax(least, ALREADY * h)) landing = edge - begin;
     }
     if (unseen && landing >= h && takes_panels(c)) return 0.5 * h; /* the piece ends at its only edge */
@@ -217,9 +237,9 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
 static double explained_length(Instance *c) {
     double begin = c->piece->begin, end = c->piece->end;
     if (!takes_panels(c) || c->model->settings->n_slope_edges == 0) return INFINITY;
-    if (window_error(c, begin, end, 0) <= UNEXPLAINED) return INFINITY;
+    if (!is_unseen(c, begin, end, 0)) return INFINITY;
     for (int at_end = 0; at_end < 2; at_end++)
-        if (factor_piece(c, at_end) && window_error(c, begin, end, 1) > UNEXPLAINED) return 0.5 * (end - begin);
+        if (factor_piece(c, at_end) && is_unseen(c, begin, end, 1)) return 0.5 * (end - begin);
     return INFINITY;
 }
 

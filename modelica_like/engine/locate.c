@@ -236,10 +236,8 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
     Look found = room_for_look(c, DEPTH + 2);
     double step;
     if (!find_candidates(c, before, after)) return NOTHING;
-    if (takes_panels(c)) c->doubtful = is_within_tolerance(c, before, after);
-    int too_long = takes_panels(c) ? c->doubtful : is_within_error(c, after);
-    if (too_long) {
-        c->doubts += !takes_panels(c);
+    if (takes_panels(c) ? is_within_tolerance(c, before, after) : is_within_error(c, after)) {
+        ++*(takes_panels(c) ? &c->doubtful : &c->doubts);
         return TOO_LONG;
     }
     if (locate(c, before, after, &found)) {

@@ -289,12 +289,15 @@ class Panels:
 def _felt(model: CompiledDae) -> Any:
     """Mark entries of d that continuous equations and delays read.
 
-    Where edges of guards have been looked at in a whole panel, also what guards read.
+    Where edges of guards have been looked at in a whole panel, also what guards read. Where equations have corners in
+    time, as tables have, also what time events read: those at the corners change nothing else.
     """
     felt = np.zeros(model.discrete_size, np.uint8)
     looked_at = (model.guards,) if model.edges.count > model.edges.slopes else ()
     for function in (model.ode, model.alg, model.delays, model.edges.function, *looked_at):
         felt[function.jac_sparsity(0, function.index_in("d")).get_triplet()[1]] = 1
+    if model.edges.in_time:
+        felt[model.moments.jac_sparsity(0, model.moments.index_in("d")).get_triplet()[1]] = 1
     if looked_at:
         felt[[one.mode for one in model.transitions if not one.timed]] = 1
     return felt

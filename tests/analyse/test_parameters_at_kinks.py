@@ -118,7 +118,7 @@ def test_what_does_not_jump_may_begin_with_the_run() -> None:
 
 
 QUICK = ("filters", "lepelletier_gears", "two_mass")
-OFTEN = ("gears_and_losses", "planetary_sets", "servo_axis", "CoupledClutches", "Backlash", "LossyGearDemo1")
+OFTEN = ("winch", "gears_and_losses", "planetary_sets", "servo_axis", "CoupledClutches", "Backlash", "LossyGearDemo1")
 """Examples of continuous integration; the others by hand, with EVERY_EXAMPLE in the environment."""
 STEPS = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 """Relative changes, of parameters that are zero in SI units: backlash of 1e-5 rad is far in gears at rest."""

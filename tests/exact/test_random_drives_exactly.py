@@ -9,11 +9,8 @@ from random_drives import random_drive
 
 ORDINARY = 75
 BLOCK = 50
-HARD = (450, 475, 1546, 1862, 1883, 1991)
+HARD = (450, 475, 1498, 1546, 1862, 1883, 1991)
 """Drives that were the last to be right: loops at rest, ties between torque and capacity, slips held for minutes."""
-OPEN = (1498,)
-"""IDAS is 2e-8 off instead of 1e-9: a speed of 3.9e6 rad/s beside others of zero is noise to its polynomials, and the
-run takes a million steps. The run-time with its own steps is right."""
 
 
 @pytest.mark.parametrize("number", [*range(ORDINARY), *HARD])
@@ -27,4 +24,4 @@ def test_drive(number):
 def test_block_of_drives(first):
     outcomes = list(judged(range(first, min(first + BLOCK, DRIVES))))
     wrong = [outcome.number for outcome in outcomes if outcome.category]
-    assert wrong == [outcome.number for outcome in outcomes if outcome.number in OPEN], summary(outcomes)
+    assert not wrong, summary(outcomes)

@@ -141,7 +141,7 @@ def test_a_design_check_of_a_long_run(tmp_path: Path) -> None:
     assert made.exceeded == 1
 
 
-QUICK = ("machine_table_direct", "machine_tool_startup", "two_mass", "CoupledClutches")
+QUICK = ("machine_table_direct", "machine_tool_startup", "two_mass", "winch", "CoupledClutches")
 EXAMPLES = [
     path
     for path in sorted((ROOT / "examples").rglob("*.toml"))
