@@ -66,6 +66,7 @@ benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/energy.py
 	$(BIN)/python benchmarks/segments.py
 	$(BIN)/python benchmarks/events.py
+	$(BIN)/python benchmarks/precision.py
 	$(BIN)/python benchmarks/chain.py 10 100 1000 5000
 	$(BIN)/python benchmarks/fmu_export.py 10 100 1000
 	$(BIN)/python benchmarks/gradient.py

@@ -270,11 +270,11 @@ static int instant(Native *n, NativeRun *r, double width) {
     return write_point(n, r);
 }
 
-/* Notes the step that has just been taken. */
+/* Notes the step that has just been taken. One of no length, with an event at once, has no polynomial. */
 static void note_step(Native *n, NativeRun *r) {
     size_t size = 5 * (size_t)n->c->model->n_unknowns;
     const Piece *piece = n->c->piece;
-    if (r->steps_taken == NULL) return;
+    if (r->steps_taken == NULL || !(piece->end > piece->begin)) return;
     double *row = r->steps_taken + (size_t)r->n_taken++ * (3 + size);
     row[0] = (double)(r->n_segments - 1);
     row[1] = piece->begin;
