@@ -158,6 +158,8 @@ class EngineLoop:
         return bool(self.model.states) and self._instance.counts()[0] - self._passed[1] > self.options.max_steps
 
     def _reached(self, time: float) -> bool:
+        if self._idas is not None:
+            self._idas.panels.integrator.interrupts.check()
         if self.progress is not None:
             self.progress(time)
         if time - self._passed[0] >= self._part * (1 - _ROUNDING):
