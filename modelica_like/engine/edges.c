@@ -268,7 +268,8 @@ double seen_length(Instance *c, double least, double *most) {
     for (int k = n_edges; k < n; k++) /* a phase may jump, but not in both halves of a step */
         advance = fmax(advance, 2 * fmin(fabs(last[k] - middle[k]), fabs(middle[k] - first[k])));
     *most = advance > 0 ? FINE * h / advance : INFINITY;
-    if (advance > 1) return *most;
+    /* What advances in a shorter time jumps. */
+    if (advance > 1 && h > TIME_RESOLUTION * fmax(1, fabs(begin))) return *most;
     if (n_edges == 0) return INFINITY;
     if (out_of_reach(c, h)) return explained_length(c);
     if (n == n_edges) edges_inside(c, begin + 0.5 * h, middle);

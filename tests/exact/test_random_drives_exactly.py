@@ -9,7 +9,7 @@ from random_drives import random_drive
 
 ORDINARY = 75
 BLOCK = 50
-HARD = (450, 475, 1498, 1546, 1862, 1883, 1991)
+HARD = (450, 475, 1546, 1862, 1883, 1991)
 """Drives that were the last to be right: loops at rest, ties between torque and capacity, slips held for minutes."""
 
 
