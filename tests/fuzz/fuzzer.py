@@ -10,6 +10,7 @@ import contextlib
 import io
 import os
 import random
+import shutil
 import signal
 import sys
 import tempfile
@@ -162,7 +163,7 @@ def words(chance: random.Random) -> tuple[str, Callable[[], object]]:
         word for one in parameters(command(name)) for word in one.words()
         if not word.startswith("--no-") or word == "--no-such"
     ]  # fmt: skip
-    files = [str(folder() / "drive.toml"), str(folder() / "motor.fmu"), str(folder() / "system.ssp"), "no.toml", "."]
+    files = [*GIVEN, "no.toml", "."]
     values = [*files, "J1.w", "*", "1", "1e-5", "J1.J=1", "J1.J=1:2:2", "", "-", "x.png", "x.csv", pieces(chance)]
     given = [chance.choice(files) for _ in range(chance.choice((0, 1, 1, 1, 2)))]
     for _ in range(chance.randrange(4)):
@@ -176,6 +177,8 @@ def words(chance: random.Random) -> tuple[str, Callable[[], object]]:
 def _called(line: list[str]) -> None:
     here = os.getcwd()
     os.chdir(folder() / "here")
+    for name in GIVEN:  # a command may write to any of them
+        shutil.copy(folder() / name, name)
     try:
         with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
             call([*line, "--debug"])
@@ -185,6 +188,7 @@ def _called(line: list[str]) -> None:
         os.chdir(here)
 
 
+GIVEN = ("drive.toml", "motor.fmu", "system.ssp")
 NOT_HERE = {"explore", "demo", "runtimes", "trust", "export", "docs"}
 """Commands that serve, compile, or take long."""
 KINDS = {
