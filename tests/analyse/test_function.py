@@ -114,6 +114,7 @@ def test_a_series_is_no_output() -> None:
         simulation_function(EXAMPLES / "machine_table_direct.toml", ["load_torque"], ["series(table.s)"])
 
 
+@pytest.mark.slow
 def test_engagement_profile_with_ipopt() -> None:
     design = runpy.run_path(str(EXAMPLES / "design" / "engagement_profile.py"))["design"]
     first, best = design(600.0)

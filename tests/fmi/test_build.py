@@ -97,6 +97,7 @@ def newest_glibc(library):
     return max(tuple(map(int, m.split(b"."))) for m in re.findall(rb"GLIBC_(\d+\.\d+)", library.read_bytes()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", ["2.0", pytest.param("3.0", marks=pytest.mark.slow)])
 def test_the_compiler_of_this_machine_does_so_too(tmp_path, version, example):
     """Also where its own glibc has newer versions of exp, log, pow and hypot."""
@@ -126,6 +127,7 @@ def test_zig_exports_the_fmi_functions_only_and_needs_an_old_glibc(monkeypatch, 
     assert library.stat().st_size < 310_000
 
 
+@pytest.mark.slow
 def test_another_platform(tmp_path, example):
     model = build_model(example)
     library = build(generate(model, interface(model), token="{t}"), "aarch64-linux", tmp_path)

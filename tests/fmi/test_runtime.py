@@ -160,6 +160,7 @@ def test_a_library_is_built_once(nothing_built):
     assert library.stat().st_size < 240_000  # every FMU carries one
 
 
+@pytest.mark.slow
 def test_a_library_of_other_sources_is_not_used(nothing_built, monkeypatch):
     library = build_runtime(NATIVE, nothing_built / "shipped" / NATIVE)
     assert runtime_library(NATIVE) == library

@@ -91,6 +91,7 @@ def test_chain_pulls_in_both_directions_and_is_as_fast_as_its_teeth() -> None:
         assert run.energy().power_closure < 1e-9
 
 
+@pytest.mark.slow
 def test_a_chain_on_a_frame_that_turns_does_not_notice() -> None:
     """Speeds, and the teeth that are in the chain, are those against the frame."""
     forces: list[Any] = []

@@ -102,6 +102,7 @@ def test_little_room_changes_nothing(monkeypatch):
     assert reached[-1] == 1.5
 
 
+@pytest.mark.slow
 def test_specialised_tapes_change_nothing(monkeypatch, tmp_path):
     """The same run-time that never specialises gives the same numbers."""
     texts = sources.runtime_sources(("native",))

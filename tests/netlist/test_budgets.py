@@ -48,6 +48,7 @@ def test_a_fault_in_a_netlist_that_is_used_often_is_told_once(tmp_path: Path) ->
     )
 
 
+@pytest.mark.slow
 def test_parts_and_parameters_are_counted() -> None:
     many = "[parts]\n" + "".join(f'{name} = {{ is = "Inertia", count = 100000 }}\n' for name in "abc")
     assert _told(lambda: loads(many)) == (

@@ -273,7 +273,9 @@ def test_bars_and_files_answer(browser: Any, explorer: Explorer, tmp_path: Path)
 
 
 @pytest.mark.browser
-@pytest.mark.parametrize("name", ["winch", "servo_axis", pytest.param("launch", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", ["winch", *(pytest.param(n, marks=pytest.mark.slow) for n in ("servo_axis", "launch"))]
+)
 def test_larger_drives_are_explored_without_complaint(browser: Any, tmp_path: Path, name: str) -> None:
     with served(name, tmp_path) as explorer:
         browser.open(explorer.address)

@@ -78,6 +78,7 @@ def _stored(solution: Solution, tree: Tree, number: int) -> np.ndarray:
     return 0.5 * c * angle**2
 
 
+@pytest.mark.slow
 @given(trees(), st.integers(1, 1000))
 @every_drive
 def test_order_and_names_count_nowhere(tree: Tree, seed: int) -> None:
@@ -148,6 +149,7 @@ def test_planetary_sets_and_gears_keep_their_momenta(tree: Tree) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8 * np.max(np.abs(expected)))
 
 
+@pytest.mark.slow
 @given(trees())
 @every_drive
 def test_what_is_written_is_the_same_drive(tree: Tree) -> None:

@@ -182,7 +182,10 @@ def test_no_torque_depends_on_what_is_written(path: Path, solver: Any) -> None:
         assert (np.abs(few - many) <= allowed).all()
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, marks=[] if path.stem in QUICK[:3] else pytest.mark.slow, id=path.stem) for path in EXAMPLES],
+)
 def test_a_name_has_one_number_in_every_example(path: Path) -> None:
     model = build(path)
     names = some_readings(model)

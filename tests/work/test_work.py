@@ -13,6 +13,7 @@ def test_every_example_is_in_the_table() -> None:
     assert sorted(EXPECTED) == netlists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", netlists())
 def test_example_costs_what_the_table_says(name: str) -> None:
     found, expected = work(name), EXPECTED[name]
