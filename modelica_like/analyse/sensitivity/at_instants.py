@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +15,11 @@ from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.analyse.sensitivity.replayed import along
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledTransition
-from modelica_like.errors import NoGradient
+from modelica_like.compile.soon import time_resolution
+from modelica_like.errors import NoGradient, SolveError
 from modelica_like.runs.readings import Output
-from modelica_like.solve.initialize import Point, share, solve_implicit
-from modelica_like.solve.initialize.slopes import slopes
+from modelica_like.solve.initialize import Point, call, initialize, share, solve_implicit
+from modelica_like.solve.initialize.slopes import Slopes, slopes
 
 _NEAR = 1e-9
 """Time between an event and an instant, relative to the run, up to which it may be rounding of parameters."""
@@ -71,10 +73,9 @@ class _Change:
 def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
     """Timed events that would come a moment after the start; the start has passed over them."""
     model, start = chain.model, chain.nodes[0]
-    for transition in (t for t in model.transitions if t.timed and start.d[t.mode] == t.target):
-        part = slopes(model, start, "moments", [transition.index])
-        if not _same(chain, float(part.value[0]), start.t):
-            continue
+    passed = list(_passed_over(chain))
+    earlier = _modes_before(chain, {one.mode for one, _ in passed}) if passed else start.d
+    for transition, part in passed:
         mode = model.flat_discretes[transition.mode]
 
         def matters(one: CompiledTransition = transition) -> bool:
@@ -82,6 +83,7 @@ def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
             chain.adjoint(readings, multipliers)
             for source in one.sources:
                 before = start.copy()
+                before.d[:] = earlier
                 before.d[one.mode] = source
                 share(model, before)
                 solve_implicit(model, before)
@@ -97,6 +99,33 @@ def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
             _error(start.t, mode.path, mode.names[transition.target], "at the start of the run", transition.source),
             matters,
         )
+
+
+def _modes_before(chain: Replay, passed: set[int]) -> Vector:
+    """Discrete variables of a start a moment earlier: what follows from events passed over has not happened there.
+
+    The modes of these events themselves, `passed`, are those of the start.
+    """
+    model, start = chain.model, chain.nodes[0]
+    modes = start.d.copy()
+    moment = start.t - 2 * time_resolution(start.t)
+    with suppress(SolveError):  # no such start: then nothing is known to follow
+        modes = initialize(model, moment, model.settings.get("start", "given")).d.copy()
+    kept = list(passed)
+    modes[kept] = start.d[kept]
+    return modes
+
+
+def _passed_over(chain: Replay) -> Iterator[tuple[CompiledTransition, Slopes]]:
+    """Timed transitions at the start that lead to its modes, also by others there, and their moments."""
+    model, start = chain.model, chain.nodes[0]
+    moments = call(model, model.moments, start)
+    there = [one for one in model.transitions if one.timed and _same(chain, float(moments[one.index]), start.t)]
+    reached = {(one.mode, start.d[one.mode]) for one in there}
+    while ready := [one for one in there if (one.mode, one.target) in reached]:
+        there = [one for one in there if one not in ready]
+        reached |= {(one.mode, source) for one in ready for source in one.sources}
+        yield from ((one, slopes(model, start, "moments", [one.index])) for one in ready)
 
 
 def _read_there(chain: Replay, readings: Sequence[Reading], outputs: Sequence[Output]) -> Iterator[Edge]:
