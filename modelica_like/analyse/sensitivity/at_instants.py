@@ -16,9 +16,10 @@ from modelica_like.analyse.sensitivity.replayed import along
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledTransition
 from modelica_like.compile.soon import time_resolution
-from modelica_like.errors import NoGradient, SolveError
+from modelica_like.errors import ModelicaLikeError, NoGradient
 from modelica_like.runs.readings import Output
-from modelica_like.solve.initialize import Point, call, initialize, share, solve_implicit
+from modelica_like.simulation import quick_run
+from modelica_like.solve.initialize import Point, call, share, solve_implicit
 from modelica_like.solve.initialize.slopes import Slopes, slopes
 
 _NEAR = 1e-9
@@ -73,18 +74,15 @@ class _Change:
 def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
     """Timed events that would come a moment after the start; the start has passed over them."""
     model, start = chain.model, chain.nodes[0]
-    passed = list(_passed_over(chain))
-    earlier = _modes_before(chain, {one.mode for one, _ in passed}) if passed else start.d
-    for transition, part in passed:
+    for transition, part in _passed_over(chain):
         mode = model.flat_discretes[transition.mode]
 
-        def matters(one: CompiledTransition = transition) -> bool:
+        def matters(one: CompiledTransition = transition, part: Slopes = part) -> bool:
             multipliers = {0: np.zeros(0)}
             chain.adjoint(readings, multipliers)
-            for source in one.sources:
+            for modes in _modes_before(chain, one, part):
                 before = start.copy()
-                before.d[:] = earlier
-                before.d[one.mode] = source
+                before.d[:] = modes
                 share(model, before)
                 solve_implicit(model, before)
                 change = _Change.between(chain, before, start)
@@ -101,19 +99,24 @@ def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
         )
 
 
-def _modes_before(chain: Replay, passed: set[int]) -> Vector:
-    """Discrete variables of a start a moment earlier: what follows from events passed over has not happened there.
+def _modes_before(chain: Replay, passed: CompiledTransition, moment: Slopes) -> Iterator[Vector]:
+    """Yield discrete variables that there are at the start if an event comes a moment later.
 
-    The modes of these events themselves, `passed`, are those of the start.
+    A parameter that moves it tells what follows from it, as switches that a signal opens. Where there is no such start,
+    nothing is known to follow.
     """
     model, start = chain.model, chain.nodes[0]
-    modes = start.d.copy()
-    moment = start.t - 2 * time_resolution(start.t)
-    with suppress(SolveError):  # no such start: then nothing is known to follow
-        modes = initialize(model, moment, model.settings.get("start", "given")).d.copy()
-    kept = list(passed)
-    modes[kept] = start.d[kept]
-    return modes
+    for source in passed.sources:
+        modes = start.d.copy()
+        modes[passed.mode] = source
+        yield modes
+    by, small = moment.by[0][len(start.x) : len(start.x) + len(model.p)], time_resolution(start.t)
+    if not np.any(by):
+        return
+    k = int(np.argmax(np.abs(by)))
+    with suppress(ModelicaLikeError):
+        later = model.with_parameters({model.flat_parameters[k].path: float(model.p[k] + 4 * small / by[k])})
+        yield quick_run(later, start.t + 2 * small, t0=start.t).segments[-1].d
 
 
 def _passed_over(chain: Replay) -> Iterator[tuple[CompiledTransition, Slopes]]:
