@@ -86,6 +86,7 @@ def shaft_diameter(bending: Torque, strength: Stress, safety: Ratio, diameter: L
         safety: required safety.
         diameter: smallest diameter of the shaft in m.
     """
+    require("Strength and safety of a shaft are positive.", strength > 0, safety > 0)
     allowable = strength / safety
     return ShaftDiameter(bending, allowable, (32 * abs(bending) / (math.pi * allowable)) ** (1 / 3), diameter)
 

@@ -59,6 +59,12 @@ class Result:
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True)(cls)
 
+    def __post_init__(self) -> None:
+        for field in _fields(type(self)):
+            value = getattr(self, field.name)
+            if isinstance(value, complex | np.ndarray) and np.iscomplexobj(value):  # Python's roots go on there
+                raise ValueError(f"There is no {field.metadata['description']}: it is the root of a negative number.")
+
     def lines(self, limits: Limits | None = None) -> tuple[Line, ...]:
         """Return the lines of the table.
 

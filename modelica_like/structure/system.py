@@ -181,7 +181,9 @@ def _levels(model: FlatModel, chains: list[list[int]], ranked: dict[int, list[_N
             preference = max((PREFERENCES.index(variable.state) for variable, _ in base), default=0)
             # The name says nothing about the guess: any of them that has one knows more than zero.
             guess = next((variable.guess / factor for variable, factor in base if variable.guess), 0.0)
-            levels.append(Level(chain, order, model.node_name(node), preference, named.nominal, guess, not connected))
+            # Variables may have two names, of which one is a state's: its derivative has the same.
+            name = f"der({levels[-1].name})" if order and model.nodes[node][1] else model.node_name(node)
+            levels.append(Level(chain, order, name, preference, named.nominal, guess, not connected))
     return levels
 
 

@@ -13,6 +13,7 @@ from components.sizing import (
     clutch_selection,
     comparison,
     flywheel_for_time,
+    shaft_diameter,
     shaft_statics,
 )
 from modelica_like.language import quantities
@@ -71,6 +72,13 @@ def test_the_worst_of_an_array_counts() -> None:
 
 def test_nan_is_not_ok() -> None:
     assert ClutchSelection(float("nan"), 0.5, 0.6).lines()[0].exceeded
+
+
+def test_the_root_of_a_negative_number_is_none() -> None:
+    with pytest.raises(ValueError, match=r"^Strength and safety of a shaft are positive\.$"):
+        shaft_diameter(1.5, 275e6, -2.0, 6e-3)
+    with pytest.raises(ValueError, match=r"^There is no required torque K·P/w without the rounded 9550: it is the root of a negative number\.$"):
+        ClutchSelection(1.0, (-8.0) ** (1 / 3), 0.6)
 
 
 def test_expressions_have_no_verdict() -> None:

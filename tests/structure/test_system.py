@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from linear_models import chains, model
 
-from components import Constant, FirstOrder, Inertia, Torque
+from components import Constant, FirstOrder, Inertia, Torque, Vehicle
 from modelica_like import Assembly, build
 from modelica_like.flatten import FlatModel, flatten
 from modelica_like.language import Component, Equations, Parameter, Variable, der, param, var
@@ -114,6 +114,12 @@ def test_what_names_a_level() -> None:
     assert named({"path": "a.b.x"}, {"path": "a.y"}, 1.0).name == "a.y"
     assert named({"path": "a.b.x", "state": "prefer"}, {"path": "a.y"}, 1.0).name == "a.b.x"
     assert named({"path": "a.x"}, {"path": "a.y"}, 1.0).name == "a.x"
+
+
+def test_a_derivative_is_named_like_the_state_below_it() -> None:
+    """Both flanges of a vehicle are one: a derivative with the name of the other could not be exported."""
+    drive = Assembly("held", parts={"car": Vehicle(m=1.0, R=1.0)}, connect={"f": ["car.flange_r", "car.support"]})
+    assert build(drive).states == ("car.support.phi", "der(car.support.phi)")
 
 
 def test_a_generic_point_has_no_equal_values() -> None:
