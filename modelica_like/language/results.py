@@ -61,8 +61,8 @@ class Result:
 
     def __post_init__(self) -> None:
         for field in _fields(type(self)):
-            value = getattr(self, field.name)
-            if isinstance(value, complex | np.ndarray) and np.iscomplexobj(value):  # Python's roots go on there
+            value: Any = getattr(self, field.name)
+            if isinstance(value, complex) or getattr(value, "dtype", None) == complex:  # Python's roots go on there
                 raise ValueError(f"There is no {field.metadata['description']}: it is the root of a negative number.")
 
     def lines(self, limits: Limits | None = None) -> tuple[Line, ...]:

@@ -1,12 +1,13 @@
 """Sensitivities against Richardson-extrapolated differences of runs, and how parameters are named."""
 
-from math import pi
+from math import cos, pi
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from modelica_like import CompiledDae, Options, build, load, sensitivities, simulate, simulation_function
+from components import Fixed, Inertia, Spring
+from modelica_like import Assembly, CompiledDae, Options, build, load, sensitivities, simulate, simulation_function
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities
 from modelica_like.errors import NoGradient
 from modelica_like.netlist import loads
@@ -212,3 +213,12 @@ def test_parameters_on_an_edge_are_refused_by_name_and_left_out_of_all() -> None
     assert relative_error(sensitivities(run, "clutch1.loss_energy", known), everything.derivatives) < 1e-12
     with pytest.raises(NoGradient, match=r"Leave out clutch2\.tau_drag, or move"):
         sensitivities(run, "clutch1.loss_energy", ["J1.J", "clutch2.tau_drag"])
+
+
+@pytest.mark.parametrize("until", [0.01, 0.05])
+def test_a_drive_at_rest_tells_nothing_about_what_a_parameter_excites(until: float) -> None:
+    """A disc on a spring, both at rest: with another free angle it swings, by cos(w t) of the torque at the start."""
+    parts = {"wall": Fixed(), "spring": Spring(c=1e4, phi_rel0=0.0), "disc": Inertia(J=0.01, phi=0.0, w=0.0)}
+    drive = build(Assembly("resting", parts=parts, series={"s": list(parts)}))
+    found = sensitivities(drive, "spring.tau", "spring.phi_rel0", until=until).derivatives
+    assert found == pytest.approx(-1e4 * cos(1000.0 * until), abs=1e-3)

@@ -77,7 +77,10 @@ def test_nan_is_not_ok() -> None:
 def test_the_root_of_a_negative_number_is_none() -> None:
     with pytest.raises(ValueError, match=r"^Strength and safety of a shaft are positive\.$"):
         shaft_diameter(1.5, 275e6, -2.0, 6e-3)
-    with pytest.raises(ValueError, match=r"^There is no required torque K·P/w without the rounded 9550: it is the root of a negative number\.$"):
+    with pytest.raises(
+        ValueError,
+        match=r"^There is no required torque K·P/w without the rounded 9550: it is the root of a negative number\.$",
+    ):
         ClutchSelection(1.0, (-8.0) ** (1 / 3), 0.6)
 
 

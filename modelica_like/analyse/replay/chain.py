@@ -20,6 +20,7 @@ from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.replay.start import start_slopes
 from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try_step
 from modelica_like.analyse.replay.steps import ABSOLUTE, StepFunctions, Tolerances
+from modelica_like.analyse.replay.tangents import Tangents
 from modelica_like.analyse.replay.when import Coincidence, event_time
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import TERMINAL, CompiledDae
@@ -36,6 +37,9 @@ _ALIKE = 1e-2
 """Difference of the states at the end of a run and of its repetition, over their largest values."""
 _FIRST = 1e-3
 """First step behind an event, relative to the last one before: a law can begin there with an infinite slope."""
+
+_LEAST = 1e-7
+"""Steps, in the time of the run, that are not shortened for the derivatives: they may jump there."""
 
 _NONE = np.zeros(0)
 Move = Step | Jump
@@ -266,6 +270,7 @@ class _Maker:
         # A step could begin and end on the same side of a kink that the run has passed twice in between.
         self.stops = np.union1d(stops, self.kinks.seen())
         self.h = np.inf
+        self.tangents = Tangents(self.model, chain.functions.tolerances)
         self.span = float(solution.segments[-1].times[-1] - solution.segments[0].times[0])
         self.events: list[list[Event]] = [[] for _ in solution.segments]
         for event in solution.events:
@@ -293,6 +298,11 @@ class _Maker:
         self.chain.start_x, self.chain.start_d = start_x, start_d
         self.chain.chances += [replace(chance, by=np.pad(chance.by @ whole, (size.x, size.d))) for chance in chances]
         self.chain.nodes.append(point)
+        self.tangents.begin(start_x, start_d)
+
+    def _append(self, move: Move) -> None:
+        self.chain.append(move)
+        self.tangents.carry(move)
 
     def jump(self, number: int) -> None:
         """Event before a segment."""
@@ -303,7 +313,7 @@ class _Maker:
             if when.trigger is None or not self._relocate(when.trigger.shift):
                 break
         jump = make_jump(self.model, self.chain.nodes[-1], events, begin, self.chain.functions.integrands, first=False)
-        self.chain.append(jump)
+        self._append(jump)
         self.h = _FIRST * min(self.h, self.span)
 
     def _relocate(self, late: float) -> bool:
@@ -322,8 +332,9 @@ class _Maker:
                 return False
         self.chain.nodes.pop()
         self.chain.moves.pop()
+        self.tangents.go_back()
         if step is not None:
-            self.chain.append(step)
+            self._append(step)
         return True
 
     def smooth(self, segment: Segment) -> None:
@@ -342,6 +353,8 @@ class _Maker:
             if h < _SMALLEST * max(1.0, abs(here.t)) and h < left:
                 raise stuck(here)
             step, error = try_step(self.chain.functions, here, h, before)
+            if step is not None and error <= 1.0 and h > _LEAST * self.span:
+                error = max(error, self.tangents.error(step))
             order = len(self.chain.functions.tableau.nodes) + 1
             factor = max(_SHRINK, min(_GROW, _SAFETY * (error + 1e-16) ** (-1.0 / order)))
             if step is not None and error <= 1.0:
@@ -349,7 +362,7 @@ class _Maker:
                     step.after.t = end
                 self.h = max(self.h, h * factor) if h == left else h * factor
                 before = self._up_to_kink(step)
-                self.chain.append(before)
+                self._append(before)
             else:
                 self.h = h * min(factor, 0.7)
                 before = None if step is None else before

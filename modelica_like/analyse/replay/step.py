@@ -43,6 +43,12 @@ class Step:
         end, gained = fast(*self._arguments, whole[:nx].ravel("F"), whole[nx:].ravel("F"))
         return np.vstack([end.reshape(columns, -1).T, whole[nx:]]), gained.reshape(columns, -1).T
 
+    def tangent(self, whole: Vector) -> tuple[Vector, Vector]:
+        """Carry derivatives of (x, theta) in one direction, shape (nx + ntheta,), and estimate their error by x."""
+        nx = len(self.before.x)
+        end, error = self.functions.tangent(*self._arguments, self.before.z, whole[:nx], whole[nx:])
+        return np.concatenate([end, whole[nx:]]), error.copy()
+
     def adjoint(self, whole: Vector, Q: Vector) -> Vector:
         """Carry derivatives by (x, theta) to the beginning; Q are those by the quadratures."""
         nx, columns = len(self.before.x), whole.shape[1]
@@ -79,7 +85,8 @@ def try_step(functions: StepFunctions, point: Point, h: float, last: Step | None
             return None, np.inf
         error, quadratures = functions.finish(point.t, h, point.x, W, *theta, point.z)
     after = Point(point.t + h, W[-nx - nz : W.size - nz].copy(), W[W.size - nz :].copy(), point.d)
-    norm = functions.tolerances.norm(error, point, after, model.nominals)
+    scale = np.maximum(np.abs(point.x), np.abs(after.x)) + ABSOLUTE * model.nominals
+    norm = functions.tolerances.norm(error / scale)
     return (Step(functions, point, after, h, W, quadratures), norm) if norm < np.inf else (None, np.inf)
 
 

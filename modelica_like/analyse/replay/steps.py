@@ -43,10 +43,9 @@ class Tolerances:
                 f"it must be between {_FINEST:g} and {_COARSEST:g}."
             )
 
-    def norm(self, error: Vector, before: Point, after: Point, nominals: Vector) -> float:
-        """Estimated error of a step over what is allowed."""
-        scale = np.maximum(np.abs(before.x), np.abs(after.x)) + ABSOLUTE * nominals
-        return float(np.linalg.norm(error / scale)) / (len(error) ** 0.5 * self.rtol**_ORDERS)
+    def norm(self, relative: Vector) -> float:
+        """Estimated error of a step, relative to the states, over what is allowed."""
+        return float(np.linalg.norm(relative)) / (len(relative) ** 0.5 * self.rtol**_ORDERS)
 
 
 class StepFunctions:
@@ -290,6 +289,40 @@ class StepFunctions:
         last = change[self.size - self.nx - self.nz : self.size - self.nz, :]
         quadratures = ca.mtimes(q_w, change) + ca.mtimes(q_theta, P)
         return ca.Function("forward", [*self._names, S, P], [last, ca.densify(quadratures)])
+
+    @property
+    def tangent(self) -> Any:
+        """Function of (t, h, x, W, p, u, d, z, S, P) of the beginning: S at the end, and the estimate of its error.
+
+        S are derivatives of x and P of (p, u, d) in one direction.
+        """
+        return self._cached("tangent", self._make_tangent)
+
+    def _make_tangent(self) -> ca.Function:
+        t, h, x, _, p, u, d = self._names
+        z, S, P = (ca.MX.sym(name, size) for name, size in (("z", self.nz), ("S", self.nx), ("P", self.nt)))
+        by_theta = self._sources(*self._names)[0]
+        change = self._solve_stages(ca.repmat(ca.vertcat(S, ca.MX(self.nz, 1)), STAGES, 1) - ca.mtimes(by_theta, P))
+        slopes, theta = self._equations(t, x, z, p, u, d)[1], ca.mtimes(self._parameters(t, x, z, p, u, d)[0], P)
+        at_once, matrix = self._shifted("both", np.zeros((1, 1)), np.array([[self.tableau.gamma]]))(t, h, x, z, p, u, d)
+        begin = _solve(at_once, ca.vertcat(S, -theta[self.nx :, :]), self._node_order)
+        first = (ca.mtimes(slopes, begin) + theta)[: self.nx, :]
+        rates = self._tangent_rates(*self._names, change, P) + self.tableau.gamma * h * first
+        error = _solve(matrix, ca.vertcat(rates, ca.MX(self.nz, 1)), self._node_order)
+        last = change[self.size - self.nx - self.nz : self.size - self.nz, :]
+        return ca.Function("tangent", [*self._names, z, S, P], [last, error[: self.nx, :]])
+
+    @cached_property
+    def _tangent_rates(self) -> ca.Function:
+        """Weighted rates of the error estimate, of tangents (x, z) at the stages and P."""
+        width, change, P = self.nx + self.nz, ca.SX.sym("change", self.size), ca.SX.sym("P", self.nt)
+        slopes, by_theta = self._at_stages(self._equations)[1], self._at_stages(self._parameters)[0]
+        rates = [
+            ca.mtimes(slope, change[k * width : (k + 1) * width]) + ca.mtimes(by, P)
+            for k, (slope, by) in enumerate(zip(slopes, by_theta, strict=True))
+        ]
+        estimate = ca.densify(self._weighted(self.tableau.estimate, rates)[: self.nx])
+        return ca.Function("tangent_rates", [*self._symbols, change, P], [estimate])
 
     def adjoint(self, columns: int) -> Any:
         """Return the function of (t, h, x, W, p, u, d, L, Q): L at the beginning, change of the gradient by (p, u, d).
