@@ -62,7 +62,8 @@ class Result:
     def __post_init__(self) -> None:
         for field in _fields(type(self)):
             value: Any = getattr(self, field.name)
-            if isinstance(value, complex) or str(getattr(value, "dtype", "")) == "complex128":  # Python's roots go on there
+            # Python's roots of negative numbers are complex.
+            if isinstance(value, complex) or str(getattr(value, "dtype", "")) == "complex128":
                 raise ValueError(f"There is no {field.metadata['description']}: it is the root of a negative number.")
 
     def lines(self, limits: Limits | None = None) -> tuple[Line, ...]:
