@@ -63,7 +63,7 @@ def cells(models: list[CompiledDae]) -> str:
 
 
 def variants(model: CompiledDae) -> list[CompiledDae]:
-    """The model with its parameters changed at random; zeros and times stay."""
+    """The model with its parameters changed at random; zeros, times and plain numbers stay."""
     source, steady = np.random.default_rng(3), ("s", "1")
     numbers = {one.path: value for one, value in zip(model.flat_parameters, model.p, strict=True)
                if value and str(one.unit) not in steady}  # fmt: skip

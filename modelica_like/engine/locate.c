@@ -236,8 +236,10 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
     Look found = room_for_look(c, DEPTH + 2);
     double step;
     if (!find_candidates(c, before, after)) return NOTHING;
-    if (takes_panels(c) ? is_within_tolerance(c, before, after) : is_within_error(c, after)) {
-        ++*(takes_panels(c) ? &c->doubtful : &c->doubts);
+    int panels = takes_panels(c);
+    if (panels ? is_within_tolerance(c, before, after) : is_within_error(c, after)) {
+        if (panels) c->doubtful++;
+        else c->doubts++;
         return TOO_LONG;
     }
     if (locate(c, before, after, &found)) {

@@ -63,7 +63,7 @@ class Result:
         for field in _fields(type(self)):
             value: Any = getattr(self, field.name)
             # Python's roots of negative numbers are complex.
-            if isinstance(value, complex) or str(getattr(value, "dtype", "")) == "complex128":
+            if isinstance(value, complex) or getattr(getattr(value, "dtype", None), "kind", "") == "c":
                 raise ValueError(f"There is no {field.metadata['description']}: it is the root of a negative number.")
 
     def lines(self, limits: Limits | None = None) -> tuple[Line, ...]:

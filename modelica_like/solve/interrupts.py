@@ -33,7 +33,7 @@ class Interrupts:
             yield
         finally:
             self._give_back(alone)
-        self.check()
+            self.check()
 
     def check(self) -> None:
         """Raise what has been noted."""

@@ -63,6 +63,20 @@ def test_an_interrupt_between_foreign_calls_waits_for_where_it_is_not_lost() -> 
     assert told == ["it goes on"]
 
 
+def test_an_interrupt_counts_more_than_a_run_that_fails() -> None:
+    interrupts, before = Interrupts(), signal.getsignal(signal.SIGINT)
+
+    def fail() -> None:
+        with interrupts.watched():
+            ctrl_c()
+            raise ValueError
+
+    with pytest.raises(KeyboardInterrupt):
+        fail()
+    assert signal.getsignal(signal.SIGINT) is before
+    interrupts.check()
+
+
 def test_the_handler_returns_after_each_call_alone() -> None:
     interrupts, before = Interrupts(), signal.getsignal(signal.SIGINT)
     for _ in range(2):

@@ -39,7 +39,7 @@ _FIRST = 1e-3
 """First step behind an event, relative to the last one before: a law can begin there with an infinite slope."""
 
 _LEAST = 1e-7
-"""Steps, in the time of the run, that are not shortened for the derivatives: they may jump there."""
+"""Steps, relative to the run, that are not shortened for the derivatives: these may jump there."""
 
 _NONE = np.zeros(0)
 Move = Step | Jump

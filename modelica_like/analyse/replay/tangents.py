@@ -29,6 +29,7 @@ class Tangents:
     def __init__(self, model: CompiledDae, tolerances: Tolerances) -> None:
         self._model, self._tolerances = model, tolerances
         self._carried: list[Vector] = []
+        self._tried: tuple[Step | None, Vector] = None, np.zeros(0)
         self._largest = np.zeros(len(model.states))
 
     def begin(self, x: Vector, d: Vector) -> None:
@@ -40,8 +41,12 @@ class Tangents:
 
     def carry(self, move: Step | Jump) -> None:
         """Go on over a move."""
-        last = self._carried[-1]
-        self._add(move.tangent(last)[0] if isinstance(move, Step) else move.forward(last[:, None])[0][:, 0])
+        last, (tried, end) = self._carried[-1], self._tried
+        if isinstance(move, Step):
+            end = end if move is tried else move.tangent(last)[0]
+        else:
+            end = move.forward(last[:, None])[0][:, 0]
+        self._add(end)
 
     def go_back(self) -> None:
         """Forget the last move."""
@@ -50,10 +55,11 @@ class Tangents:
     def error(self, step: Step) -> float:
         """Return the estimated error in a step over what is allowed, relative to the largest derivatives so far."""
         end, error = step.tangent(self._carried[-1])
-        nominals, largest = self._model.nominals, np.maximum(self._largest, np.abs(end[: len(self._largest)]))
+        self._tried = step, end
+        nominals, largest = self._model.nominals, np.fmax(self._largest, np.abs(end[: len(self._largest)]))
         scale = np.maximum(largest, _UNFELT * np.max(largest / nominals) * nominals)
         return self._tolerances.norm(error / scale) if np.all(scale > 0.0) else 0.0
 
     def _add(self, tangent: Vector) -> None:
         self._carried.append(tangent)
-        self._largest = np.maximum(self._largest, np.abs(tangent[: len(self._largest)]))
+        self._largest = np.fmax(self._largest, np.abs(tangent[: len(self._largest)]))
