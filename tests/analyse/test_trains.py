@@ -34,7 +34,8 @@ def test_a_train_turns_as_it_does_in_the_end(number: int) -> None:
             assert found[path] == pytest.approx(end[path], rel=1e-6, abs=1e-6), path
 
 
-@pytest.mark.parametrize("number", [101, 105, 107, *(pytest.param(n, marks=pytest.mark.slow) for n in range(108, 130))])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [101, 105, 107, *(n for n in range(108, 130))])
 def test_a_gradient_passes_where_several_parts_that_hold_a_shaft_give_way(number: int) -> None:
     """How they split what they hold changes with the load, because a gear bears more under load: no matter."""
     drive, step, asked = train(number), 1e-4, ("J0.w", "J1.w")

@@ -48,6 +48,7 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
     assert result.stderr.startswith("Invalid value for --fmi: '1.0' is not one of '2.0', '3.0'.\n")
 
 
+@pytest.mark.slow
 def test_a_model_that_is_compiled_in(tmp_path: Path) -> None:
     path = tmp_path / "x.fmu"
     assert called(["export", NETLIST, "-o", str(path), "--embed", "--no-check"]).exit_code == 0

@@ -259,6 +259,7 @@ if __name__ == "__main__":  # workers import this module
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_workers_of_a_killed_sweep_end_with_it(tmp_path: Path, number: int) -> None:
     """They have its standard output, too, which ends when the last of them has ended."""

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from exact_drives import Drive, Element, run_exactly
 from random_drives import assembly, random_drive
+from some import some
 
 from modelica_like import Options, sensitivities
 from modelica_like.errors import NoGradient
@@ -84,9 +85,7 @@ def gradient(drive: Drive, method: Method) -> np.ndarray:
     return result.derivatives * [one.value for one in result.parameters] / (max(run_exactly(drive).largest) or 1.0)
 
 
-@pytest.mark.parametrize(
-    "number", [*(SMOOTH + TIES)[::2], *(pytest.param(n, marks=pytest.mark.slow) for n in (SMOOTH + TIES)[1::2])]
-)
+@pytest.mark.parametrize("number", some(SMOOTH + TIES))
 def test_a_gradient_is_exact(number):
     drive = random_drive(number)
     above, below = exactly(drive)
@@ -101,7 +100,7 @@ def test_an_adjoint_gradient_is_exact(number):
     assert gradient(drive, "adjoint") == pytest.approx(exactly(drive)[0], abs=PRECISE)
 
 
-@pytest.mark.parametrize("number", EDGES)
+@pytest.mark.parametrize("number", some([*EDGES]))
 def test_on_an_edge_there_is_none(number):
     drive = replace(random_drive(number), until=EDGES[number])
     above, below = exactly(drive)

@@ -61,6 +61,7 @@ def gradient_of(path, version):
     return found
 
 
+@pytest.mark.slow
 def test_an_fmu_gives_what_a_handle_gives(fmus):
     handle = build(CLUTCHES).native(outputs=OF, by=BY, rtol=1e-8)
     handle.reset(until=END)

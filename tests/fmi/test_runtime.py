@@ -149,6 +149,7 @@ def nothing_built(monkeypatch, tmp_path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_library_is_built_once(nothing_built):
     assert found_runtime(NATIVE) is None
     said: list[str] = []

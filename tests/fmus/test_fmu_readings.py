@@ -48,7 +48,7 @@ def closed_forms() -> dict[str, tuple[float, float]]:
     }
 
 
-@pytest.mark.parametrize("points", [7, 500])
+@pytest.mark.parametrize("points", [7, pytest.param(500, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", ["cs", "me"])
 def test_closed_forms_of_an_oscillation(fmu: Path, kind: Any, points: int) -> None:
     expected = closed_forms()
@@ -86,6 +86,7 @@ def test_a_table_is_straight_lines_between_its_rows(tmp_path: Path) -> None:
     assert (found[1].time, found[1].sign) == (1.0, -1)
 
 
+@pytest.mark.slow
 def test_a_system_of_fmus_reads_like_one(fmu: Path, tmp_path: Path) -> None:
     system = tmp_path / "system.toml"
     system.write_text(f'name = "alone"\n[fmus]\nboth = "{fmu.as_posix()}"\n[simulate]\nuntil = "{END} s"\n')

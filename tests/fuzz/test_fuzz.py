@@ -21,7 +21,7 @@ from modelica_like.fmi.cosimulation.system import System, Unit
 from modelica_like.netlist import loads
 from modelica_like.netlist.write import dumps
 
-BATCHES = 6
+BATCHES = 24
 INPUTS = 3000
 
 

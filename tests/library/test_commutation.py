@@ -33,6 +33,7 @@ class Rippling(Motor):
     )
 
 
+@pytest.mark.slow
 def test_a_motor_that_ripples() -> None:
     """In the mean over the angle its torque is k·i, and its induced voltage takes <flux²>·k²·w/R from that."""
     run, smooth = simulate(Rippling(), 0.5), simulate(Motor(), 0.5)

@@ -28,6 +28,7 @@ from modelica_like import Assembly, Component, simulate
 TIGHT = {"rtol": 1e-10, "atol": 1e-13}
 
 
+@pytest.mark.slow
 def test_waves_of_stiffness_and_error_as_scipy_has_them() -> None:
     """Lagrange's equations of V = c·(1 + ripple·cos(z·phi_a))·x²/2, with backlash and flanks that never pull."""
     z, r_a, r_b, c, d, ripple, b, e = 20, 0.03, 0.05, 1e7, 300.0, 0.3, 1e-5, 3e-6

@@ -122,6 +122,7 @@ def test_stop_and_go(name: str, sign: int) -> None:
     np.testing.assert_allclose(stops, [0.7, 1.7], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_other_ways_to_prescribe() -> None:
     """An angle, exactly or filtered, and an acceleration."""
     for source, entry, signal in (

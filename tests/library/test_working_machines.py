@@ -74,6 +74,7 @@ def test_variable_gear_loses_its_share_whichever_side_drives(load: float) -> Non
     assert run.final["gear.loss_power"] == pytest.approx(0.2 * entering, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_chain_pulls_in_both_directions_and_is_as_fast_as_its_teeth() -> None:
     chain = ChainDrive(z_a=15, z_b=45, pitch=0.0127, c=2e5, d=500.0)
     for speed in (20.0, -20.0):

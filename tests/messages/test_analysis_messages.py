@@ -221,6 +221,7 @@ def test_pictures_that_cannot_be_drawn(tmp_path):
         assert str(caught.value) == told
 
 
+@pytest.mark.slow
 def test_workers_that_die_again_and_again(monkeypatch):
     monkeypatch.setattr("modelica_like.analyse.sweeps.workers.run_chunk", dies)
     job = Job.of(model(), ["mass.J"], ["mass.w"], {"until": 1.0})

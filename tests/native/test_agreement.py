@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from some import some
 
 from modelica_like import Solution, build, simulate
 
@@ -16,7 +17,6 @@ NETLISTS = sorted(
     and {"parts", "simulate"} <= set(content := tomllib.loads(path.read_text()))
     and "until" in content["simulate"]
 )
-SLOW = {"msl/translational/PreLoad", "lepelletier", "msl/dcmachines/DCPM_Cooling", "msl/dcmachines/DCSE_SinglePhase"}
 UNDECIDED = {
     "components/h_bridge": {"load.load"},
     "msl/rotational/LossyGearDemo2": {"bearingFriction.mode"},
@@ -50,7 +50,7 @@ def ends(run: Solution) -> np.ndarray:
     return np.array([run.final[one.path] for one in run.model.flat_variables])
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] if n in SLOW else []) for n in NETLISTS])
+@pytest.mark.parametrize("name", some(NETLISTS))
 def test_both_solvers_agree(name):
     model = build(EXAMPLES / f"{name}.toml")
     first, second = (simulate(model, rtol=RTOL, atol=RTOL / 100, solver=solver) for solver in ("idas", "native"))

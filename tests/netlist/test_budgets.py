@@ -24,6 +24,7 @@ def test_netlists_in_netlists_have_a_depth(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_netlists_that_double_are_refused_soon(tmp_path: Path) -> None:
     """2**40 parts in 40 files of 60 bytes."""
     for k in range(40):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from some import some
 
 from modelica_like.netlist import dumps, load, loads, schema
 
@@ -21,7 +22,7 @@ def validator() -> jsonschema.Draft7Validator:
     return jsonschema.Draft7Validator(schema())
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", some(EXAMPLES, lambda path: path.stem))
 def test_example_is_read_and_written_without_loss(path: Path, validator: jsonschema.Draft7Validator) -> None:
     original = load(path)
     text = dumps(original, folder=path.parent)

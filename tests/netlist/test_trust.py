@@ -97,6 +97,7 @@ def test_examples_need_no_trust(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     assert told.returncode == 0, told.stderr
 
 
+@pytest.mark.slow
 def test_other_commands_trust_by_the_same_rule(drive: Path) -> None:
     """A sizing file runs a netlist; a sweep sends the model to processes."""
     drive.with_name("size.toml").write_text(

@@ -7,6 +7,8 @@ import pytest
 from components import Clutch, ConstantTorque, Inertia, Spring, SpringDamper
 from modelica_like import Assembly, Component, Solution, simulate
 
+LONG = ("1 h", "24 h")
+
 
 def chain(until: float | str, rtol: float = 1e-8, /, **parts: Component) -> Solution:
     """Run parts in a row; the first one may be a source."""
@@ -52,7 +54,9 @@ def test_a_stiff_damped_coupling_is_as_good_as_rigid(stiffness):
         assert run.final["e.phi_rel"] * stiffness == pytest.approx(-2.0, rel=1e-5)
 
 
-@pytest.mark.parametrize("until", ["1 ms", "1 s", "1000 s", "1 h", "24 h"])
+@pytest.mark.parametrize(
+    "until", ["1 ms", "1 s", "1000 s", *(pytest.param(one, marks=pytest.mark.slow) for one in ("1 h", "24 h"))]
+)
 def test_the_end_time_does_not_matter(until):
     """The coupling starts with 0.1 rad/s of slip, which decays; momentum is kept whatever the time."""
     run = chain(

@@ -36,6 +36,7 @@ def run() -> Solution:
     return simulate(NETLIST, "1 s", rtol=1e-10, points=20_000)
 
 
+@pytest.mark.slow
 def test_swing_through_the_play(run: Solution) -> None:
     """From a moment after the lock-up, before the flanks part for the first time."""
     at = run.at(0.28)

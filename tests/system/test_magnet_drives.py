@@ -76,6 +76,7 @@ def engaging(_: float, y: Any, moving: bool) -> list[float]:
             w3 - w4, a4, heat / C]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_engaging(run: Solution) -> None:
     def seated(t: float, y: Any) -> float:
         return y[1] - GAP
@@ -133,6 +134,7 @@ def test_heat_and_wear(run: Solution) -> None:
     assert run.final["clutch.W"] == pytest.approx(run.energy()["clutch"].lost, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_cold_and_hot_oil() -> None:
     """Hotter plates grip less: the clutch locks later, with smaller torques."""
     runs = [simulate(EXAMPLES / "machine_tool_magnet.toml", "0.5 s", parameters={"oil": 273.15 + oil})

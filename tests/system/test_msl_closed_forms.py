@@ -238,6 +238,7 @@ def test_current_control() -> None:
         assert ours == pytest.approx([w, i, u], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_series_machine_at_single_phase() -> None:
     """An AC machine of 50 Hz: against equations written by hand; the torque never changes its sign."""
     machine = run("dcmachines/DCSE_SinglePhase")

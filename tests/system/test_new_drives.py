@@ -49,6 +49,7 @@ def test_the_ends_agree_to_the_tolerance(name, rtol):
     assert distance(run(name, rtol), run(name, FINEST)) < GROWTH * rtol
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DRIVES)
 def test_the_exported_drive_passes_its_check(name, tmp_path):
     path = tmp_path / f"{name}.fmu"

@@ -77,6 +77,7 @@ def test_energy_closes() -> None:
     assert run().energy().power_closure < 1e-10
 
 
+@pytest.mark.slow
 def test_cut_below_the_rope(tmp_path: Path) -> None:
     parts = split(WINCH, "rope", tmp_path, names=("winch", "hook"))
     cut = cosim(parts.path, until=0.5, step=5e-4, master="gauss-seidel")

@@ -136,7 +136,7 @@ def test_work_of_the_slideway() -> None:
     [
         pytest.param("launch", "car.v", "mass", 1600.0, 1.6, marks=pytest.mark.slow),
         pytest.param("launch", "max(clutch.T)", "clutch.fn_max", 10e3, 10.0, marks=pytest.mark.slow),
-        ("servo_axis", "table.s", "screw.backlash", 1e-5, 1e-8),
+        pytest.param("servo_axis", "table.s", "screw.backlash", 1e-5, 1e-8, marks=pytest.mark.slow),
     ],
 )
 def test_gradient_is_the_slope_of_runs(name: str, of: str, to: str, value: float, step: float) -> None:

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pint
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modelica_like.errors import UnitError, ValueOutOfRange
@@ -34,12 +34,14 @@ EXPONENTS = st.one_of(
 UNITS = st.dictionaries(NAMES, EXPONENTS, max_size=5).map(lambda powers: Unit(tuple(powers.items())))
 
 
+@settings(max_examples=30)
 @given(UNITS)
 def test_what_is_printed_reads_back(unit: Unit) -> None:
     assert parse_unit(str(unit)).exponents == unit.exponents
     assert dict(parse_unit(str(unit)).atoms) == dict(unit.atoms)
 
 
+@settings(max_examples=30)
 @given(UNITS, UNITS)
 def test_exponents_add_in_products_and_subtract_in_quotients(first: Unit, second: Unit) -> None:
     pairs = list(zip(first.dimension, second.dimension, strict=True))
@@ -48,11 +50,13 @@ def test_exponents_add_in_products_and_subtract_in_quotients(first: Unit, second
     assert math.isclose((first * second).factor, first.factor * second.factor, rel_tol=1e-12)
 
 
+@settings(max_examples=30)
 @given(UNITS, st.integers(-4, 4))
 def test_powers_multiply_exponents(unit: Unit, power: int) -> None:
     assert (unit**power).dimension == tuple(power * exponent for exponent in unit.dimension)
 
 
+@settings(max_examples=30)
 @given(UNITS)
 def test_a_unit_divided_by_itself_is_one(unit: Unit) -> None:
     assert unit / unit == ONE
