@@ -51,6 +51,11 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "A has no 'b'.\n  in a.mo:5 `connect(a.flange_b, b.flange_a);`",
     ),
     "inner": (model("inner Real x;"), "'inner' before x: that is not supported here.\n  in a.mo:3 `inner Real x;`"),
+    "a displayUnit that is a number": (
+        model(f"{R}.Inertia a(w(displayUnit = true));"),
+        "A displayUnit of a.w that is no text: that is not supported here.\n"
+        f"  in a.mo:3 `{R}.Inertia a(w(displayUnit = true));`",
+    ),
     "stream": (
         model("C c;", before="connector C stream Real h; flow Real m; end C;"),
         "'stream' before h: that is not supported here.\n  in a.mo:1 `connector C stream Real h; flow Real m; end C;`",

@@ -150,8 +150,7 @@ class _Part:
         unit = given.inner.get("displayUnit")
         here = self.known.here(name)
         if unit is not None and unit.value is not None and isinstance(self.fields.get(here), Input):
-            shown = Resolver(*unit.scope)(unit.value) if unit.scope else unit.value
-            self.notes.display[f"{self.owner.path}.{self.name}.{here}".lstrip(".")] = str(shown.args[0])
+            self._show(here, Resolver(*unit.scope)(unit.value) if unit.scope else unit.value)
         if given.value is None or given.scope is None:
             return
         node = Resolver(*given.scope)(given.value)
@@ -165,6 +164,11 @@ class _Part:
             node = Resolver(*given.scope, numeric=True)(given.value)
         if node.kind != "number" or self.known.omit.get(name) != node.args[0]:
             self.values[name] = node
+
+    def _show(self, here: str, unit: Expr) -> None:
+        if unit.kind != "string":
+            raise refused(f"a displayUnit of {self.name}.{here} that is no text", self.member.text, unit.line)
+        self.notes.display[f"{self.owner.path}.{self.name}.{here}".lstrip(".")] = unit.args[0]
 
     def _defaults(self) -> None:
         for name, value in self.known.default.items():
@@ -225,7 +229,7 @@ class _Part:
             if inner.value is not None and inner.scope is not None
         }
         if "displayUnit" in attributes:
-            self.notes.display[f"{self.owner.path}.{self.name}.{here}".lstrip(".")] = attributes["displayUnit"].args[0]
+            self._show(here, attributes["displayUnit"])
         path, _, last = here.rpartition(".")
         fixed = "fixed" in attributes and attributes["fixed"].args == (True,)
         if isinstance(part.find(path).fields[last], Output) and not fixed:
