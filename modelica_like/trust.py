@@ -49,8 +49,17 @@ def may_run(folder: Path) -> bool:
     Raises:
         NetlistError: the list of trusted folders is damaged, or others can write it.
     """
-    places = {folder, *folder.parents}
-    return not places.isdisjoint([_EXAMPLES, *trusted_folders()]) or _decision.get()(folder)
+    trusted = trusted_folders()
+    for place in (folder, *folder.parents):
+        if place == _EXAMPLES or (place in trusted and not _everyone_writes(place)):
+            return True
+        if _everyone_writes(place):
+            break  # what lies in it may be of others, whoever trusts a folder around it
+    return _decision.get()(folder)
+
+
+def _everyone_writes(folder: Path) -> bool:
+    return os.name == "posix" and bool(folder.stat().st_mode & stat.S_IWOTH)
 
 
 def trusted_folders() -> list[Path]:
@@ -90,7 +99,7 @@ def trust(folder: str | Path) -> Path:
     place = Path(folder).resolve()
     if not place.is_dir():
         raise NetlistError(f"'{folder}' is not a folder.")
-    if os.name == "posix" and place.stat().st_mode & stat.S_IWOTH:
+    if _everyone_writes(place):
         raise NetlistError(
             f"'{place}' cannot be trusted: everyone can write there.",
             advice="Trust a folder of yours, such as one in it.",

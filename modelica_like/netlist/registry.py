@@ -205,6 +205,12 @@ def _own_module(name: str, folder: Path, spec: ModuleSpec) -> ModuleType:
     _check_home(top, folder)
     if name not in sys.modules:
         file = spec.origin or str(folder / top)
+        linked = Path(file).resolve()
+        if linked.parent not in (folder, folder / top):
+            raise NetlistError(
+                f"The module '{top}' of '{folder}' is a link to '{linked}'.",
+                advice="A module is a file of the netlist's folder: copy it there.",
+            )
         if not may_run(folder):
             raise UntrustedModule(
                 f"'{name}' is a Python module, '{file}', in a folder that is not trusted.",

@@ -176,6 +176,49 @@ def test_an_interrupt_stays_one(drive: Path) -> None:
     assert _command(drive, "check", "drive.toml", "--trust").returncode == 130
 
 
+def test_trust_ends_where_everyone_can_write(drive: Path, tmp_path: Path) -> None:
+    """A folder for all, in a trusted one or around it: what lies there may be of others."""
+    trust(tmp_path)
+    drive.parent.chmod(0o777)
+    with pytest.raises(UntrustedModule):
+        load(drive)
+    drive.parent.chmod(0o755)
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o1777)
+    below = shared / drive.parent.name
+    drive.parent.rename(below)
+    with pytest.raises(UntrustedModule):
+        load(below / "drive.toml")
+    assert not (below / "has_run").exists()
+    shared.chmod(0o755)
+    load(below / "drive.toml")
+
+
+def test_trust_ends_with_the_rights_of_the_folder(drive: Path) -> None:
+    trust(drive.parent)
+    drive.parent.chmod(0o777)
+    with pytest.raises(UntrustedModule):
+        load(drive)
+    assert not _ran(drive)
+
+
+def test_a_link_to_a_module_elsewhere_is_refused_before_it_runs(drive: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    drive.with_name("hub_of_test.py").rename(other / "hub_of_test.py")
+    drive.with_name("hub_of_test.py").symlink_to(other / "hub_of_test.py")
+    with pytest.raises(NetlistError) as caught:
+        load(drive, trust=True)
+    home = drive.parent.resolve()
+    assert str(caught.value) == (
+        f"The module 'hub_of_test' of '{home}' is a link to '{other.resolve()}/hub_of_test.py'.\n"
+        '  in drive.toml:2 `a = { is = "hub_of_test:Hub", J = 1, w = 1, phi = 0 }`\n'
+        "A module is a file of the netlist's folder: copy it there."
+    )
+    assert not (other / "has_run").exists()
+
+
 def test_the_list_is_the_users_alone(drive: Path, tmp_path: Path) -> None:
     store = tmp_path / "config" / "trusted.json"
     trust(drive.parent)

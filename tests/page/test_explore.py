@@ -127,6 +127,22 @@ def test_a_wrong_request_gets_a_sentence(explorer: Explorer) -> None:
     assert ask(explorer, "/elsewhere", {})[0] == 404
 
 
+def test_a_request_that_no_browser_writes_gets_an_answer(explorer: Explorer, capfd: pytest.CaptureFixture[str]) -> None:
+    known = f"Host: {explorer.host}\r\nX-Token: {explorer.token}\r\n"
+    for head, code in (
+        ("GET http://[ HTTP/1.1\r\n", b"403"),
+        (f"GET http://[?token={explorer.token} HTTP/1.1\r\n", b"404"),
+        (f"POST /run HTTP/1.1\r\nContent-Length: {'9' * 5000}\r\n", b"404"),
+        ("POST /run HTTP/1.1\r\nContent-Length: 1234567890\r\n", b"404"),
+        ("POST /run HTTP/1.1\r\nContent-Length: \xb2\r\n", b"404"),
+        ("POST /run HTTP/1.1\r\n", b"404"),
+    ):
+        with socket.create_connection(("127.0.0.1", explorer.server_port), timeout=60) as connection:
+            connection.sendall(f"{head}{known}\r\n".encode("latin-1"))
+            assert connection.recv(4096).split(b" ")[1] == code, head
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_bad_value_is_told_as_the_command_line_tells_it(explorer: Explorer) -> None:
     _, body = ask(explorer, "/run", request(explorer, ["J1.w"], J1__J=-1.0))
     assert read(body)[0]["message"] == "Inertia.J = -1.0 is out of range: it must be at least 0 kg.m2."
