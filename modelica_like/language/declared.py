@@ -183,15 +183,15 @@ def unknown(
 
 
 def refuse_collection(label: str, value: object, where: Callable[[], Source] | None = None) -> None:
-    """Refuse a list, tuple or dictionary with parts or connectors that is no list of parts.
+    """Refuse a list, tuple, set or dictionary with parts or connectors that is no list of parts.
 
     Raises:
         LanguageError: it is one.
     """
-    if not isinstance(value, list | tuple | dict):
+    if not isinstance(value, list | tuple | set | dict):
         return
     elements = list(cast("Iterable[Any]", value.values() if isinstance(value, dict) else value))
-    inner = [part for e in elements for part in cast("Iterable[Any]", e if isinstance(e, tuple) else (e,))]
+    inner = [part for e in elements for part in cast("Iterable[Any]", e if isinstance(e, list | tuple) else (e,))]
     if any(isinstance(element, Connector) for element in inner):
         advice = "Give each a name of its own: flange_1 and flange_2; where their number varies, by setattr in `build`."
     elif any(isinstance(element, Declared) for element in inner):

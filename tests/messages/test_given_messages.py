@@ -36,6 +36,13 @@ class Parts(Component):
         self.ends = [("a", Fixed())]  # tuples
 
 
+class Grid(Component):
+    """What authors try for rows of rows."""
+
+    def build(self) -> None:
+        self.ends = [[Fixed()], [Fixed()]]  # lists
+
+
 def in_a_class() -> object:
     class Row(Component):
         ends = [Flange(), Flange()]
@@ -94,6 +101,10 @@ Give each a name of its own: flange_1 and flange_2; where their number varies, b
     "a list of tuples of parts": (LanguageError, Parts, """\
 Parts.ends is a list that is no array of parts: it has tuple.
   in test_given_messages.py:{tuples} `self.ends`
+An array is a list of parts only: [Inertia(J=1), Inertia(J=2)]; other parts have names of their own."""),
+    "a list of lists of parts": (LanguageError, Grid, """\
+Grid.ends is a list that is no array of parts: it has list.
+  in test_given_messages.py:{lists} `self.ends`
 An array is a list of parts only: [Inertia(J=1), Inertia(J=2)]; other parts have names of their own."""),
     "a list of connectors in a class": (LanguageError, in_a_class, """\
 Row.ends is a list that is no array of parts: it has Flange.

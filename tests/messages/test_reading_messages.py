@@ -67,6 +67,9 @@ A load cannot be the 'peek' of a trajectory; did you mean 'peak'? It can be peak
     "a file as data": (ValueOutOfRange, lambda: calibrate(DRIVE, ["meas.csv"], {"table.J": (1.0, 2.0)}), """\
 'meas.csv' is no measurement.
 Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the uncertainties."""),
+    "an array as data": (ValueOutOfRange, lambda: calibrate(DRIVE, [np.ones((9, 9))], {"table.J": (1.0, 2.0)}), """\
+ndarray is no measurement.
+Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the uncertainties."""),
 }  # fmt: skip
 
 

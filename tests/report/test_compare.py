@@ -179,8 +179,18 @@ def test_other_files() -> None:
         trajectories("drive.txt")
     assert str(told.value) == (
         "'drive.txt' has no trajectories.\n"
-        "Netlists and systems of FMUs (.toml), FMUs (.fmu), SSPs (.ssp) and tables (.csv) have."
+        "Netlists and systems of FMUs (.toml), Modelica texts (.mo), FMUs (.fmu), SSPs (.ssp) and tables (.csv) have."
     )
+
+
+def test_a_text_and_its_classes_are_compared(tmp_path: Path) -> None:
+    """exp(-t) and exp(-2·t) are 1/4 apart, at ln 2."""
+    law = "  Real x(start = 1, fixed = true);\nequation\n  der(x) = -{}*x;\n"
+    text = "".join(f"model {name}\n{law.format(rate)}end {name};\n" for name, rate in (("Fast", 2), ("Slow", 1)))
+    (tmp_path / "laws.mo").write_text(text)
+    apart = compare(tmp_path / "laws.mo", f"{tmp_path}/laws.mo:Fast", until=1.0, points=1000, tolerance=1e-9)
+    assert apart.deviations[0].largest == pytest.approx(0.25, rel=1e-5)
+    assert apart.deviations[0].time == pytest.approx(np.log(2), abs=1e-3)
 
 
 def test_what_needs_equations_says_so_of_recorded_data(tmp_path: Path) -> None:

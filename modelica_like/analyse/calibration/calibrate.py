@@ -135,7 +135,7 @@ def calibrate(
     for item in measured:
         if not isinstance(item, Measurement):
             raise ValueOutOfRange(
-                f"{item!r} is no measurement.",
+                f"{repr(item) if isinstance(item, str | Path) else type(item).__name__} is no measurement.",
                 advice='Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the '
                 "uncertainties.",
             )

@@ -11,6 +11,7 @@ from modelica_like.fmi.cosimulation.files import describes_system
 from modelica_like.fmi.cosimulation.run import cosim
 from modelica_like.fmi.run import run_fmu
 from modelica_like.netlist import load
+from modelica_like.netlist.read import is_modelica
 from modelica_like.runs.measured import read_csv
 from modelica_like.runs.trajectories import Trajectories
 from modelica_like.simulation import simulate
@@ -25,7 +26,7 @@ def trajectories(
     """Return the trajectories of a netlist, an FMU, a system of FMUs or a CSV file; a solution is returned unchanged.
 
     Args:
-        source: a file that ends in `.toml`, `.fmu`, `.ssp` or `.csv`.
+        source: a file that ends in `.toml`, `.mo`, `.fmu`, `.ssp` or `.csv`; of a text also `drives.mo:Package.Class`.
         until: end time of the run in s; by default that of the source.
         points: number of equal intervals of its results; a system has results at its communication points.
         tolerance: relative tolerance of its run; for a system, of its FMUs.
@@ -47,12 +48,14 @@ def trajectories(
         return run_fmu(path, parameters=values, stop=until, points=points, tolerance=tolerance)
     if kind == ".csv":
         return read_csv(path)
-    if kind not in (".toml", ".ssp"):
+    text = is_modelica(path)
+    if not text and kind not in (".toml", ".ssp"):
         raise NetlistError(
             f"'{path.name}' has no trajectories.",
-            advice="Netlists and systems of FMUs (.toml), FMUs (.fmu), SSPs (.ssp) and tables (.csv) have.",
+            advice="Netlists and systems of FMUs (.toml), Modelica texts (.mo), FMUs (.fmu), SSPs (.ssp) and "
+            "tables (.csv) have.",
         )
-    if describes_system(path):
+    if not text and describes_system(path):
         if values:
             raise NetlistError(f"No values can be set in the system '{path.name}'.", advice="Change the file.")
         return cosim(path, until, fmu_tolerance=tolerance)
