@@ -164,7 +164,13 @@ class _Points:
     def jumps(self, key: _Key, step: Any) -> bool:
         """Return whether the expression jumps with a step, while other steps follow."""
         chosen = Symbol(None, "step")
-        opened = _Written(lambda other, _, new: chosen if other == key else new).write(self._whole)
+
+        def replaced(other: _Key, _: Any, new: Any) -> Any:
+            if other[0] != key[0]:
+                return new
+            return chosen if other == key else 1 - chosen  # a sign is at zero only: both of its steps change there
+
+        opened = _Written(replaced).write(self._whole)
         taken_of = step.dep(0) if step.op() == ca.OP_FLOOR else step.dep(0) - step.dep(1)
         values = ca.Function("step", [self._symbols], [step, taken_of])
         result = ca.Function("result", [self._symbols, chosen], [opened])

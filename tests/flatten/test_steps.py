@@ -18,6 +18,7 @@ from modelica_like.language import (
     floor,
     interpolate,
     maximum,
+    minimum,
     mod,
     param,
     sign,
@@ -57,6 +58,9 @@ def events(expression: Any) -> int:
         (lambda c: c.y - where(c.x < c.a, c.x**2, c.x), 1),
         (lambda c: c.y - where(floor(c.x) < 3, 1, 0), 1),
         (lambda c: c.y - where(absolute(c.x) < 1e-3, 1, 0), 1),
+        (lambda c: c.y - maximum(0, sign(c.x)), 2),
+        (lambda c: c.y - minimum(sign(c.x - c.a), 0), 2),
+        (lambda c: c.y - maximum(absolute(c.x), sign(sin(c.y) - 0.3)), 2),
     ],
 )
 def test_jumps_become_events(law: Equation, count: int) -> None:
