@@ -47,6 +47,8 @@ from modelica_like.structure import reduce
 
 _SECOND = parse_unit("s")
 _SHORTEST = 1e-12
+_LONGEST = 1e100
+"""Seconds of a run: error tests square them, and beyond 1e154 s they shorten their steps without an end."""
 
 Solver = Literal["idas", "native"]
 Model = Component | CompiledDae | str | Path
@@ -241,6 +243,8 @@ def plan(
         raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
     if end - t0 < _SHORTEST * max(1.0, abs(t0)):
         raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: its times cannot be distinguished.")
+    if end - t0 > _LONGEST:
+        raise ValueOutOfRange(f"A run of {end - t0:g} s is too long: solvers square such times, which are no numbers.")
     return end, chosen
 
 

@@ -56,6 +56,10 @@ FOUND: dict[str, tuple[Callable[[], object], str]] = {
         lambda: simulate(loads(WHEEL), 5e-324),
         "A run of 4.94066e-324 s is too short: its times cannot be distinguished.",
     ),
+    "a run longer than solvers count": (
+        lambda: simulate(loads(WHEEL), 1e150),
+        "A run of 1e+150 s is too long: solvers square such times, which are no numbers.",
+    ),
 }
 
 
