@@ -70,7 +70,7 @@ ROWS = {
         Row("undercut of gears", "a rack moved past the flank in small steps", "four gears", "2e-4 of the roll angle", "sizing/test_gears.py"),
     ],
     "Input": [
-        Row("mutated netlists, formulas, units, sizing files, systems, FMUs", "no raw error, no endless run", "{INPUTS} in each test run; 100,000 by hand", "none", "fuzz/test_fuzz.py"),
+        Row("mutated and crossed netlists, drives of all types, formulas, units, command lines, tables (CSV), Modelica text, sizing files, systems, FMUs, archives", "no raw error, no endless run", "{INPUTS} in each test run; 100,000 by hand", "none", "fuzz/test_fuzz.py"),
     ],
 }  # fmt: skip
 
