@@ -17,7 +17,9 @@ from modelica_like.netlist.registry import find_type
 from modelica_like.runs.measured import read_columns, title_and_unit
 
 _SECOND = parse_unit("s")
-_PAIRS = 'Give pairs of time in s and value, {"time": …, "path": …}, a pandas table, or the path of a CSV file.'
+_PAIRS = (
+    'Give pairs of time in s and value, arrays (times, values), {"time": …, "path": …}, a pandas table, or a CSV file.'
+)
 Columns = dict[str, tuple[Any, str]]
 
 
@@ -26,9 +28,10 @@ def driven(drive: Any, inputs: Any) -> Assembly:
 
     Args:
         drive: a component or a netlist file with open inputs.
-        inputs: by path a number, a quantity, pairs of time in s and value, or a pandas Series over time; or a table
-            with a column (or index) `time`: a dictionary, a pandas DataFrame, or a CSV file. Names of columns may have
-            a unit in brackets: `motor.tau [N.mm]`; without one values are in SI units.
+        inputs: by path a number, a quantity, pairs of time in s and value, two arrays (times, values), or a pandas
+            Series over time; or a table with a column (or index) `time`: a dictionary, a pandas DataFrame, or the path
+            of a CSV file. Names of columns may have a unit in brackets: `motor.tau [N.mm]`; without one values are in
+            SI units.
 
     Raises:
         UnknownName: there is no such input.
@@ -74,6 +77,8 @@ def _series(name: str, value: Any) -> tuple[Any, Any]:
     """Split what one input is given into times and values."""
     if hasattr(value, "to_numpy"):  # a Series over time
         return np.asarray(value.index), np.asarray(value)
+    if isinstance(value, tuple) and [hasattr(part, "dtype") for part in cast("tuple[Any, ...]", value)] == [True] * 2:
+        return np.asarray(value[0]), np.asarray(value[1])
     if isinstance(value, int | float | str | np.number):
         return [0.0], [value]
     try:

@@ -138,20 +138,20 @@ For a jump, write two times close to each other."""),
     "an input that is no trajectory": (
         LanguageError, lambda: simulate(loads(PUSHED), 1, inputs={"push.f": [1, 2, 3]}), """\
 The input 'push.f' is given no trajectory.
-Give pairs of time in s and value, {"time": …, "path": …}, a pandas table, or the path of a CSV file."""),
+Give pairs of time in s and value, arrays (times, values), {"time": …, "path": …}, a pandas table, or a CSV file."""),
     "inputs without names": (LanguageError, lambda: simulate(loads(PUSHED), 1, inputs=[1, 2]), """\
 Something of type list is no trajectory of inputs.
-Give pairs of time in s and value, {"time": …, "path": …}, a pandas table, or the path of a CSV file."""),
+Give pairs of time in s and value, arrays (times, values), {"time": …, "path": …}, a pandas table, or a CSV file."""),
     "a table without time": (LanguageError, lambda: simulate(loads(PUSHED), 1, inputs=no_time()), """\
 'force.csv' has no column `time`.
-Give pairs of time in s and value, {"time": …, "path": …}, a pandas table, or the path of a CSV file."""),
+Give pairs of time in s and value, arrays (times, values), {"time": …, "path": …}, a pandas table, or a CSV file."""),
     "more times than values": (
         ValueOutOfRange, lambda: simulate(loads(PUSHED), 1, inputs={"time": [0, 1], "push.f": [1]}), """\
 The input 'push.f' has 2 times and 1 values."""),
     "times that are texts": (
         LanguageError, lambda: simulate(loads(PUSHED), 1, inputs={"time": ["a"], "push.f": [1]}), """\
 The times of 'push.f' are no numbers in s.
-Give pairs of time in s and value, {"time": …, "path": …}, a pandas table, or the path of a CSV file."""),
+Give pairs of time in s and value, arrays (times, values), {"time": …, "path": …}, a pandas table, or a CSV file."""),
     "an input with another unit": (UnitError, lambda: simulate(loads(PUSHED), 1, inputs={"push.f [m]": [(0, 1)]}), """\
 push.f expects N; '1.0 m' is m."""),
     "an input that is connected": (LanguageError, lambda: simulate(loads(FED), 1, inputs={"push.f": 3}), """\

@@ -24,6 +24,7 @@ TIMES = [0.0, 1.0]
 RAMP: dict[str, Any] = {
     "pairs": {"push.f": [(0, 0), (1, 6)]},
     "an array": {"push.f": np.array([[0.0, 0.0], [1.0, 6.0]])},
+    "two arrays": {"push.f": (np.array([0.0, 1.0]), np.array([0.0, 6.0]))},
     "a unit": {"push.f [kN]": [(0, 0), (1, 0.006)]},
     "columns": {"time": TIMES, "push.f": [0, 6]},
     "milliseconds": {"time [ms]": [0, 1000], "push.f": [0, 6]},
