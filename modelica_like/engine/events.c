@@ -285,9 +285,10 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
 }
 
 /* An error if a relation became true and stays true, because what it sets is at rest and is turned back too late: a
-   ball rebounds ever more slowly, until the acceleration a of the guard turns it back within few time resolutions. With
-   value g and rate r < 0 after that, g - r^2 / 2a is the least value that comes; above zero the relation fires no more,
-   and the ball falls through the floor. `before`: guards and rates before the instant; its modes are in d_begun. */
+   ball rebounds ever more slowly, or not at all, until the acceleration a of the guard turns it back within few time
+   resolutions. With value g and rate r < 0 after that, g - r^2 / 2a is the least value that comes; above zero the
+   relation fires no more, and the ball falls through the floor. `before`: guards and rates before the instant; its
+   modes are in d_begun. */
 Result check_turned_back(Instance *c, const double *before) {
     const Model *m = c->model;
     double step = LATER * TIME_RESOLUTION * fmax(1, fabs(c->state.t)), *now = c->guards_before;
@@ -299,7 +300,8 @@ Result check_turned_back(Instance *c, const double *before) {
     for (int g = 0; g < m->n_guards; g++) {
         const Transition *one = &m->transitions[m->guard_transition[g]];
         double rate = rates[g], turn = later[g] - rate;
-        int slow = fmax(fabs(before[m->n_guards + g]), fabs(rate)) < turn && fabs(before[g]) < turn * step;
+        double came = fabs(before[m->n_guards + g]), near = turn * step + came * TIME_RESOLUTION * fmax(1, c->state.t);
+        int slow = fabs(rate) < turn && fabs(before[g]) < near;
         if (!slow || c->d_begun[one->mode] == one->target || c->d[one->mode] != one->target) continue;
         if (!m->modes[one->mode].hidden) continue; /* a declared mode may keep its condition */
         if (rate > -turn / LATER || now[g] > rate * rate * step / (2 * turn))

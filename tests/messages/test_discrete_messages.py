@@ -360,6 +360,15 @@ def test_a_ball_that_comes_to_rest_does_not_fall_through_the_floor(
     check_message(Chattering, lambda: simulate(build(Rebound(e=e)), 3.0, solver=solver), text)
 
 
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize("e", [0.0, 1e-12, 1e-9, 1e-8, 1e-6, 1e-4])
+@pytest.mark.parametrize("h", [0.3, 1.0])
+def test_a_ball_that_hardly_rebounds_does_not_fall_through_either(solver: Any, e: float, h: float) -> None:
+    """It is fast before the one impact, and at rest after it."""
+    with pytest.raises(Chattering):
+        simulate(build(Rebound(e=e, h=h)), 3.0, solver=solver)
+
+
 def test_no_fmu_lets_a_ball_fall_through_the_floor(tmp_path: Path) -> None:
     with pytest.raises(FmuFailed, match=r"the condition of relation\[1\] stays true: what is set there is at rest"):
         run_fmu(export_fmu(Rebound(e=0.1), tmp_path / "ball.fmu", kind=("cs",), check=False).path, stop=3.0)
