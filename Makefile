@@ -6,6 +6,7 @@
 # make try   the wheel in dist/, in a new environment
 # make browser   Chromium for the tests of pages, by the system's package manager, where no browser is
 # make shells   fish, for the tests of completion, likewise
+# make emulators   qemu and wine, for the tests of the run-time of other platforms, likewise
 # make fmus   the reference FMUs, from their C sources, to build/fmus
 # make benchmark   times as ratios to hand-written baselines of the same run
 
@@ -19,7 +20,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constr
 COMPILED := ls modelica_like/fmi/runtimes/* >/dev/null 2>&1 || echo "The run-time is not compiled: this is done at \
 first use. Install cc, gcc or clang, or zig by $(BIN)/pip install 'modelica-like[cross]'."
 
-.PHONY: demo test lint types layers pytest slow browser shells benchmark release try fmus format clean site
+.PHONY: demo test lint types layers pytest slow browser shells emulators benchmark release try fmus format clean site
 
 demo: .venv/installed
 	$(BIN)/modelica-like demo
@@ -57,6 +58,13 @@ shells:
 	AS=$$(test "$$(id -u)" = 0 || echo sudo); \
 	$$AS apt-get update --quiet --quiet && $$AS apt-get install --yes --quiet --quiet --no-install-recommends fish || \
 	{ echo "fish could not be installed by apt-get: install it." >&2; exit 1; }
+
+emulators:
+	@{ command -v qemu-aarch64 && test -d /usr/aarch64-linux-gnu && { command -v wine64 || test -x /usr/lib/wine/wine64; }; } >/dev/null && exit; \
+	AS=$$(test "$$(id -u)" = 0 || echo sudo); \
+	$$AS apt-get update --quiet --quiet && \
+	$$AS apt-get install --yes --quiet --quiet --no-install-recommends qemu-user libc6-arm64-cross wine64 || \
+	{ echo "qemu-user, libc6-arm64-cross and wine64 could not be installed by apt-get: install them." >&2; exit 1; }
 
 # Times are those of the CPU: threads of BLAS that wait would count.
 benchmark: export OPENBLAS_NUM_THREADS = 1
