@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
+from modelica_like.compile.elastic import Elastic, elastic
 from modelica_like.flatten.template import column
-from modelica_like.structure.alias import PREFERRED
 from modelica_like.structure.reduce import ReducedDae
-from modelica_like.structure.system import System
 
 _STORED = 0
-_RATES = 2
-"""Levels of a chain whose speed may rest: a position and its speed, below an acceleration."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +21,7 @@ class StartSystem:
     Attributes:
         function: of (t, x, y, z, p, u, d) with y the variables that start values need: y itself, the Jacobian of the
             values by (x, y, z), and the values of [y - expression, alg, variables of `nodes`].
-        nodes: variables (nodes) at its end.
+        nodes: variables (nodes) at its end; numbers beyond all nodes are relative motions that are no variable.
         rest: variables at rest if not given, in order of priority: node, and the state if it is one.
         rates: positions in (x, y) of derivatives of others, which are all zero at rest.
         guesses: numbers of the guessed start values of variables that may be at rest, in the same order.
@@ -50,13 +46,15 @@ def start_system(reduced: ReducedDae, rest: bool) -> StartSystem:
         rest: include variables that may be at rest.
     """
     flat, system = reduced.flat, reduced.system
-    order = tuple((node, _state(reduced, node)) for node in rest_order(reduced)) if rest else ()
-    resting = [node for node, state in order if state is None]
-    nodes = tuple(dict.fromkeys([*(s.node for s in flat.starts), *resting]))
-    needed = _needed(reduced, nodes)
+    resting = rest_order(reduced) if rest else []
+    count = len(flat.nodes)
+    order = tuple((count + k if one.node is None else one.node, one.state) for k, one in enumerate(resting))
+    nodes = tuple(dict.fromkeys([*(s.node for s in flat.starts), *(node for node, state in order if state is None)]))
+    of_nodes = [placed[0] for node in nodes if node < count and (placed := system.node_level[node]) is not None]
+    needed = _needed(reduced, {*of_nodes, *(level for one in resting for level in one.levels)})
     y = column(system.symbols[level] for level, _ in needed)
     explicit = ca.vertcat(*(system.symbols[level] - expression for level, expression in needed))
-    wanted = ca.vertcat(*(system.node_values[node] for node in nodes))
+    wanted = ca.vertcat(*(system.node_values[k] if k < count else resting[k - count].value for k in nodes))
     values = ca.densify(ca.vertcat(explicit, reduced.alg, wanted))
     unknowns = ca.vertcat(reduced.x, y, reduced.z)
     arguments = [flat.time, reduced.x, y, reduced.z, flat.p, reduced.u, flat.d]
@@ -64,7 +62,7 @@ def start_system(reduced: ReducedDae, rest: bool) -> StartSystem:
     names = ["t", "x", "y", "z", "p", "u", "d"]
     function = ca.Function("start_system", arguments, results, names, ["variables", "jacobian", "values"])
     rates = _rates(reduced, [level for level, _ in needed]) if rest else ()
-    return StartSystem(function, nodes, order, rates, _guesses(reduced, [node for node, _ in order]))
+    return StartSystem(function, nodes, order, rates, _guesses(reduced, [node for node, _ in order if node < count]))
 
 
 def _guesses(reduced: ReducedDae, resting: list[int]) -> tuple[int, ...]:
@@ -84,8 +82,27 @@ def _rates(reduced: ReducedDae, needed: list[int]) -> tuple[int, ...]:
     return *sorted(states), *(reduced.x.numel() + k for k, level in enumerate(needed) if levels[level].order)
 
 
-def rest_order(reduced: ReducedDae) -> list[int]:
-    """Undetermined variables (nodes) that are zero at rest, in an order that does not depend on the order of lines.
+@dataclass(frozen=True)
+class Resting:
+    """What may be at rest.
+
+    Attributes:
+        name: of the variable; of a relative motion that is no variable, that of its spring.
+        node: the variable, or None.
+        state: the state, if it is one.
+        value: expression in levels that is zero, if there is neither a variable nor a state.
+        levels: levels in `value`.
+    """
+
+    name: str
+    node: int | None
+    state: int | None
+    value: Any = None
+    levels: tuple[int, ...] = ()
+
+
+def rest_order(reduced: ReducedDae) -> list[Resting]:
+    """What is undetermined and zero at rest, in an order that does not depend on the order of lines.
 
     Relative speeds of springs come first: what is coupled elastically turns with a part that is given a speed. Then
     variables that store energy: speeds of inertias and masses before currents, pressures and twists of springs. Other
@@ -94,7 +111,8 @@ def rest_order(reduced: ReducedDae) -> list[int]:
     """
     system = reduced.system
     stores = {placed[0] for node in _storing(reduced) if (placed := system.node_level[node]) is not None}
-    springs = _spring_rates(reduced) - stores
+    coupled = elastic(reduced)
+    springs = coupled.rates - stores
     first: dict[int, tuple[str, int]] = {}
     for node, placed in enumerate(system.node_level):
         if placed is not None and (placed[0] in stores or system.derivative(placed[0]) is not None):
@@ -107,43 +125,26 @@ def rest_order(reduced: ReducedDae) -> list[int]:
         relative = -one.preference if one.order == 0 else one.preference
         # A state is free to be zero; another position may be a way that no angle leads to.
         follows = one.order == 0 and reduced.node_states[first[level][1]] is None
-        return level not in springs, level not in stores, one.order == 0, relative, follows, first[level][0]
+        return level not in stores, one.order == 0, relative, follows, first[level][0]
 
-    return [first[level][1] for level in sorted(first, key=rank) if level not in system.inputs]
-
-
-def _spring_rates(reduced: ReducedDae) -> set[int]:
-    """Rates of relative positions that a force follows in every mode: those of springs.
-
-    A gap couples nothing before it closes: its force follows the position in some modes only. The angle of a clutch
-    or damper occurs in kinematic equations, and perhaps in an output, by which nothing moves.
-    """
-    system, model = reduced.system, reduced.flat
-    wanted = [one.preference >= PREFERRED for one in system.levels]
-    relative = [chain for chain in system.chains if len(chain) > _RATES and any(wanted[level] for level in chain[:2])]
-    bases = system.column(chain[0] for chain in relative)
-    slopes = ca.jacobian(system.residual, bases)
-    by_mode = {*ca.jacobian_sparsity(ca.vertcat(ca.SX(0, 1), *slopes.nonzeros()), model.d).row()}
-    forces = _force_rows(system)
-    read = {column for k, (row, column) in enumerate(_entries(slopes.sparsity())) if row in forces and k not in by_mode}
-    states, moving = (
-        {column for _, column in _entries(ca.jacobian_sparsity(one, bases))}
-        for one in (reduced.x, ca.vertcat(reduced.ode, reduced.alg))
-    )
-    return {relative[k][1] for k in read - (states - moving)}
+    others = (level for level in sorted(first.keys() - springs, key=rank) if level not in system.inputs)
+    named = (Resting(*first[level], _state(reduced, first[level][1])) for level in others)
+    return [*_between_springs(reduced, coupled, springs, first), *named]
 
 
-def _force_rows(system: System) -> set[int]:
-    """Equations with an unknown that has no derivatives and is no place of a connector: not kinematic ones."""
-    kinds, nodes = system.model.variables, zip(system.model.nodes, system.node_level, strict=True)
-    places = {placed[0] for (k, _), placed in nodes if placed is not None and kinds[k].kind == "potential"}
-    incidence = _entries(ca.jacobian_sparsity(system.residual, system.everything))
-    single = {chain[0] for chain in system.chains if len(chain) == 1} - places
-    return {row for row, level in incidence if level in single}
-
-
-def _entries(pattern: ca.Sparsity) -> list[tuple[int, int]]:
-    return [*zip(*pattern.get_triplet(), strict=True)]
+def _between_springs(
+    reduced: ReducedDae, coupled: Elastic, springs: frozenset[int], named: dict[int, tuple[str, int]]
+) -> list[Resting]:
+    """Relative speeds of springs, those that are a variable or state first."""
+    system = reduced.system
+    of_states = ca.jacobian_sparsity(reduced.x, system.everything)
+    states = {level: k for k, level in zip(*of_states.get_triplet(), strict=True)}
+    rates: list[Resting] = []
+    for level in springs.difference(system.inputs):
+        name, node = named.get(level, (system.levels[level].name, None))
+        rates.append(Resting(name, node, states.get(level), system.symbols[level], (level,)))
+    rows = (Resting(name, None, None, value, levels) for name, value, levels in coupled.rows)
+    return [*sorted(rates, key=lambda one: one.name), *sorted(rows, key=lambda one: one.name)]
 
 
 def _storing(reduced: ReducedDae) -> list[int]:
@@ -166,10 +167,8 @@ def _state(reduced: ReducedDae, node: int) -> int | None:
     return None if state is None else state[0]
 
 
-def _needed(reduced: ReducedDae, nodes: Iterable[int]) -> list[tuple[int, Any]]:
-    """The explicit unknowns that the start nodes need, directly or indirectly."""
-    system = reduced.system
-    pending = {placed[0] for node in nodes if (placed := system.node_level[node]) is not None}
+def _needed(reduced: ReducedDae, pending: set[int]) -> list[tuple[int, Any]]:
+    """The explicit unknowns that some levels need, directly or indirectly."""
     position = {level: k for k, (level, _) in enumerate(reduced.explicit)}
     uses, needed = _uses(reduced), set[int]()
     while pending := pending & position.keys():

@@ -6,14 +6,21 @@ import pytest
 
 from components import (
     Clutch,
+    ConstantSpeed,
     Damper,
     DualMassFlywheel,
+    ElasticCoupling,
     ElastoGap,
     Fixed,
     IdealGear,
+    IdealRollingWheel,
     Inertia,
     Mass,
+    Spring,
     SpringDamper,
+    TimingBelt,
+    TranslationalSpring,
+    TranslationalSpringDamper,
 )
 from components.interfaces import CompliantWithRelativeStates
 from modelica_like import simulate
@@ -76,6 +83,71 @@ def test_an_open_gap_couples_nothing():
     """The second mass waits for the first."""
     values = starts(Mass(m=1.0, s=0.0, v=3.0), ElastoGap(c=1e4, d=1.0), Mass(m=1.0, s=0.5))
     assert (values["p0.v"], values["p2.v"]) == (3.0, 0.0)
+
+
+SPRING, SOFT, STAGES = Spring(c=50), SpringDamper(c=80, d=0.1), ElasticCoupling(stages=((0, 10), (0.1, 90)), d=0.2)
+GEAR, WHEEL, ROPE = IdealGear(ratio=4.0), IdealRollingWheel(radius=0.3), TranslationalSpring(c=900)
+BELT = TimingBelt(r_a=0.1, r_b=0.25, c=1e4, d=5)
+
+
+@pytest.mark.parametrize(
+    ("between", "ratio"),
+    [
+        ([SPRING], 1.0),
+        ([SOFT, SOFT], 1.0),
+        ([SPRING, SOFT], 1.0),
+        ([SPRING, SPRING], 1.0),
+        ([STAGES, STAGES], 1.0),
+        ([SPRING, STAGES, SOFT, SPRING], 1.0),
+        ([SOFT, GEAR, SOFT], 0.25),
+        ([SPRING, GEAR, SPRING], 0.25),
+        ([SOFT, GEAR, STAGES, GEAR, SPRING], 1 / 16),
+        ([BELT], 0.4),
+        ([SOFT, BELT, SPRING], 0.4),
+    ],
+)
+def test_springs_need_no_inertia_in_between(between: list[Component], ratio: float):
+    """Nor a damper: whatever is given at one end, the other one turns along."""
+    end = f"p{len(between) + 1}.w"
+    assert starts(Inertia(J=1.0, w=100.0), *between, Inertia(J=2.0))[end] == pytest.approx(100.0 * ratio, rel=1e-12)
+    values = starts(Inertia(J=1.0), *between, Inertia(J=2.0, w=6.0))
+    assert values["p0.w"] == pytest.approx(6.0 / ratio, rel=1e-12)
+    values = starts(Inertia(J=1.0), *between, Inertia(J=2.0))
+    assert (values["p0.w"], values[end]) == (0.0, 0.0)
+    values = starts(Inertia(J=1.0, w=7.0), *between, Inertia(J=2.0, w=6.0))
+    assert (values["p0.w"], values[end]) == (7.0, 6.0)
+    values = starts(ConstantSpeed(w_fixed=8.0), *between, Inertia(J=2.0))
+    assert values[end] == pytest.approx(8.0 * ratio, rel=1e-12)
+    assert starts(Fixed(), *between, Inertia(J=2.0), Damper(d=1.0), Inertia(J=1.0, w=5.0))[end] == 0.0
+
+
+@pytest.mark.parametrize("rope", [[ROPE], [TranslationalSpringDamper(c=900, d=2.0), ROPE], []])
+@pytest.mark.parametrize("shaft", [[SPRING], [SOFT], []])
+def test_what_rolls_moves_with_a_shaft(shaft: list[Component], rope: list[Component]):
+    row = [Inertia(J=1.0, w=20.0), *shaft, WHEEL, *rope, Mass(m=3.0)]
+    assert starts(*row)[f"p{len(row) - 1}.v"] == pytest.approx(6.0, rel=1e-12)
+
+
+def test_springs_between_masses():
+    for between in ([ROPE], [ROPE, ROPE], [ROPE, TranslationalSpringDamper(c=900, d=2.0)]):
+        assert starts(Mass(m=1.0, v=3.0), *between, Mass(m=2.0))[f"p{len(between) + 1}.v"] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("spring", [SPRING, SOFT])
+def test_a_spring_in_series_with_a_damper_couples_nothing(spring: Component):
+    for between in ([spring, Damper(d=0.5)], [Damper(d=0.5), spring]):
+        values = starts(Inertia(J=0.1, w=85.0), *between, Inertia(J=0.1))
+        assert (values["p0.w"], values["p3.w"]) == (85.0, 0.0)
+
+
+def test_two_ways_of_springs_between_the_same_parts():
+    """One of them says it all, and the other one nothing else."""
+    parts = {"a": Inertia(J=1.0, w=9.0), "b": Inertia(J=1.0), "c": Inertia(J=1.0)}
+    parts |= {f"{name}{k}": SpringDamper(c=10.0 * k, d=1.0) for name in "fg" for k in (1, 2)}
+    parts |= {"gear": IdealGear(ratio=3.0)}
+    series = {"first": ["a", "f1", "f2", "b"], "second": ["a", "g1", "g2", "b"], "last": ["b", "gear", "c"]}
+    run = simulate(Assembly("ways", parts=parts, series=series), "1 ms", start="rest")
+    assert [run[name][0] for name in ("b.w", "c.w")] == pytest.approx([9.0, 3.0], rel=1e-12)
 
 
 class PlainSpring(CompliantWithRelativeStates):

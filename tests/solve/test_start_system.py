@@ -35,7 +35,7 @@ def held() -> Assembly:
 
 def resting(drive: Assembly) -> list[str]:
     flat = flatten(drive)
-    return [flat.node_name(node) for node in rest_order(reduce(flat))]
+    return [one.name for one in rest_order(reduce(flat))]
 
 
 def test_springs_rest_before_what_stores_energy():
