@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from modelica_like.cli.reader import Argument, Option
-from modelica_like.errors import InitializationError, ModelicaLikeError, NetlistError, SolveError, Source
+from modelica_like.errors import InitializationError, ModelicaLikeError, NetlistError, SolveError
 from modelica_like.writing import check_writable
 
 if TYPE_CHECKING:
@@ -180,18 +180,11 @@ def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
 
 def load_netlist(netlist: Path, assignments: list[str] | None) -> Any:
     """Load a netlist and give it the values of `--set`."""
-    from modelica_like.language import Assembly
     from modelica_like.netlist import load
+    from modelica_like.netlist.read import assign
 
     assembly = load(netlist)
-    for path, value in values(assignments).items():
-        place = Source("--set", text=f"{path}={value}")
-        try:
-            assembly.set(path, value)
-        except ModelicaLikeError as error:
-            error.where = (place,)
-            raise
-        Assembly.place(assembly, f"set.{path}", place)
+    assign(assembly, values(assignments), "--set")
     return assembly
 
 

@@ -104,8 +104,9 @@ def compare(
 
         end = None if until is None else seconds(until)
         comparison = run(
-            a, b, signals=signals or (), until=end, points=points or 500, tolerance=rtol, values=values(assignments)
-        )
+            a, b, signals=signals or (), until=end, points=points or 500, tolerance=rtol, values=values(assignments),
+            option="--set",
+        )  # fmt: skip
         page.print(comparison)
         if plot:
             from modelica_like.show.plot import save_plot

@@ -251,3 +251,15 @@ def new_component(kind: type[Component], values: dict[str, Any]) -> Component:
     except (Exception, SystemExit) as error:  # code of users
         given = ", ".join(f"{key} = {value!r}" for key, value in structural.items())
         raise NetlistError(f"{kind.__name__} cannot be created with {given or 'no values'}: {error}.") from error
+
+
+def assign(drive: Assembly, values: Mapping[str, Any], option: str) -> None:
+    """Give a drive other values by path, whose place in messages is an option of the command line."""
+    for path, value in values.items():
+        place = Source(option, text=f"{path}={value}")
+        try:
+            drive.set(path, value)
+        except ModelicaLikeError as error:
+            error.where = (place,)
+            raise
+        Assembly.place(drive, f"set.{path}", place)

@@ -35,8 +35,7 @@ def read_columns(path: Path) -> dict[str, tuple[Vector, str]]:
     writes them. The text is UTF-8, UTF-16 or Windows-1252. Lines that begin with `#` are comments.
 
     Raises:
-        NetlistError: the file is not a table of numbers.
-        OSError: the file cannot be read.
+        NetlistError: the file cannot be read, or is not a table of numbers.
     """
     text = _text(path)
     said = _SEPARATOR.match(text)
@@ -71,8 +70,7 @@ def read_csv(path: Path) -> RecordedSolution:
     A repeated time gives the values before and after an event.
 
     Raises:
-        NetlistError: the file is not such a table.
-        OSError: the file cannot be read.
+        NetlistError: the file cannot be read, or is not such a table.
     """
     columns = read_columns(path)
     if next(iter(columns)) != "time":
@@ -98,7 +96,10 @@ def _in_si(numbers: Vector, text: str) -> tuple[Vector, str]:
 
 def _text(path: Path) -> str:
     """Return the text of a table in the encodings that Excel writes."""
-    data = path.read_bytes()
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise NetlistError(f"{path}: {error.strerror or error}.") from None
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     for encoding in ("utf-16",) if wide else ("utf-8-sig", "cp1252"):
         try:

@@ -4,7 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like.errors import ModelicaLikeError
+from components import Inertia
+from modelica_like import simulate
+from modelica_like.errors import ModelicaLikeError, NetlistError
+from modelica_like.language import Assembly
 from modelica_like.netlist import load
 
 MESSAGES = {
@@ -170,3 +173,11 @@ def test_a_folder_and_a_missing_file(tmp_path: Path, monkeypatch: pytest.MonkeyP
         load(".")
     with pytest.raises(ModelicaLikeError, match=r"^The netlist 'nowhere/x\.toml' does not exist\.$"):
         load("nowhere/x.toml")
+
+
+def test_a_missing_table_of_inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In Python as on the command line."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(NetlistError) as caught:
+        simulate(Assembly("drive", parts={"wheel": Inertia(J=1.0)}), "1 s", inputs="no.csv", start="rest")
+    assert str(caught.value) == "no.csv: No such file or directory."

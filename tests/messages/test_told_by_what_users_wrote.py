@@ -329,3 +329,14 @@ def test_brackets_in_paths_are_no_markup(grip: str, tmp_path: Path) -> None:
 def test_brackets_in_help_are_no_markup() -> None:
     text = " ".join(called(["split", "--help"]).stdout.replace("│", " ").split())
     assert "or a name in [connect]." in text
+
+
+@pytest.mark.parametrize("command", ["simulate", "check", "compare"])
+def test_an_unknown_value_of_an_option_is_placed_there(command: str, grip: str) -> None:
+    result = called([command, grip, *[grip] * (command == "compare"), "--set", "rotor.q=4"])
+    assert (result.exit_code, result.stderr) == (
+        2,
+        """Inertia has no parameter or variable 'q'. It has J, phi, w.
+  in --set `rotor.q=4`
+""",
+    )

@@ -29,7 +29,7 @@ class Comparison(Curves):
 
 def compare(
     a: Source, b: Source, *, signals: Sequence[str] = (), until: float | None = None, points: int = 500,
-    tolerance: float | None = None, values: Mapping[str, Any] | None = None,
+    tolerance: float | None = None, values: Mapping[str, Any] | None = None, option: str = "",
 ) -> Comparison:  # fmt: skip
     """Compare two trajectories of one system by the names of their signals.
 
@@ -44,14 +44,15 @@ def compare(
         points: number of equal intervals of simulations.
         tolerance: relative tolerance of simulations.
         values: to set in netlists by path, and in FMUs as numbers; tables and solutions stay as they are.
+        option: of the command line that gave the values, which messages name as their place.
 
     Raises:
         UnknownName: nothing matches a pattern, or they have no signal in common.
         ValueOutOfRange: they have no time in common.
         ModelicaLikeError: a run fails.
     """
-    first = trajectories(a, until, points, tolerance, values)
-    second = trajectories(b, until if until is not None else float(first.time[-1]), points, tolerance, values)
+    first = trajectories(a, until, points, tolerance, values, option)
+    second = trajectories(b, until if until is not None else float(first.time[-1]), points, tolerance, values, option)
     labels = _label(a), _label(b)
     return Comparison(**vars(compare_solutions(first, second, signals, labels)))
 

@@ -11,7 +11,7 @@ from modelica_like.fmi.cosimulation.files import describes_system
 from modelica_like.fmi.cosimulation.run import cosim
 from modelica_like.fmi.run import run_fmu
 from modelica_like.netlist import load
-from modelica_like.netlist.read import is_modelica
+from modelica_like.netlist.read import assign, is_modelica
 from modelica_like.runs.measured import read_csv
 from modelica_like.runs.trajectories import Trajectories
 from modelica_like.simulation import simulate
@@ -21,7 +21,7 @@ _POINTS = 500
 
 def trajectories(
     source: str | Path | Trajectories, until: float | None = None, points: int = _POINTS,
-    tolerance: float | None = None, values: Mapping[str, Any] | None = None,
+    tolerance: float | None = None, values: Mapping[str, Any] | None = None, option: str = "",
 ) -> Trajectories:  # fmt: skip
     """Return the trajectories of a netlist, an FMU, a system of FMUs or a CSV file; a solution is returned unchanged.
 
@@ -31,11 +31,12 @@ def trajectories(
         points: number of equal intervals of its results; a system has results at its communication points.
         tolerance: relative tolerance of its run; for a system, of its FMUs.
         values: to set in a netlist by path, or parameters of an FMU: numbers in its units. Tables and solutions stay.
+        option: of the command line that gave the values, which messages name as their place.
 
     Raises:
         NetlistError: the file is none of these, or the table is not one.
         ModelicaLikeError: the run fails.
-        OSError: the file cannot be read.
+        OSError: the FMU or system cannot be read.
     """
     if isinstance(source, Trajectories):
         return source
@@ -60,6 +61,9 @@ def trajectories(
             raise NetlistError(f"No values can be set in the system '{path.name}'.", advice="Change the file.")
         return cosim(path, until, fmu_tolerance=tolerance)
     drive = load(path)
+    if option:
+        assign(drive, values or {}, option)
+        values = {}
     for name, value in (values or {}).items():
         drive.set(name, value)
     return simulate(drive, until, points=points, rtol=tolerance)
