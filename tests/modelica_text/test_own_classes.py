@@ -316,3 +316,36 @@ def test_an_fmu_of_a_text_agrees_with_idas(tmp_path: Path) -> None:
 def test_derivatives_by_parameters_exist() -> None:
     model = build(drive("Discharge"))
     assert {one.path for one in model.flat_parameters} >= {"store.C", "wire.R"}
+
+
+BOUND = """
+class Sum "A rate, and its sum over time."
+  {kind} s(unit = "m/s");
+  Real y(unit = "m", start = 0, fixed = true);
+equation
+  der(y) = s;
+end Sum;
+model M
+  parameter Real k(unit = "m/s2") = 3;
+  Real x(unit = "m/s", start = 1, fixed = true), one_s;
+  Sum pair[2](each s = k*time + x), one(s = pair[1].y / T), constant_rate(s = 4);
+  parameter Real T(unit = "s") = 1;
+equation
+  T*der(x) = -x;
+  one_s = 2;
+end M;
+"""
+
+
+@pytest.mark.parametrize("kind", ["input Real", "Modelica.Blocks.Interfaces.RealInput"])
+def test_the_value_of_an_input_is_an_equation(kind: str, tmp_path: Path) -> None:
+    """y' = 3·t + exp(-t), and its sum; a signal that drives an input takes no name of others."""
+    (tmp_path / "m.mo").write_text(BOUND.replace("{kind}", kind))
+    result = simulate(load(tmp_path / "m.mo:M"), 2.0, rtol=1e-10, atol=1e-12)
+    t = result.time
+    for k in (1, 2):
+        assert result[f"pair[{k}].s"] == pytest.approx(3 * t + np.exp(-t), rel=1e-8)
+        assert result[f"pair[{k}].y"] == pytest.approx(1.5 * t**2 + 1 - np.exp(-t), rel=1e-8, abs=1e-10)
+    assert result["one.y"] == pytest.approx(0.5 * t**3 + t - 1 + np.exp(-t), rel=1e-8, abs=1e-10)
+    assert result["constant_rate.y"] == pytest.approx(4 * t, rel=1e-10, abs=1e-12)
+    assert result["one_s"] == pytest.approx(2.0)

@@ -29,8 +29,8 @@ from modelica_like.netlist.modelica.library import Known, connector_type
 from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.statements import Statements
-from modelica_like.netlist.modelica.types import Basic, basic_type
-from modelica_like.netlist.modelica.wiring import groups
+from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside
+from modelica_like.netlist.modelica.wiring import Wire, groups
 from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConnector, as_formula, written_class
 
 
@@ -79,6 +79,9 @@ class _Builder:
         component: Written = kind(text.name, description=text.description)
         self.component = component
         self.wires = groups(self.statements.connections, self.instance)
+        for name, bound in self.statements.bound.items():
+            component._declare(name, signal_out(self._unit(bound.basic), f"value of {bound.end}"))
+            self.wires.append(Wire([name, bound.end], bound.source))
         for name, member in self.instance.members.items():
             place = member.text.place(member.declaration.line)
             Assembly.place(component, f"parts.{name}", place)
@@ -199,7 +202,9 @@ class _Builder:
         description = member.declaration.description
         declared: Field
         signal = bool(basic.prefixes & {"input", "output"}) and (
-            not {"input", "output"} & member.declaration.prefixes or member.text.kind == "block"
+            not {"input", "output"} & member.declaration.prefixes
+            or member.text.kind == "block"
+            or is_bound_outside(self.instance, member, basic)
         )
         if basic.kind == "Boolean" and not signal:
             declared = boolean(description)

@@ -11,10 +11,19 @@ from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement, calls_in
-from modelica_like.netlist.modelica.types import basic_type
+from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside
 from modelica_like.netlist.modelica.written import ASSERT, MEMORY, TERMINATE, Happening
 
 _INSTANTS = ("sample", "edge", "change", "initial", "terminal")
+
+
+@dataclass(frozen=True)
+class Bound:
+    """An input of a part that has an equation in the part's modification: its path, type and place."""
+
+    end: str
+    basic: Basic
+    source: Source
 
 
 @dataclass
@@ -32,6 +41,7 @@ class Statements:
         assigned: names that only events change.
         memory: values of discrete variables before the start, from initial equations of `pre(…)`.
         outputs: Boolean signals with an equation, and whether they are true for instants only.
+        bound: inputs of parts with an equation in the part's modification, by the names of signals that drive them.
     """
 
     instance: Instance
@@ -42,6 +52,7 @@ class Statements:
     assigned: set[str] = field(default_factory=set)
     memory: dict[str, Expr] = field(default_factory=dict)
     outputs: dict[str, bool] = field(default_factory=dict)
+    bound: dict[str, Bound] = field(default_factory=dict[str, "Bound"])
 
     def read(self) -> None:
         """Go through declarations with values, then all equations.
@@ -108,7 +119,9 @@ class Statements:
             if {"parameter", "constant"} & declared.prefixes:
                 continue
             if basic is None:
-                self._connector_bindings(name, member)
+                self._part_bindings(name, member)
+            elif is_bound_outside(self.instance, member, basic):
+                continue  # an equation of the part's owner
             elif member.given.value is not None and member.given.scope is not None:
                 scope, text = member.given.scope
                 if scope is not self.instance:
@@ -116,11 +129,13 @@ class Statements:
                 left = Resolver(self.instance, text)(Expr("name", ((name, ()),), declared.line))
                 self._equate(left, Resolver(scope, text)(member.given.value), text, declared.line)
 
-    def _connector_bindings(self, name: str, member: Member) -> None:
-        """Collect `Flange_a flange(tau = …)`: values of a connector's variables are equations."""
+    def _part_bindings(self, name: str, member: Member) -> None:
+        """Collect `Flange_a flange(tau = …)` and `Own part(input = …)`: such values are equations."""
         shape = sizes(self.instance, member) if member.given.inner and exists(self.instance, member) else (0,)
         for k in range(1, shape[0] + 1) if shape else (0,):
             part = part_of(self.instance, member, k)
+            if isinstance(part, Instance) and part.text.kind != "connector":
+                self._input_bindings(f"{name}[{k}]" if k else name, part)
             if isinstance(part, Known) or (isinstance(part, Instance) and part.text.kind != "connector"):
                 continue
             for last, entry in (element(member.given, k) if k else member.given).inner.items():
@@ -131,6 +146,19 @@ class Statements:
                     raise refused(what, entry.scope[1], entry.line)
                 path = Expr("name", ((f"{name}[{k}].{last}" if k else f"{name}.{last}", ()),), entry.line)
                 self._equate(path, Resolver(*entry.scope)(entry.value), entry.scope[1], entry.line)
+
+    def _input_bindings(self, path: str, part: Instance) -> None:
+        """Collect `Own part(input = …)`: a signal of this class has the value, and drives the input."""
+        for name, member in part.members.items():
+            basic, (given, scope) = basic_type(part, member), (member.given.value, member.given.scope)
+            if given is None or scope is None or not is_bound_outside(part, member, basic):
+                continue
+            assert basic is not None
+            signal = f"{path}_{name}"
+            while signal in self.instance.members or signal in self.bound:
+                signal += "_"
+            self.bound[signal] = Bound(f"{path}.{name}", basic, scope[1].place(given.line))
+            self._equate(Expr("name", ((signal, ()),), given.line), Resolver(*scope)(given), scope[1], given.line)
 
     def _statement(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
         resolver = Resolver(self.instance, text, local)

@@ -50,3 +50,18 @@ def basic_type(instance: Instance, member: Member) -> Basic | None:
         base = instance.classes.find(base.short.base, scope)
     plain = isinstance(base, str) and base in (*SCALARS, "StateSelect")
     return Basic(str(base), attributes, prefixes) if plain else None
+
+
+def is_bound_outside(instance: Instance, member: Member, basic: Basic | None) -> bool:
+    """Return whether a member is an input that the owner of a part gives an equation: `Own part(input = …)`."""
+    scope = member.given.scope
+    return (
+        basic is not None
+        and basic.kind == "Real"
+        and "input" in basic.prefixes
+        and not member.declaration.dimensions
+        and member.given.value is not None
+        and scope is not None
+        and scope[0] is not instance
+        and scope[0] is instance.owner
+    )
