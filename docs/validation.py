@@ -20,6 +20,35 @@ ROOT = Path(__file__).parents[1]
 PAGE = Path(__file__).with_suffix(".md")
 
 
+class Run(NamedTuple):
+    """A longer run by hand: a variable of the environment, and what it counted, nothing before it was run.
+
+    Attributes:
+        value: of the variable. RANDOM_LAWS counts laws in blocks of 50, beside 12 of its own; NARROW_FORCES counts
+            blocks: of n, 24 + 50·n forces and 12 + 25·n carriers; LIBRARY_DRIVES counts drives.
+        counted: cases that ran, by kind.
+    """
+
+    value: int
+    counted: dict[str, int | None]
+
+
+BY_HAND = {
+    "RANDOM_LAWS": Run(5000, {"": None}),
+    "NARROW_FORCES": Run(40, {"forces": None, "carriers": None}),
+    "LIBRARY_DRIVES": Run(500, {"": None}),
+}
+"""`RANDOM_LAWS=5000 pytest tests/properties/test_random_laws.py`, `NARROW_FORCES=40 pytest tests/solve/test_edges.py`,
+`LIBRARY_DRIVES=500 pytest tests/properties/test_library_drives.py -m slow`: after a run write its counts here."""
+
+
+def by_hand(variable: str, kind: str = "") -> str:
+    """Return what follows the count of a test run: the count by hand and its command, or the command only."""
+    value, counts = BY_HAND[variable]
+    command, count = f"`{variable}={value}`", counts[kind]
+    return f" in each test run{f' (more by {command})' if count is None else f'; {count:,} by hand ({command})'}"
+
+
 class Row(NamedTuple):
     """What is compared with what.
 
@@ -47,10 +76,10 @@ ROWS = {
         Row("start-up of a machine tool (document 003)", "its equations by hand, integrated by SciPy (DOP853); its numbers", "two of its variants", "event times 1e-6 s, slip energy 1e-6, samples 1e-5, peaks 1e-4", "system/test_machine_tool_startup.py"),
         Row("random rotational drives with friction, freewheels, impacts", "a solver in fractions", "{DRIVES} drives", "speeds {SPEED}, losses {LOSS}, balance {CLOSURE}; the same events", "exact/test_random_drives_exactly.py", "exact/drive_runs.py"),
         Row("small drives that once were wrong", "the same solver", "{len(SMALL)} drives", "the same", "exact/test_small_drives.py"),
-        Row("random laws over all functions of the language", "plain Python in small steps", "{MANY[-1][-1] + 1} laws", "{NEAR}, the reference's own error; by both solvers, through Modelica text and FMUs", "properties/test_random_laws.py"),
-        Row("masses that meet narrow forces on their way or in time", "energy and momentum", "{24 + 50 * BLOCKS} forces: widths from 1 µm to 0.1 m, speeds over six decades", "1e-5 of the speed; by both solvers, two as FMU", "solve/test_edges.py"),
+        Row("random laws over all functions of the language", "plain Python in small steps", "{MANY[-1][-1] + 1} laws{by_hand('RANDOM_LAWS')}", "{NEAR}, the reference's own error; by both solvers, through Modelica text and FMUs", "properties/test_random_laws.py"),
+        Row("masses that meet narrow forces on their way or in time", "energy and momentum", "{24 + 50 * BLOCKS} forces{by_hand('NARROW_FORCES', 'forces')}: widths from 1 µm to 0.1 m, speeds over six decades", "1e-5 of the speed; by both solvers, two as FMU", "solve/test_edges.py"),
         Row("masses that meet narrow smooth forces (Gaussian, rational, two steps, …) on their way", "energy", "{SEEDS * len(SHAPES)} forces: widths from 1 µm to 30 mm, speeds over six decades", "1e-5 of the speed; by both solvers, one as FMU", "exact/test_narrow_pulses.py"),
-        Row("relations with fast functions of time", "fixed small steps", "{12 + 25 * BLOCKS} carriers", "2e-6 and 2e-5 of the duration; by both solvers", "solve/test_edges.py"),
+        Row("relations with fast functions of time", "fixed small steps", "{12 + 25 * BLOCKS} carriers{by_hand('NARROW_FORCES', 'carriers')}", "2e-6 and 2e-5 of the duration; by both solvers", "solve/test_edges.py"),
         Row("rams with friction through their dead centres", "SciPy (DOP853), with its events", "one crank with two frictions, in three orders of lines", "1e-7, by both solvers", "solve/test_dead_centres.py"),
         Row("largest values, integrals and means of runs", "closed forms; document 003 in small steps", "runs of 1 to 300 s with 5 to 500 results", "1e-6, whatever is written of a run", "runs/test_readings.py"),
         Row("the same of runs of FMUs and of co-simulations", "closed forms", "every kind of reading, with 7 to 500 results, fixed and variable steps", "1e-5 of the largest amount, 3e-5 of co-simulations, or a refusal in words", "fmus/test_fmu_readings.py"),
@@ -59,7 +88,7 @@ ROWS = {
         Row("random trees of inertias, gears, planetary sets, springs, clutches", "laws: energy, order of lines, signs, inertias in two", "{EXAMPLES} drives for each law", "{SAME} of the largest speed", "properties/test_properties.py"),
     ],
     "Engines against each other": [
-        Row("random drives of all types", "IDAS, compiled run-time, FMU by FMPy in both kinds", "{COUNT} drives, of nearly all {types} types", "{SAME} at once, or {CONVERGED} at a hundredth of the tolerance; else a refusal in words", "properties/test_library_drives.py"),
+        Row("random drives of all types", "IDAS, compiled run-time, FMU by FMPy in both kinds", "{COUNT} drives{by_hand('LIBRARY_DRIVES')}, of nearly all {types} types", "{SAME} at once, or {CONVERGED} at a hundredth of the tolerance; else a refusal in words", "properties/test_library_drives.py"),
         Row("starts, events at one instant, impacts, sharing", "Python and C, call by call", "every example with a mode that holds", "1e-6 and less, by call", "fmi/test_pairs.py"),
         Row("every example as an FMU of FMI 2.0 and 3.0", "FMPy, ecos, libcosim: [importers](importers.md)", "{exports} exports", "marks in that table", "fmi/test_export.py"),
     ],
@@ -122,8 +151,8 @@ def counted() -> dict[str, Any]:
 
 def _filled(text: str, values: dict[str, Any]) -> str:
     def number(found: re.Match[str]) -> str:
-        value = eval(found[1], {}, values)  # noqa: S307 -- written above
-        return format(value, "g" if isinstance(value, float) else ",")
+        value = eval(found[1], {"by_hand": by_hand}, values)  # noqa: S307 -- written above
+        return value if isinstance(value, str) else format(value, "g" if isinstance(value, float) else ",")
 
     return re.sub(r"\{([^}]+)\}", number, text)
 
