@@ -163,8 +163,8 @@ def check_equation(left: Expr, right: Expr, dimensions: Dimensions, component: s
 
 def check_expression(
     expression: Expr | float, expected: Unit, dimensions: Dimensions, label: str, source: Source | None = None
-) -> None:
-    """Check that an expression has the expected dimension.
+) -> Unit:
+    """Check that an expression has the expected dimension, and return its unit.
 
     Args:
         expression: the expression.
@@ -183,6 +183,7 @@ def check_expression(
     if not same_dimension(unit, expected):
         actual = "has no unit" if unit == ONE else f"is {unit}"
         raise UnitMismatch(f"{label} expects {expected}; the expression {actual}.", where=where)
+    return unit
 
 
 @contextmanager

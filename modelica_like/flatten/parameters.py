@@ -36,8 +36,10 @@ class Parameters:
         self._position: dict[tuple[int, str], int] = {}
         self._open: list[str] = []
         self._by_leaf: dict[int, int] = {}
-        self._quantities: dict[int, tuple[Any, float, Unit]] = {}
+        self._quantities: dict[int, tuple[Any, Any, Unit]] = {}
         self._dimensions = Dimensions(self._unit_of_leaf)
+        self._units: dict[int, Unit] = {}
+        self._unit: Unit | None = None
 
     def declare(self, component: Component, name: str, path: str) -> int | None:
         """Give a parameter its place in q; None if it has no value.
@@ -67,6 +69,8 @@ class Parameters:
             with component.at_its_place(name):
                 expression = self._dependent(component, name, path, value)
         self._position[key] = self.add(expression)
+        if value.formula is not None and self._unit is not None:
+            self._units[self._position[key]] = self._unit
         return self._position[key]
 
     def add(self, expression: Any) -> int:
@@ -114,8 +118,9 @@ class Parameters:
         )
         if result.is_constant() and not math.isfinite(float(result)):
             raise ValueOutOfRange(f"{label} must be a finite number, not {float(result):g}.")
+        self._unit = None
         if getattr(scope, "units_checked", True):
-            check_expression(expression, value.unit, self._dimensions, f"{label} = {value.formula}")
+            self._unit = check_expression(expression, value.unit, self._dimensions, f"{label} = {value.formula}")
         return result
 
     def _quantity(self, text: str) -> Any:
@@ -123,9 +128,9 @@ class Parameters:
         number, unit = cast("tuple[float, Unit]", read_quantity(text))
         return self._constant(text, number * unit.factor + unit.offset, unit)
 
-    def _constant(self, text: str, number: float, unit: Unit) -> Any:
+    def _constant(self, text: str, value: Any, unit: Unit) -> Any:
         symbol = ca.SX.sym(text)
-        self._quantities[leaf_id(symbol)] = symbol, number, unit
+        self._quantities[leaf_id(symbol)] = symbol, value, unit
         return symbol
 
     def _unit_of_leaf(self, leaf: Any) -> Unit:
@@ -139,9 +144,13 @@ class Parameters:
         if not isinstance(field, Parameter | Input):
             names = [key for key, f in owner.fields.items() if isinstance(f, Parameter)]
             raise unknown("parameter", f"{label}: {owner.label}", path, names, {path: owner.renamed.get(name, "")})
-        value = self._q[self.position(owner, name)]
-        # A constant has a unit, too.
-        return self._constant(path, float(value), unit_of_field(owner, name)) if value.is_constant() else value
+        position = self.position(owner, name)
+        value = self._q[position]
+        if value.is_symbolic():
+            return value
+        # A constant has a unit, too; that of a formula is known, which would be read again in every one that uses it.
+        unit = unit_of_field(owner, name) if value.is_constant() else self._units.get(position)
+        return value if unit is None else self._constant(path, value, unit)
 
     def position(self, component: Component, name: str) -> int:
         """Return the position of a parameter in q.
