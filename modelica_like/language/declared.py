@@ -47,7 +47,13 @@ class Declared:
     @property
     def fields(self) -> dict[str, Field]:
         """Declared parameters, variables, signals and discrete values, and those that this one alone has, by name."""
-        return {**self._class_fields, **self._own_fields} if self._own_fields else self._class_fields
+        own = self._own_fields
+        if not own:
+            return self._class_fields
+        # Every change makes a new dictionary; a netlist of thousands of parameters asks for each of them.
+        if (joined := self.__dict__.get("_joined_fields")) is None or joined[0] is not own:
+            joined = self.__dict__["_joined_fields"] = own, {**self._class_fields, **own}
+        return joined[1]
 
     def declare_array(self, name: str, size: int, field: Field) -> None:
         """Declare variables or signals `name[1]` to `name[size]`, in `build`: structural fields say how many.
