@@ -300,8 +300,8 @@ Result check_turned_back(Instance *c, const double *before) {
     for (int g = 0; g < m->n_guards; g++) {
         const Transition *one = &m->transitions[m->guard_transition[g]];
         double rate = rates[g], turn = later[g] - rate;
-        double came = fabs(before[m->n_guards + g]), near = turn * step + came * TIME_RESOLUTION * fmax(1, c->state.t);
-        int slow = fabs(rate) < turn && fabs(before[g]) < near;
+        double came = fabs(before[m->n_guards + g]); /* a guard that was fast is found within the time resolution */
+        int slow = fabs(rate) < turn && fabs(before[g]) < (turn + came / LATER) * step;
         if (!slow || c->d_begun[one->mode] == one->target || c->d[one->mode] != one->target) continue;
         if (!m->modes[one->mode].hidden) continue; /* a declared mode may keep its condition */
         if (rate > -turn / LATER || now[g] > rate * rate * step / (2 * turn))

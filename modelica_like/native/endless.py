@@ -29,7 +29,8 @@ _CANNOT = {
 }
 _LET_IT_REST = (
     "Let it rest: a mode that holds the motion, with a restitution (docs/language.md, what a mode holds), or a "
-    "smallest speed below which `when` sets zero and a mode keeps it."
+    "smallest speed below which `when` sets zero and a mode keeps it. What stops once and goes on from there is a "
+    "transition of a mode with a reset."
 )
 SWITCHING = "Modes still switch after {} rounds at one instant"
 """Why modes are told to chatter."""

@@ -253,13 +253,14 @@ def new_component(kind: type[Component], values: dict[str, Any]) -> Component:
         raise NetlistError(f"{kind.__name__} cannot be created with {given or 'no values'}: {error}.") from error
 
 
-def assign(drive: Assembly, values: Mapping[str, Any], option: str) -> None:
-    """Give a drive other values by path, whose place in messages is an option of the command line."""
+def assign(drive: Assembly, values: Mapping[str, Any], option: str = "") -> None:
+    """Give a drive other values by path, whose place in messages is an option of the command line if they are its."""
     for path, value in values.items():
         place = Source(option, text=f"{path}={value}")
         try:
             drive.set(path, value)
         except ModelicaLikeError as error:
-            error.where = (place,)
+            error.where = (place,) if option else error.where
             raise
-        Assembly.place(drive, f"set.{path}", place)
+        if option:
+            Assembly.place(drive, f"set.{path}", place)

@@ -35,7 +35,7 @@ def test_a_train_turns_as_it_does_in_the_end(number: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [101, 105, 107, *(n for n in range(108, 130))])
+@pytest.mark.parametrize("number", [101, 105, 107, *range(108, 130)])
 def test_a_gradient_passes_where_several_parts_that_hold_a_shaft_give_way(number: int) -> None:
     """How they split what they hold changes with the load, because a gear bears more under load: no matter."""
     drive, step, asked = train(number), 1e-4, ("J0.w", "J1.w")

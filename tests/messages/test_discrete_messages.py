@@ -355,7 +355,8 @@ def test_a_ball_that_comes_to_rest_does_not_fall_through_the_floor(
         "without another event.\n"
         f"  in {HERE}:{{rebound}} `yield when(self.h < 0, {{self.v: -self.e * self.v}})`\n"
         "Let it rest: a mode that holds the motion, with a restitution (docs/language.md, what a mode holds), or a "
-        "smallest speed below which `when` sets zero and a mode keeps it."
+        "smallest speed below which `when` sets zero and a mode keeps it. What stops once and goes on from there is a "
+        "transition of a mode with a reset."
     )
     check_message(Chattering, lambda: simulate(build(Rebound(e=e)), 3.0, solver=solver), text)
 
@@ -367,6 +368,22 @@ def test_a_ball_that_hardly_rebounds_does_not_fall_through_either(solver: Any, e
     """It is fast before the one impact, and at rest after it."""
     with pytest.raises(Chattering):
         simulate(build(Rebound(e=e, h=h)), 3.0, solver=solver)
+
+
+class Once(Rebound):
+    """Stops at h = 0.5 m, and falls on from there, as its message says one has to write it."""
+
+    place = Mode("above", "below", start="above")
+
+    def events(self) -> Events:
+        yield self.place.go("above", "below", when=self.h < 0.5, reset={self.v: 0})
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_what_stops_once_goes_on_by_a_mode(solver: Any) -> None:
+    """It reaches 0.5 m after sqrt(2 * 0.5 m / g), and falls 0.3 m more in sqrt(2 * 0.3 m / g)."""
+    time = (2 * 0.5 / 9.81) ** 0.5 + (2 * 0.3 / 9.81) ** 0.5
+    assert simulate(build(Once()), time, solver=solver).final["h"] == pytest.approx(0.2, abs=1e-6)
 
 
 def test_no_fmu_lets_a_ball_fall_through_the_floor(tmp_path: Path) -> None:

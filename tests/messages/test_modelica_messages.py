@@ -51,7 +51,7 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "A has no 'b'.\n  in a.mo:5 `connect(a.flange_b, b.flange_a);`",
     ),
     "inner": (model("inner Real x;"), "'inner' before x: that is not supported here.\n  in a.mo:3 `inner Real x;`"),
-    "a displayUnit that is a number": (
+    "a displayUnit that is no text": (
         model(f"{R}.Inertia a(w(displayUnit = true));"),
         "A displayUnit of a.w that is no text: that is not supported here.\n"
         f"  in a.mo:3 `{R}.Inertia a(w(displayUnit = true));`",

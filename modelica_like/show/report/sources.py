@@ -61,9 +61,5 @@ def trajectories(
             raise NetlistError(f"No values can be set in the system '{path.name}'.", advice="Change the file.")
         return cosim(path, until, fmu_tolerance=tolerance)
     drive = load(path)
-    if option:
-        assign(drive, values or {}, option)
-        values = {}
-    for name, value in (values or {}).items():
-        drive.set(name, value)
+    assign(drive, values or {}, option)
     return simulate(drive, until, points=points, rtol=tolerance)
