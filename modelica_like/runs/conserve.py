@@ -15,6 +15,7 @@ from modelica_like.errors import EnergyDrift, SingularAtStart
 from modelica_like.options import Options
 from modelica_like.runs.powers import COARSE, POWERS, Powers, results
 from modelica_like.runs.solution import Solution
+from modelica_like.solve.dense import Dense
 from modelica_like.solve.initialize import Point
 from modelica_like.solve.initialize.slopes import slopes
 from modelica_like.solve.recorder import Segment
@@ -100,11 +101,11 @@ def find_astray(run: Solution) -> Astray | None:
     First, all results are looked at as they are, which costs little; where that is too coarse to judge, they are
     integrated again.
     """
-    model, segments, options = run.model, run.segments, run.options
+    model, segments, options, dense = run.model, run.segments, run.options, _dense(run)
     if not model.states or not model.components:
         return None
     for finer in (False, True):
-        drifts, powers = _drifts(model, segments, options, finer=finer)
+        drifts, powers = _drifts(model, segments, options, dense, finer=finer)
         suspects = np.flatnonzero(np.abs(drifts) > _SUSPICIOUS * options.rtol * powers.moved)
         # Where the tolerances allow it anyway, finer results could only be limited by them, too.
         if suspects.size and not finer:
@@ -116,11 +117,15 @@ def find_astray(run: Solution) -> Astray | None:
     return next((name for name in wrong if name is not None), None)
 
 
+def _dense(run: Solution) -> Dense | None:
+    return None if run.dense is None else run.dense()
+
+
 def _drifts(
-    model: CompiledDae, segments: Sequence[Segment], options: Options, *, finer: bool = True
+    model: CompiledDae, segments: Sequence[Segment], options: Options, dense: Dense | None, *, finer: bool = True
 ) -> tuple[Vector, Powers]:
     """Changes of stored energies minus integrals of their rates, in J, where these are known; shape (components,)."""
-    powers = Powers(model, options, sum(len(segment.times) for segment in segments))
+    powers = Powers(model, options, sum(len(segment.times) for segment in segments), dense)
     total = np.zeros(len(model.components))
     for some in results(model, segments):
         places = np.arange(len(some.times))
@@ -156,7 +161,8 @@ class _Places:
     def _part(self, low: int, high: int) -> tuple[Vector, Powers]:
         if (low, high) not in self._parts:
             run = self.run
-            self._parts[low, high] = _drifts(run.model, [*_between(run.segments, low, high)], run.options)
+            between = [*_between(run.segments, low, high)]
+            self._parts[low, high] = _drifts(run.model, between, run.options, _dense(run))
         return self._parts[low, high]
 
 

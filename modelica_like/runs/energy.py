@@ -14,6 +14,7 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.options import Options
 from modelica_like.runs.powers import POWERS, Powers, Results, results
+from modelica_like.solve.dense import Dense
 from modelica_like.solve.initialize import INSTANT, Impact, Point, call, solve_implicit
 from modelica_like.solve.recorder import Event, Segment
 from modelica_like.upper import Shown
@@ -215,11 +216,12 @@ def energy_balance(
     options: Options | None = None,
     events: Sequence[Event] = (),
     impacts: Sequence[Impact] = (),
+    dense: Dense | None = None,
 ) -> EnergyBalance:
     """Integrate the energy terms of every component along a run.
 
-    It is a quadrature over the results of the run; where they are too coarse, IDAS integrates powers and states
-    again. If this fails, the coarser value is kept: there is always a balance.
+    It is a quadrature over the results of the run; where they are too coarse, over more points of its dense output, or,
+    without that, of IDAS, which integrates again. If this fails, the coarser value is kept: there is always a balance.
 
     Args:
         model: the compiled model.
@@ -227,11 +229,12 @@ def energy_balance(
         options: of the run; the integrals are as precise as its relative tolerance.
         events: mode changes; their resets may change stored energies.
         impacts: losses of components at events.
+        dense: dense output of the run, if that was kept.
     """
     count = len(model.components)
     audit, totals = _Audit(count), np.zeros((POWERS, count))
     options = options or Options()
-    powers = Powers(model, options, sum(len(segment.times) for segment in segments))
+    powers = Powers(model, options, sum(len(segment.times) for segment in segments), dense)
     for some in results(model, segments):
         totals += powers.integrals(some)
         audit.see(some)

@@ -1,4 +1,8 @@
-"""Integrals of the powers along a run: by a rule over its results and, where these are too coarse, over finer ones."""
+"""Integrals of the powers along a run: by a rule over its results and, where these are too coarse, over finer ones.
+
+Finer ones are read off the run's dense output, so that they see what the integrator has seen between two results. Where
+that was not kept, IDAS integrates again.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,7 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.options import SMALLEST_ATOL, Options
 from modelica_like.runs.quadrature import Places, rules
+from modelica_like.solve.dense import Dense
 from modelica_like.solve.idas import Grid, Integrator
 from modelica_like.solve.initialize import Point
 from modelica_like.solve.recorder import Segment
@@ -42,6 +47,8 @@ _MORE, _LEAST, _DEEPEST = 4, 4, 12
 """Finer results per interval, the smallest number of intervals for this, and the number of repetitions."""
 COARSE = _DEEPEST + 1
 """Depth at which results are taken as they are."""
+_FINEST_RESULTS, _FOR_EACH = 100_000, 100
+"""Finer results off dense output in all, and for each result: what is no number, or noise, never becomes fine."""
 _FAILURES = 20
 """Failures of IDAS in a piece of a run after which the given results must suffice."""
 _FEW = 4
@@ -134,6 +141,7 @@ class Powers:
         model: the compiled model.
         options: of the run.
         count: number of its results.
+        dense: its dense output, if that was kept.
 
     Attributes:
         stored: the largest energy that all components stored at one time so far, in J.
@@ -143,9 +151,9 @@ class Powers:
             results were fine enough; shape (components,).
     """
 
-    def __init__(self, model: CompiledDae, options: Options, count: int) -> None:
-        self.model, self.options = model, options
-        self._share = min(_SHARE, _ALL / count)
+    def __init__(self, model: CompiledDae, options: Options, count: int, dense: Dense | None = None) -> None:
+        self.model, self.options, self._dense = model, options, dense
+        self._share, self._left = min(_SHARE, _ALL / count), _FINEST_RESULTS + _FOR_EACH * count
         self.stored, self.moved, self._noise = 0.0, _NOTHING, np.zeros(2)
         self.unknown = np.zeros(len(model.components))
         rtol = min(options.rtol, max(_FINER * options.rtol, _FINEST))
@@ -210,14 +218,20 @@ class Powers:
         return again, finer
 
     def _finer(self, every: Results, begin: int, end: int, intervals: int) -> Segment | None:
-        """Integrate again from one result to another, with more results between; None if IDAS gives up."""
+        """Return more results from one of them to another; None if IDAS gives up, or there are too many."""
         start = every.point(begin)
         span, count = float(every.times[end]) - start.t, _MORE * 2 ** math.ceil(math.log2(max(intervals, _LEAST)))
-        try:
-            x, z = self._integrator.run(start, span, Grid(looks=count))
-        except StepFailed:
-            return None
         times = start.t + span * np.arange(count + 1) / count
+        if self._dense is None:
+            try:
+                x, z = self._integrator.run(start, span, Grid(looks=count))
+            except StepFailed:
+                return None
+        else:
+            self._left -= count
+            if self._left < 0 or not np.isfinite(start.x).all():
+                return None
+            x, z = self._dense.at(times[1:])
         states, implicit = (np.column_stack(pair) for pair in ((start.x, x), (start.z, z)))
         return Segment(times, states, implicit, start.d)
 

@@ -176,7 +176,8 @@ class Solution(Trajectories):
             until = np.inf if last == self.time[-1] else last
             events = [event for event in self.events if first <= event.time < until]
             impacts = [impact for impact in self.impacts if first <= impact.time < until]
-            self._cache[key] = energy_balance(self.model, segments, self.options, events, impacts)
+            dense = None if self.dense is None else self.dense()
+            self._cache[key] = energy_balance(self.model, segments, self.options, events, impacts, dense)
         return self._cache[key]
 
     def _part(self, begin: float, end: float) -> Iterator[Segment]:

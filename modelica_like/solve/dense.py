@@ -41,6 +41,10 @@ class Dense:
         y = (first + s * (last - first + (1 - s) * (a + s * (b + s * c)))).T
         return y[:nx], polished(self._model, times, y[:nx], y[nx:], self.d[:, pieces])
 
+    def at(self, times: Vector) -> tuple[Vector, Vector]:
+        """Return states and implicit unknowns at ascending times, before an event at one of them."""
+        return self.points(np.maximum(np.searchsorted(self.begins, times) - 1, 0), times)
+
 
 @dataclass
 class Keeper:

@@ -31,6 +31,36 @@ def test_a_force_over_a_short_way_stops_a_mass(solver):
     assert run["m.s"][-1] == pytest.approx(1 / np.sqrt(8e7), rel=1e-5)
 
 
+PULSE = """
+[parts]
+m = {{ is = "Mass", m = "1 kg", s = {s}, v = {v} }}
+k = {{ is = "FormingForce", s_scale = {width}, f_scale = {force}, table = [[0, 0], [1, 1], [2, 1], [3, 0]] }}
+f = {{ is = "TranslationalFixed" }}
+[connect]
+a = ["m.flange_b", "k.flange"]
+b = ["k.support", "f.flange"]
+"""
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize("points", [1, 5, 500, 5000])
+@pytest.mark.parametrize(("v", "width", "share"), [(54.55, 1e-5, 0.25), (10.0, 2e-6, 0.8), (270.0, 5e-4, 0.2)])
+def test_a_force_narrower_than_results_is_accounted_for(solver, points, v, width, share):
+    """The run sees it: so must its balance, or the run would be refused, with some numbers of results only."""
+    from modelica_like.netlist import loads
+
+    taken = share * 0.5 * v**2
+    drive = loads(PULSE.format(s=-0.6 * v, v=v, width=width, force=taken / (2.0 * width)))
+    run = simulate(drive, 1.0, solver=solver, points=points)
+    balance = run.energy()
+    # The place is known to 1e-9 of the way so far, so the window is it to 1e-9 of the way over its width.
+    near = 1e-5 + 1e-9 * 0.6 * v / width
+    assert run.notices == balance.notices == ()
+    assert balance["k"].lost == pytest.approx(taken, rel=near)
+    assert balance["m"].stored == pytest.approx(-taken, rel=near)
+    assert balance["k"].lost == pytest.approx(run.read("k.loss_energy")[0], rel=1e-6)
+
+
 def forged(run):
     """A run in which a mass jumps from one speed to another between two results, as if something were stepped over."""
     (segment,) = run.segments

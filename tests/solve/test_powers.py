@@ -26,7 +26,7 @@ def random() -> np.random.Generator:
 def bare(**parts: Any) -> Powers:
     """Powers of which only the parts are there that a test needs."""
     made = Powers.__new__(Powers)
-    vars(made).update(parts)
+    vars(made).update({"_dense": None, "_left": 100, **parts})
     return made
 
 
@@ -118,6 +118,17 @@ def test_four_or_more_finer_results_for_each_interval(intervals: int, count: int
     assert found.x[:, :3].tolist() == [[11.0, 0.0, 1.0], [15.0, count, count + 1]]
     assert found.z[0, :3].tolist() == [51.0, 0.0, 1.0]
     assert found.d.tolist() == [90.0]
+
+
+def test_finer_results_are_those_of_the_run_where_it_has_kept_them() -> None:
+    every = piece([3.0, 4.0, 6.0, 10.0])
+    dense = SimpleNamespace(at=lambda times: (np.stack([times, 2.0 * times]), -times[None]))
+    found = bare(_dense=dense)._finer(every, 1, 3, 2)
+    assert found is not None
+    times = np.linspace(4.0, 10.0, 17)
+    np.testing.assert_allclose(found.x[:, 1:], [times[1:], 2.0 * times[1:]], rtol=1e-15)
+    assert (found.x[:, 0].tolist(), found.z[0, :2].tolist()) == ([11.0, 15.0], [51.0, -times[1]])
+    assert bare(_dense=dense, _left=15)._finer(every, 1, 3, 2) is None
 
 
 @pytest.mark.parametrize(("bad", "calls"), [([], 2), ([5], 8), ([5, 6], 10), (list(range(12)), 20)])
