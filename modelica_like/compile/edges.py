@@ -57,10 +57,7 @@ def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, gu
     given = list(arguments.values())
     rates = ode(*given)
     equations = ca.vertcat(rates, alg(*given))
-    kinks, of_guards = (
-        _different([_edge(*one) for one in _operations(arguments, expressions, _EDGES)])
-        for expressions in (equations, guards(*given))
-    )
+    kinks, of_guards = (kinks_of(arguments, expressions) for expressions in (equations, guards(*given)))
     smooth = _different([*Narrow(arguments, rates).edges(_operations(arguments, equations, NARROW))])
     edges = kinks + smooth + of_guards
     slopes = len(edges) - len(of_guards)
@@ -69,6 +66,11 @@ def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, gu
     function = ca.Function("edges", list(arguments.values()), [result], list(arguments), ["edges"])
     in_time = ca.depends_on(ca.vertcat(ca.SX(0, 1), *kinks), arguments["t"])
     return Edges(function, len(edges), slopes, len(kinks), len(phases), in_time)
+
+
+def kinks_of(arguments: dict[str, Any], expressions: Any) -> list[Any]:
+    """Return what is zero where the slope of expressions may change or jump while time, states and unknowns move."""
+    return _different([_edge(*one) for one in _operations(arguments, expressions, _EDGES)])
 
 
 def _edge(code: int, operands: list[Any]) -> Any:

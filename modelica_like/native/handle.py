@@ -120,7 +120,7 @@ class Native:
         """Return the derivatives of `outputs` with respect to `by`, through all events since the start.
 
         Where the run stays at a kink that changes no mode (an output limited to what it just is), they are those of one
-        side; `sensitivities` refuses that.
+        side, and where a law jumps without an event, they lack what the jump moves; `sensitivities` refuses both.
 
         Returns:
             Shape (outputs, by).

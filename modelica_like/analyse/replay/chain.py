@@ -266,7 +266,7 @@ def _check_end(solution: Solution, end: Point) -> None:
 class _Maker:
     def __init__(self, solution: Solution, chain: Replay, stops: Sequence[float] | Vector) -> None:
         self.solution, self.model, self.chain = solution, solution.model, chain
-        self.kinks = Kinks(solution.model, solution.segments)
+        self.kinks = Kinks(solution.model, solution.segments, chain.functions.quadratures)
         # A step could begin and end on the same side of a kink that the run has passed twice in between.
         self.stops = np.union1d(stops, self.kinks.seen())
         self.h = np.inf
@@ -368,7 +368,11 @@ class _Maker:
                 before = None if step is None else before
 
     def _up_to_kink(self, step: Step) -> Step:
-        """Shorten a step so that it ends just before the first kink of the equations within it."""
+        """Shorten a step so that it ends just before the first kink of the equations within it.
+
+        Raises:
+            NoGradient: rates or integrands jump there.
+        """
         begin = self.kinks.at(step.before)
         for _ in range(self.kinks.count):
             passed = self._passed(step, begin)
@@ -377,9 +381,12 @@ class _Maker:
             number, high = passed
             value = lambda point, k=number: float(self.kinks.at(point)[k])  # noqa: E731
             shorter = shortened(step, value, (0.0, float(begin[number])), high)
+            self.kinks.refuse_jump((shorter or step).after, number, begin, self.chain.functions.integrands)
             if shorter is None:
                 break
             step = shorter
+        for number in self.kinks.reached(begin, step.after):
+            self.kinks.refuse_jump(step.after, number, begin, self.chain.functions.integrands)
         return step
 
     def _passed(self, step: Step, begin: Vector) -> tuple[int, tuple[float, float]] | None:

@@ -1,12 +1,13 @@
 """Places inside a smooth segment at which equations change their slope: breakpoints of tables, |x|, min, max, where.
 
 States are smooth there, their sensitivities are not: a step must end there. It also must at tops and flanks of smooth
-functions that may be narrow, because it would go over them.
+functions that may be narrow, because it would go over them. Where rates jump without an event, the place moves with
+parameters and nothing tells by how much: there is no gradient.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
@@ -14,12 +15,20 @@ import numpy as np
 
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.solve.initialize import Point
+from modelica_like.compile.edges import kinks_of
+from modelica_like.errors import NoGradient
+from modelica_like.solve.initialize import Point, call, solve_implicit
 from modelica_like.solve.recorder import Segment
 
 _DIFFERENCES = (ca.OP_LT, ca.OP_LE, ca.OP_FMIN, ca.OP_FMAX)
 _ZEROS = (ca.OP_FABS, ca.OP_SIGN)
 _NOISE = 1e-12
+_MOVING = (1, 2, 3, 4, 5)
+"""Arguments that move with parameters: all but time."""
+_AWAY = 10.0 ** np.arange(-12, -4)
+"""Distances from a kink, relative to the time; the first one on a side counts. Where rates jump, steps end roughly."""
+_JUMP = 1e-4
+"""Change of a rate over such a distance that is no slope."""
 _AT_IT = 1e-9
 
 
@@ -29,11 +38,14 @@ class Kinks:
     Args:
         model: the compiled model.
         segments: the run; the size of the functions in it sets the scale of rounding.
+        integrands: of its quadratures, an SX column in the model's `arguments`.
     """
 
-    def __init__(self, model: CompiledDae, segments: Sequence[Segment] = ()) -> None:
+    def __init__(self, model: CompiledDae, segments: Sequence[Segment] = (), integrands: Any = None) -> None:
         self.model = model
-        self._function: ca.Function = model.once("kinks", lambda: _switches(model))
+        column = ca.SX(0, 1) if integrands is None else ca.SX(integrands)
+        self._key = "kinks along", str(column)
+        self._function: ca.Function = model.once(self._key, lambda: _with_integrands(model, column))
         self.count = int(self._function.size1_out(0))
         self._along = [(segment.times, self._over(segment)) for segment in segments if self.count]
         largest = [np.abs(values).max(axis=1) for _, values in self._along]
@@ -44,7 +56,7 @@ class Kinks:
         model = self.model
         if not self.count:
             return np.zeros(0)
-        fast = model.fast("kinks along", lambda: self._function)
+        fast = model.fast(self._key, lambda: self._function)
         return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
     def passed(self, before: Vector, after: Vector) -> Any:
@@ -60,6 +72,49 @@ class Kinks:
         times = [times[1:][self.passed(values[:, :-1], values[:, 1:]).any(axis=0)] for times, values in self._along]
         return np.concatenate([np.zeros(0), *times])
 
+    def reached(self, begin: Vector, end: Point) -> list[int]:
+        """Which kinks a step that began beside them ends at."""
+        if not self.count:
+            return []
+        return np.flatnonzero((np.abs(begin) > self._zero) & (np.abs(self.at(end)) <= self._zero)).tolist()
+
+    def refuse_jump(self, at: Point, number: int, begin: Vector, integrands: Callable[[Point], Vector]) -> None:
+        """Raise an error where rates or integrands jump at a kink that parameters move.
+
+        Args:
+            at: point at the kink.
+            number: of the kink.
+            begin: kinks at the beginning of the step that leads there.
+            integrands: gives those of the quadratures at a point.
+
+        Raises:
+            NoGradient: they do.
+        """
+        model = self.model
+        if not any(number in self._function.sparsity_jac(k, 0).row() for k in _MOVING):
+            return
+        slopes, sides = call(model, model.ode, at), list[Vector]()
+        for side in (-1.0, 1.0):
+            for away in _AWAY * max(1.0, abs(at.t)):
+                point = Point(at.t + side * away, at.x + side * away * slopes, at.z.copy(), at.d)
+                solve_implicit(model, point)
+                if self.at(point)[number] * begin[number] * side < 0.0:
+                    sides.append(np.concatenate([call(model, model.ode, point), integrands(point)]))
+                    break
+        if len(sides) < 2:
+            return  # it only touches the kink
+        sizes = np.ones(len(sides[0]))
+        sizes[: len(slopes)] = model.nominals
+        jumps = np.flatnonzero(np.abs(sides[1] - sides[0]) > _JUMP * (sizes + np.abs(sides[0]) + np.abs(sides[1])))
+        if jumps.size:
+            k = int(jumps[0])
+            what = f"the rate of {model.states[k]}" if k < len(slopes) else "what is integrated"
+            raise NoGradient(
+                f"No gradient at t = {at.t:.9g} s: {what} jumps without an event.",
+                why="The jump moves with the parameters, and only the time of an event has a derivative.",
+                advice="Let it be an event: leave out events=False, or noEvent in Modelica text.",
+            )
+
     def _over(self, segment: Segment) -> Vector:
         """Values at the results of a segment, shape (count, n)."""
         model, times = self.model, segment.times
@@ -68,18 +123,14 @@ class Kinks:
 
 
 def _switches(model: CompiledDae) -> ca.Function:
-    """Arguments of operations with a kink, if they change during a segment, and edges of smooth functions."""
+    """Edges of the equations, those of smooth functions included."""
     given = list(model.arguments.values())
-    equations = ca.Function("equations", given, [model.ode(*given), model.alg(*given)])
-    places: dict[str, Any] = {}
-    if any(equations.instruction_id(k) in (*_DIFFERENCES, *_ZEROS) for k in range(equations.n_instructions())):
-        moving = ca.vertcat(*(model.arguments[name] for name in "txz"))
-        for one in arguments_of_kinks(equations, given):
-            if ca.depends_on(one, moving):
-                places.setdefault(str(one), one)
-    edges = model.edges
-    smooth = edges.function(*given)[edges.kinks : edges.slopes] if edges.kinks < edges.slopes else ca.SX(0, 1)
-    return ca.Function("kinks", given, [ca.densify(ca.vertcat(ca.SX(0, 1), *places.values(), smooth))])
+    return ca.Function("kinks", given, [model.edges.function(*given)[: model.edges.slopes]])
+
+
+def _with_integrands(model: CompiledDae, integrands: Any) -> ca.Function:
+    given, kinks = list(model.arguments.values()), kinks_of(model.arguments, integrands)
+    return ca.Function("kinks", given, [ca.densify(ca.vertcat(ca.SX(0, 1), _switches(model)(*given), *kinks))])
 
 
 def arguments_of_kinks(function: ca.Function, given: list[Any]) -> list[Any]:

@@ -1,0 +1,92 @@
+"""Laws that jump without an event: their jump moves with parameters, so its derivative is refused, never left out."""
+
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+
+from modelica_like import sensitivities, simulate
+from modelica_like.errors import NoGradient
+from modelica_like.language import (
+    Component,
+    Equations,
+    Expr,
+    Parameter,
+    Variable,
+    absolute,
+    der,
+    floor,
+    mod,
+    param,
+    sign,
+    var,
+    where,
+)
+
+Kind = Literal["where", "sign", "floor", "mod", "meets", "time"]
+
+
+class Way(Component):
+    """x = a t up to b, where its rate changes; y is not part of the equations of states."""
+
+    units_checked = False
+    x: Variable = var("1", "way", default=0.0)
+    y: Variable = var("1", "sign of what is left")
+    a: Parameter = param("1", "rate before", default=2.0)
+    b: Parameter = param("1", "where it changes", default=1.0)
+    kind: Kind = "where"
+    told: bool = False
+
+    def law(self) -> Expr:
+        x, a, b, events = self.x, self.a, self.b, self.told
+        match self.kind:
+            case "where":
+                return where(x < b, a, 1.0, events=events)
+            case "sign":
+                return (a + 1) / 2 - (a - 1) / 2 * sign(x - b, events=events)
+            case "floor":
+                return a + (1 - a) * floor(x / b, events=events)
+            case "mod":
+                return a + (1 - a) * (x - mod(x, b, events=events)) / b
+            case "meets":
+                return a + where(x < b, 0.0, x - b, events=events) + absolute(x - b) - absolute(x - b)
+            case "time":
+                return where(self.time < 0.5, a, 1.0, events=events)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.law()
+        yield self.y == sign(self.x - self.b, events=self.told)
+
+
+JUMPS: tuple[Kind, ...] = ("where", "sign", "floor", "mod")
+END = 0.9
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize("kind", JUMPS)
+def test_a_jump_without_an_event_has_no_derivative(kind: Kind, solver: Any) -> None:
+    """With an event: x = b + (t - b/a) behind it, so its derivatives are b/a² and 1 - 1/a."""
+    told = sensitivities(simulate(Way(kind=kind, told=True), END, solver=solver), "x", ["a", "b"])
+    np.testing.assert_allclose(told.derivatives, [[0.25, 0.5]], rtol=1e-7)
+    silent = simulate(Way(kind=kind), END, solver=solver)
+    assert silent.final["x"] == pytest.approx(1.4, abs=1e-5)
+    with pytest.raises(NoGradient, match=r"the rate of x jumps without an event") as refused:
+        sensitivities(silent, "x", ["a", "b"])
+    assert "noEvent" in str(refused.value)
+
+
+@pytest.mark.parametrize("method", ["forward", "adjoint"])
+def test_an_integral_of_what_jumps_has_none_either(method: Any) -> None:
+    """That of y is t - 2 b/a, and the rate of x does not jump."""
+    with pytest.raises(NoGradient, match=r"what is integrated jumps without an event"):
+        sensitivities(simulate(Way(kind="meets"), END), "integral(y)", ["a", "b"], method=method)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_branches_that_meet_and_fixed_times_have_derivatives(solver: Any) -> None:
+    """Behind the kink x = b - a + a exp(t - b/a); before a fixed time x = 0.5 a, then its rate is one."""
+    meets = sensitivities(simulate(Way(kind="meets"), END, solver=solver), "x", ["a", "b"])
+    grown = np.exp(END - 0.5)
+    np.testing.assert_allclose(meets.derivatives, [[grown - 1.0 + 0.5 * grown, 1.0 - grown]], rtol=1e-6)
+    fixed = sensitivities(simulate(Way(kind="time"), END, solver=solver), "x", ["a", "b"])
+    np.testing.assert_allclose(fixed.derivatives, [[0.5, 0.0]], rtol=1e-6, atol=1e-9)
