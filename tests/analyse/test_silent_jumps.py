@@ -23,7 +23,7 @@ from modelica_like.language import (
     where,
 )
 
-Kind = Literal["where", "sign", "floor", "mod", "meets", "time"]
+Kind = Literal["where", "sign", "floor", "mod", "meets", "time", "clock"]
 
 
 class Way(Component):
@@ -52,6 +52,9 @@ class Way(Component):
                 return a + where(x < b, 0.0, x - b, events=events) + absolute(x - b) - absolute(x - b)
             case "time":
                 return where(self.time < 0.5, a, 1.0, events=events)
+
+            case "clock":
+                return where(self.time < b, a, 1.0, events=events)
 
     def equations(self) -> Equations:
         yield der(self.x) == self.law()
@@ -90,3 +93,14 @@ def test_branches_that_meet_and_fixed_times_have_derivatives(solver: Any) -> Non
     np.testing.assert_allclose(meets.derivatives, [[grown - 1.0 + 0.5 * grown, 1.0 - grown]], rtol=1e-6)
     fixed = sensitivities(simulate(Way(kind="time"), END, solver=solver), "x", ["a", "b"])
     np.testing.assert_allclose(fixed.derivatives, [[0.5, 0.0]], rtol=1e-6, atol=1e-9)
+
+
+def test_only_parameters_that_move_the_jump_have_none() -> None:
+    """x = a b + t - b; b is when the rate jumps."""
+    run = simulate(Way(kind="clock", b=0.5), END)
+    np.testing.assert_allclose(sensitivities(run, "x", ["a"]).derivatives, [[0.5]], rtol=1e-6)
+    with pytest.raises(NoGradient, match="the rate of x jumps without an event"):
+        sensitivities(run, "x", ["b"])
+    whole = sensitivities(run, "x")
+    assert [*whole.left_out] == ["b"]
+    assert whole["x", "a"] == pytest.approx(0.5, rel=1e-6)

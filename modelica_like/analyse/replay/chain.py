@@ -71,6 +71,7 @@ class Replay:
         start_x: derivatives of the first node's states by (p, u), shape (nx, np + nu).
         start_d: derivatives of its discrete values, shape (nd, np + nu).
         chances: motions of zero that modes hold from the start, by (x, theta) there.
+        silent: nodes at which rates or integrands jump without an event, and how the time of that moves.
     """
 
     functions: StepFunctions
@@ -79,6 +80,7 @@ class Replay:
     start_x: Vector = field(default_factory=lambda: np.zeros((0, 0)))
     start_d: Vector = field(default_factory=lambda: np.zeros((0, 0)))
     chances: list[Coincidence] = field(default_factory=list)
+    silent: list[tuple[Point, Coincidence]] = field(default_factory=list)
 
     @property
     def model(self) -> CompiledDae:
@@ -368,25 +370,21 @@ class _Maker:
                 before = None if step is None else before
 
     def _up_to_kink(self, step: Step) -> Step:
-        """Shorten a step so that it ends just before the first kink of the equations within it.
-
-        Raises:
-            NoGradient: rates or integrands jump there.
-        """
-        begin = self.kinks.at(step.before)
+        """Shorten a step so that it ends just before the first kink of the equations within it."""
+        begin, last = self.kinks.at(step.before), -1
         for _ in range(self.kinks.count):
             passed = self._passed(step, begin)
             if passed is None:
                 break
-            number, high = passed
-            value = lambda point, k=number: float(self.kinks.at(point)[k])  # noqa: E731
-            shorter = shortened(step, value, (0.0, float(begin[number])), high)
-            self.kinks.refuse_jump((shorter or step).after, number, begin, self.chain.functions.integrands)
+            last, high = passed
+            value = lambda point, k=last: float(self.kinks.at(point)[k])  # noqa: E731
+            shorter = shortened(step, value, (0.0, float(begin[last])), high)
             if shorter is None:
                 break
             step = shorter
-        for number in self.kinks.reached(begin, step.after):
-            self.kinks.refuse_jump(step.after, number, begin, self.chain.functions.integrands)
+        for number in self.kinks.reached(begin, step.after, last):
+            chance = self.kinks.jump(step.after, number, begin, self.chain.functions.integrands)
+            self.chain.silent += [] if chance is None else [(step.after, chance)]
         return step
 
     def _passed(self, step: Step, begin: Vector) -> tuple[int, tuple[float, float]] | None:

@@ -59,7 +59,7 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
         readings: the requested ones, which may depend on the times of jumps.
     """
     timed = {id(node) for reading in readings for node, _ in reading.parts}
-    chances = [(chain.nodes[0], chance) for chance in chain.chances]
+    chances = [*((chain.nodes[0], chance) for chance in chain.chances), *chain.silent]
     for _, jump in chain.jumps:
         apart = jump.when.apart if jump.matters or id(jump.before) in timed else ()
         chances += [(jump.before, chance) for chance in (*apart, *jump.chances)]

@@ -2,7 +2,7 @@
 
 States are smooth there, their sensitivities are not: a step must end there. It also must at tops and flanks of smooth
 functions that may be narrow, because it would go over them. Where rates jump without an event, the place moves with
-parameters and nothing tells by how much: there is no gradient.
+parameters and nothing tells by how much: there is no gradient by these.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.replay.when import SAME, Coincidence
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.edges import kinks_of
 from modelica_like.errors import NoGradient
 from modelica_like.solve.initialize import Point, call, solve_implicit
+from modelica_like.solve.initialize.slopes import slopes
 from modelica_like.solve.recorder import Segment
 
 _DIFFERENCES = (ca.OP_LT, ca.OP_LE, ca.OP_FMIN, ca.OP_FMAX)
 _ZEROS = (ca.OP_FABS, ca.OP_SIGN)
 _NOISE = 1e-12
-_MOVING = (1, 2, 3, 4, 5)
-"""Arguments that move with parameters: all but time."""
 _AWAY = 10.0 ** np.arange(-12, -4)
 """Distances from a kink, relative to the time; the first one on a side counts. Where rates jump, steps end roughly."""
 _JUMP = 1e-4
@@ -72,48 +72,47 @@ class Kinks:
         times = [times[1:][self.passed(values[:, :-1], values[:, 1:]).any(axis=0)] for times, values in self._along]
         return np.concatenate([np.zeros(0), *times])
 
-    def reached(self, begin: Vector, end: Point) -> list[int]:
-        """Which kinks a step that began beside them ends at."""
+    def reached(self, begin: Vector, end: Point, last: int) -> list[int]:
+        """Which kinks a step that began beside them ends at: one that it was shortened to, and those that are zero."""
         if not self.count:
             return []
-        return np.flatnonzero((np.abs(begin) > self._zero) & (np.abs(self.at(end)) <= self._zero)).tolist()
+        zero = (np.abs(begin) > self._zero) & (np.abs(self.at(end)) <= self._zero)
+        return sorted({*np.flatnonzero(zero).tolist(), last} - {-1})
 
-    def refuse_jump(self, at: Point, number: int, begin: Vector, integrands: Callable[[Point], Vector]) -> None:
-        """Raise an error where rates or integrands jump at a kink that parameters move.
+    def jump(self, at: Point, number: int, begin: Vector, integrands: Callable[[Point], Vector]) -> Coincidence | None:
+        """Return how the time of a kink moves if rates or integrands jump there, else None.
 
         Args:
             at: point at the kink.
             number: of the kink.
             begin: kinks at the beginning of the step that leads there.
             integrands: gives those of the quadratures at a point.
-
-        Raises:
-            NoGradient: they do.
         """
         model = self.model
-        if not any(number in self._function.sparsity_jac(k, 0).row() for k in _MOVING):
-            return
-        slopes, sides = call(model, model.ode, at), list[Vector]()
+        rates, sides = call(model, model.ode, at), list[Vector]()
         for side in (-1.0, 1.0):
             for away in _AWAY * max(1.0, abs(at.t)):
-                point = Point(at.t + side * away, at.x + side * away * slopes, at.z.copy(), at.d)
+                point = Point(at.t + side * away, at.x + side * away * rates, at.z.copy(), at.d)
                 solve_implicit(model, point)
                 if self.at(point)[number] * begin[number] * side < 0.0:
                     sides.append(np.concatenate([call(model, model.ode, point), integrands(point)]))
                     break
         if len(sides) < 2:
-            return  # it only touches the kink
+            return None  # it only touches the kink
         sizes = np.ones(len(sides[0]))
-        sizes[: len(slopes)] = model.nominals
+        sizes[: len(rates)] = model.nominals
         jumps = np.flatnonzero(np.abs(sides[1] - sides[0]) > _JUMP * (sizes + np.abs(sides[0]) + np.abs(sides[1])))
-        if jumps.size:
-            k = int(jumps[0])
-            what = f"the rate of {model.states[k]}" if k < len(slopes) else "what is integrated"
-            raise NoGradient(
-                f"No gradient at t = {at.t:.9g} s: {what} jumps without an event.",
-                why="The jump moves with the parameters, and only the time of an event has a derivative.",
-                advice="Let it be an event: leave out events=False, or noEvent in Modelica text.",
-            )
+        if not jumps.size:
+            return None
+        k = int(jumps[0])
+        what = f"the rate of {model.states[k]}" if k < len(rates) else "what is integrated"
+        kink = slopes(model, at, f"{self._key}", [number], lambda: self._function)
+        reason = NoGradient(
+            f"No gradient at t = {at.t:.9g} s: {what} jumps without an event.",
+            why="The jump moves with the parameter, and only the time of an event has a derivative.",
+            advice="Let it be an event: leave out events=False, or noEvent in Modelica text.",
+        )
+        return Coincidence(-kink.by[0] / kink.rate[0], SAME * max(1.0, abs(at.t)), reason)
 
     def _over(self, segment: Segment) -> Vector:
         """Values at the results of a segment, shape (count, n)."""
