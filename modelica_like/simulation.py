@@ -40,7 +40,7 @@ from modelica_like.runs.conserve import conserving
 from modelica_like.runs.driven import driven
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Statistics, Trajectories, needs_equations
-from modelica_like.solve.initialize import StartKind, initialize
+from modelica_like.solve.initialize import StartKind
 from modelica_like.solve.initialize.ideal import refuse_contradiction
 from modelica_like.solve.panels import Progress
 from modelica_like.structure import reduce
@@ -170,7 +170,7 @@ def simulate(
     model = as_asked(model if settings == model.settings else model.twin(settings=settings))
 
     def attempt(options: Options) -> Solution:
-        loop = make(model, options, initialize(model, t0, kind), end, progress)
+        loop = make(model, options, upper.initialize(model, t0, kind), end, progress)
         asked = collector(model, readings, options.atol)
         if readings:
             loop.record.keeper.read = lambda steps: asked.feed(loop.dense(steps))

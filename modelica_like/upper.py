@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from modelica_like.analyse.sensitivity.function import simulation_function as simulation_function
     from modelica_like.native.handle import Native as Native
     from modelica_like.native.run import EngineLoop as EngineLoop
+    from modelica_like.native.start import initialize as initialize
     from modelica_like.show.draw import icon as icon
     from modelica_like.show.draw import schematic as schematic
     from modelica_like.show.plot import plot as plot
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Native": "native.handle",
     "EngineLoop": "native.run",
+    "initialize": "native.start",
     "html": "show.report.notebook",
     "icon": "show.draw",
     "mathematics": "show.report.mathematics",

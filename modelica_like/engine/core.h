@@ -113,26 +113,28 @@ typedef struct {
  * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
  * steady state began; `impact_x` and `impact_d` are states before the first impact at an instant, `trials` points
  * without and with it, whose powers differ by what sources give in its duration. */
-#define WORK_NUMBERS(A)                                                                                                \
-    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),           \
-        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),    \
-        A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),           \
-        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),           \
-        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS),   \
-        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),              \
-        A(start_unknowns, system), A(start_values, starts), A(start_residual, larger(m->n_start_values, resets)),      \
-        A(delayed, 2 * delays), A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(d_before, n_d),                \
-        A(d_begun, n_d), A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),        \
-        A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(impact_d, n_d),         \
-        A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), \
-        A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n),      \
-        A(changes, n), A(step_error, n), A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d))
+#define WORK_NUMBERS(A)                                                                                              \
+    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),         \
+        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),  \
+        A(qr_work, system), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),         \
+        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),         \
+        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS), \
+        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),            \
+        A(start_unknowns, system), A(start_errors, system), A(start_sizes, system),                                  \
+        A(kept_starts, N_KEPT_STARTS *(n + 2 * n_d)), A(start_values, starts),                                       \
+        A(start_residual, larger(m->n_start_values, resets)), A(delayed, 2 * delays),                                \
+        A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(d_before, n_d), A(d_begun, n_d), A(d_earlier, n_d),  \
+        A(d_fired, n_d), A(reset_values, resets), A(target_values, resets), A(respond_d, n_d), A(respond_z, n_z),    \
+        A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds),  \
+        A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), A(sizes, members), A(edges, 3 * edges),  \
+        A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n),           \
+        A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; idle:
  * time events that changed nothing of d that is felt by what moves when they came last */
 #define WORK_INDICES(A)                                                                                          \
     A(order, n_z), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), A(member, members), \
-        A(pivots, members), A(same, slots), A(places_of_slots, slots)
+        A(pivots, members), A(same, slots), A(places_of_slots, slots), A(steady_order, steady), A(steady_places, n)
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
@@ -152,6 +154,13 @@ typedef struct { /* see codes.h; place -1: none */
     FailureCode code;
     double place, numbers[2];
 } Failure;
+
+typedef struct { /* of something for which there may be another way */
+    FailureCode code;
+    double values[3];
+} Refusal;
+
+typedef enum { KEPT_FAILED, KEPT_LED, KEPT_SETTLING, N_KEPT_STARTS } KeptStart; /* points to come back to */
 
 /* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns; `wanting` transitions fire at the
  * end of the piece. */
@@ -199,7 +208,9 @@ typedef struct Instance {
     int co_simulation, event_mode_used, early_return_allowed, inputs_move;
     Allocate allocate;
     Release release;
-    Failure failure;     /* the last one */
+    Failure failure; /* the last one */
+    int trying;      /* what fails is noted in `tried` only */
+    Refusal tried;
     int passing;         /* a gradient passes an instant again, of which nobody is told */
     int bounded;         /* the work of a step is bounded: iterations end early */
     int budget;          /* rounds of events and further pieces that are left of a bounded step */
@@ -245,6 +256,18 @@ double input_at(const Instance *c, int k, double t);
 void start_values(Instance *c);
 Result start_solve(Instance *c);
 void choose_modes(Instance *c);
+#define MODE_ROUNDS 5 /* in which modes and start values settle */
+void begin_start(Instance *c);
+Result apply_fixed(Instance *c);
+void apply_defaults(Instance *c);
+int choose_start_modes(Instance *c, const double *begun, int declared);
+Result complete_start(Instance *c);
+const double *keep_start(Instance *c, KeptStart which);
+void take_start(Instance *c, KeptStart which);
+/* steady.c */
+Result start_steady(Instance *c);
+Result find_steady(Instance *c, int fixed, int defaults);
+Result steady_near(Instance *c);
 /* holds.c */
 #define UNLIMITED 1e30
 #define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */
@@ -274,6 +297,7 @@ Result reach_instant(Instance *c);
 Result leave_instant(Instance *c, int happened);
 /* events.c */
 double just_after(const State *s);
+int is_source(const Instance *c, const Transition *one);
 int guard_active(const Instance *c, int guard);
 double next_moment(Instance *c, int idle_too);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);

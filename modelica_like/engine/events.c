@@ -16,7 +16,7 @@ double number_or_false(double guard) {
     return fabs(guard) < NOISE && fabs(guard) > JUST_TRUE ? 0 : guard;
 }
 
-static int is_source(const Instance *c, const Transition *one) {
+int is_source(const Instance *c, const Transition *one) {
     double mode = c->d[one->mode];
     return mode >= 0 && mode < 64 && (one->sources >> (int)mode & 1);
 }

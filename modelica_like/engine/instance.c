@@ -54,6 +54,7 @@ Result fail_with(Instance *c, FailureCode code, double v0, double v1, double v2)
     double *number = failure.numbers;
     size_t used = 0;
     const char *s = sentences;
+    if (c->trying) return c->tried = (Refusal){code, {v0, v1, v2}}, RESULT_ERROR;
     for (int k = 0; k < (int)code; k++) s += strlen(s) + 1;
     for (; *s != 0 && used < MESSAGE_LENGTH; s++) {
         if (*s != '%') {

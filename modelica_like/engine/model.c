@@ -3,7 +3,7 @@
  * resources, which importers name in many ways. */
 #include "model.h"
 
-#define FORMAT 9
+#define FORMAT 10
 #define UNKNOWN (-1)
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
 
@@ -187,6 +187,7 @@ typedef struct { /* integers of records, not below `low` and below `end` */
 /* Every index is one of the table that it points into. */
 static int check_indices(const Model *m, char *message) {
     const Range ranges[] = {COLUMN(settings, terminal, n_settings, -1, m->n_modes),
+        COLUMN(settings, homotopy, n_settings, -1, m->n_modes),
         COLUMN(settings, n_edges, n_settings, 0, m->tapes.edges.n_outputs + 1),
         COLUMN(settings, n_slope_edges, n_settings, 0, m->settings->n_edges + 1),
         COLUMN(settings, n_kinks, n_settings, 0, m->settings->n_slope_edges + 1), ARRAY(state_names, n_x, n_text),

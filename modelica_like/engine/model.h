@@ -110,7 +110,8 @@ typedef struct {
     int ideal;                  /* entry of d where the rows of ideal elements begin */
     int n_edges, n_slope_edges; /* the first results of their tape: of slopes, then of guards; phases follow */
     int n_kinks;                /* the first edges of slopes; behind them are those of smooth functions */
-    int rests, unused;          /* where impacts follow each other ever faster, they end in contact */
+    int rests;                  /* where impacts follow each other ever faster, they end in contact */
+    int homotopy;               /* entry of d: share of the actual expressions of homotopies, or -1 */
     double absolute_to_relative, default_tolerance;
     double fixed_step; /* 0: as accuracy asks for */
 } Settings;

@@ -161,6 +161,14 @@ static void go_to(Instance *c, const double *x, const double *z, const double *d
     c->state.z_valid = c->variables_valid = 0;
 }
 
+/* Finds the start alone, or a steady state of given modes near a point; `native_failure` tells where that is. */
+EXPORTED int native_start(Native *n) { return code(start_solve(n->c)); }
+
+EXPORTED int native_steady_near(Native *n, const double *x, const double *z, const double *d) {
+    go_to(n->c, x, z, d);
+    return code(steady_near(n->c));
+}
+
 /* Begins at states, implicit unknowns and d that are given; events there have not happened yet. */
 EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const double *d) {
     go_to(n->c, x, z, d);

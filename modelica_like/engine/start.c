@@ -1,10 +1,11 @@
 /* Consistent start values and modes: tables say which start values determine what, Newton's method does the rest. */
 #include "core.h"
 
-#define MODE_ROUNDS 5
 #define MAX_NEWTON 50
-#define CONSISTENT 1e-8
-#define AT_REST (-1) /* in place of a start value: the variable is zero */
+#define CONSISTENT 1e-8           /* relative distance of start values that are the same */
+#define SHARE (1.0 / 16)          /* by which actual expressions grow at once: powers of 2 end at 1 exactly */
+#define LEAST_SHARE (1 / 16384.0) /* smaller ones mean that the solution turns back or ends */
+#define AT_REST (-1)              /* in place of a start value: the variable is zero */
 
 /* Start values as the model says, or as they were given. */
 void start_values(Instance *c) {
@@ -13,7 +14,7 @@ void start_values(Instance *c) {
         if (c->start_given[k]) c->start_values[k] = c->start_value[k];
 }
 
-static Result apply_direct(Instance *c) {
+Result apply_fixed(Instance *c) {
     const Model *m = c->model;
     unsigned char *known = memset(c->known, 0, (size_t)m->n_x);
     double *x = c->x;
@@ -28,44 +29,87 @@ static Result apply_direct(Instance *c) {
     return RESULT_OK;
 }
 
+/* Points to come back to: states and implicit unknowns, d, and d before. */
+static double *kept_start(Instance *c, KeptStart which, size_t *n, size_t *n_d) {
+    *n = (size_t)c->model->n_unknowns;
+    *n_d = (size_t)c->model->n_d;
+    return c->kept_starts + which * (*n + 2 * *n_d);
+}
+
+const double *keep_start(Instance *c, KeptStart which) {
+    size_t n, n_d;
+    double *kept = kept_start(c, which, &n, &n_d);
+    memcpy(kept, c->x, n * sizeof(double));
+    memcpy(kept + n, c->d, n_d * sizeof(double));
+    memcpy(kept + n + n_d, c->d_before, n_d * sizeof(double));
+    return kept;
+}
+
+void take_start(Instance *c, KeptStart which) {
+    size_t n, n_d;
+    const double *kept = kept_start(c, which, &n, &n_d);
+    memcpy(c->x, kept, n * sizeof(double));
+    memcpy(c->d, kept + n, n_d * sizeof(double));
+    memcpy(c->d_before, kept + n + n_d, n_d * sizeof(double));
+}
+
 /* Guesses, or defaults: they contradict nothing. */
 static void apply(Instance *c, const StartOf *starts, int count) {
     for (int k = 0; k < count; k++) c->x[starts[k].position] = c->start_values[starts[k].start] / starts[k].factor;
 }
 
+void apply_defaults(Instance *c) { apply(c, c->model->start_default, c->model->n_start_default); }
+
+/* An unknown of the start system: a state, an implicit unknown, or a variable that follows. */
+static double *start_unknown(Instance *c, int k) {
+    int column = c->model->start_columns[k], follows = column - c->model->n_unknowns;
+    return follows < 0 ? c->x + column : c->slots + c->model->slot_y + follows;
+}
+
+/* Sizes of the terms of every row of the start system: the scale of rounding. */
+static void measure_rows(Instance *c, double *sizes) {
+    const QrPattern *a = &c->model->start;
+    memset(sizes, 0, (size_t)a->size * sizeof(double));
+    for (int j = 0; j < a->size; j++)
+        for (int k = a->colind[j]; k < a->colind[j + 1]; k++)
+            sizes[a->row[k]] += fabs(c->jacobian[k] * *start_unknown(c, j));
+}
+
 /* Newton's method on the equations between free states, the variables that follow from them, and start values. */
 static Result solve_start_system(Instance *c) {
     const Model *m = c->model;
-    double *residual = c->start_residual, *step = c->start_unknowns, error = 0;
-    if (m->n_start_unknowns == 0) return RESULT_OK;
+    int n = m->n_start_unknowns, met = 1;
+    double *residual = c->start_residual, *step = c->start_unknowns, *error = c->start_errors, *sizes = c->start_sizes;
+    if (n == 0) return RESULT_OK;
     memset(c->slots + m->slot_y, 0, m->n_y * sizeof(double));
+    memset(sizes, 0, (size_t)n * sizeof(double));
     for (int k = 0; k < m->n_start_zero; k++) c->x[m->start_zero[k]] = 0;
+    memcpy(c->first, c->x, (size_t)m->n_unknowns * sizeof(double));
     for (int round = 0; round < MAX_NEWTON; round++) {
         double change = 0;
+        int rounding = 1;
         evaluate_now(c, &m->tapes.start_system, residual);
         tape_run(&m->tapes.start_jacobian, c->slots, c->jacobian);
-        error = 0;
-        for (int k = 0; k < m->n_start_unknowns; k++) {
+        for (int k = 0; k < n; k++) {
             int given = m->start_rows[k].start;
-            double target = given == AT_REST ? 0 : c->start_values[given];
-            step[k] = residual[m->start_rows[k].row] - target;
-            error = fmax(error, isfinite(step[k]) ? fabs(step[k]) / (1 + fabs(target)) : INFINITY);
+            step[k] = error[k] = residual[m->start_rows[k].row] - (given == AT_REST ? 0 : c->start_values[given]);
+            rounding &= fabs(error[k]) <= DBL_EPSILON * sizes[k];
         }
-        if (!isfinite(error) || !qr_factor(&m->start, c->jacobian, c)) {
-            error = INFINITY;
-            break;
-        }
+        if (rounding) break;
+        met = qr_factor(&m->start, c->jacobian, c);
+        if (!met) break;
         qr_solve(&m->start, c, step);
-        for (int k = 0; k < m->n_start_unknowns; k++) {
-            int column = m->start_columns[k]; /* among states, implicit unknowns, variables */
-            double *y = &c->slots[m->slot_y] - m->n_unknowns, *unknown = column < m->n_unknowns ? c->x : y;
-            unknown += column;
+        for (int k = 0; k < n; k++) {
+            double *unknown = start_unknown(c, k);
             *unknown -= step[k];
             change = fmax(change, fabs(step[k]) / (1 + fabs(*unknown)));
         }
-        if (change < 1e-13) break;
+        measure_rows(c, sizes);
+        if (change <= 1e-13) break;
     }
-    if (error <= CONSISTENT) return RESULT_OK;
+    for (int k = 0; k < n; k++) met = met && fabs(error[k]) < CONSISTENT * (1 + sizes[k]);
+    if (met) return RESULT_OK;
+    memcpy(c->x, c->first, (size_t)m->n_unknowns * sizeof(double)); /* where it began, for the message */
     return fail(c, START_NOT_FOUND, 0);
 }
 
@@ -79,39 +123,6 @@ static Result check_dependent(Instance *c) {
             return fail(c, START_NOT_MET, value, m->start_dependent[k].start, actual);
     }
     return RESULT_OK;
-}
-
-/* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. An error
- * is told by who calls this, because other modes may be tried. */
-static Result solve_steady(Instance *c) {
-    const Model *m = c->model;
-    int n = m->n_steady;
-    double *rates = c->rhs, *a = c->square, *step = c->point, residual = INFINITY;
-    for (int round = 0; round < MAX_NEWTON && n > 0; round++) {
-        double change = 0;
-        evaluate_now(c, &m->tapes.rates, rates);
-        tape_run(&m->tapes.jacobian, c->slots, c->jacobian);
-        memset(c->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
-        for (int k = 0; k < m->n_jacobian; k++) c->matrix[m->jacobian_to_step[k]] = c->jacobian[k];
-        memset(a, 0, (size_t)n * (size_t)n * sizeof(double));
-        for (int j = 0; j < n; j++)
-            for (int k = m->step.colind[m->steady[j]]; k < m->step.colind[m->steady[j] + 1]; k++)
-                for (int i = 0; i < n; i++)
-                    if (m->steady[i] == m->step.row[k]) a[i * n + j] = c->matrix[k];
-        residual = 0;
-        for (int i = 0; i < n; i++) {
-            c->vector[i] = rates[m->steady[i]];
-            residual = fmax(residual, isfinite(c->vector[i]) ? fabs(c->vector[i]) : INFINITY);
-        }
-        if (!isfinite(residual)) break;
-        keeping_least_squares(n, n - m->n_z, a, a + (size_t)n * (size_t)n, c->vector, step);
-        for (int j = 0; j < n; j++) {
-            c->x[m->steady[j]] -= step[j];
-            change = fmax(change, fabs(step[j]) / (1 + fabs(step[j])));
-        }
-        if (change < 1e-13) break;
-    }
-    return n == 0 || residual <= 1e-6 ? RESULT_OK : RESULT_ERROR;
 }
 
 /* Equations of discrete variables, whose values before the start are their start values. */
@@ -140,7 +151,7 @@ void choose_modes(Instance *c) {
 
 /* What slides one way where it began the other way (`begun`, if there is a steady state before) is held: equilibrium
  * lies in between, where it stands still. Others may be asked to be as `declared`. Tells whether a mode changed. */
-static int choose_start_modes(Instance *c, const double *begun, int declared) {
+int choose_start_modes(Instance *c, const double *begun, int declared) {
     const Model *m = c->model;
     memcpy(c->decided, c->mode_given, (size_t)m->n_d);
     memcpy(c->d_before, c->d, (size_t)m->n_d * sizeof(double));
@@ -160,71 +171,60 @@ static int choose_start_modes(Instance *c, const double *begun, int declared) {
     return memcmp(c->d_before, c->d, (size_t)m->n_d * sizeof(double)) != 0;
 }
 
-/* The steady state of the present modes, in which what they hold stands still; held motions become what they were. */
-static Result find_steady(Instance *c, double *begun) {
-    const Model *m = c->model;
-    int count = 0;
-    apply(c, m->start_default, m->n_start_default);
-    if (!apply_direct(c)) return RESULT_ERROR;
-    if (m->n_holds > 0) find_held(c, c->terms, c->held);
-    variables_now(c);
-    for (int k = 0; k < m->n_holds; k++) {
-        begun[k] = c->variables[m->holds[k].motion];
-        if (c->held[k]) c->standing[count++] = m->holds[k].motion;
-    }
-    if (count > 0) move_states(c, c->standing, NULL, count);
-    return solve_steady(c);
+/* Held motions within rounding rest; the rest follows. */
+Result complete_start(Instance *c) {
+    rest(c);
+    replace_dependent(c);
+    return solve_now(c, 0) && check_singular(c);
 }
 
-/* Surfaces that stick against too large a torque are not in equilibrium. */
-static Result check_modes_hold(Instance *c) {
-    const Model *m = c->model;
-    if (m->n_guards == 0 || !m->settings->steady) return RESULT_OK;
-    evaluate_now(c, &m->tapes.guards, c->guards_before);
-    for (int k = 0; k < m->n_guards; k++) {
-        const Transition *one = &m->transitions[m->guard_transition[k]];
-        if (guard_active(c, k) && c->guards_before[k] > 0 && one->target != (int)c->d[one->mode])
-            return fail(c, MODE_NOT_STEADY, c->state.t, m->guard_transition[k]);
+/* States from start values, which may depend on modes, and modes, which depend on states. */
+static Result find_start(Instance *c) {
+    for (int round = 0; round < MODE_ROUNDS; round++) {
+        if (!apply_fixed(c) || !solve_start_system(c) || !solve_now(c, 0) || !check_dependent(c)) return RESULT_ERROR;
+        if (!choose_start_modes(c, NULL, 0)) return complete_start(c);
+        share(c);
     }
-    return RESULT_OK;
+    return fail(c, START_NOT_SETTLED, 0);
 }
 
-/* States and modes. A steady state is sought from the modes that guesses choose, or from those that are declared. */
-static Result start_settled(Instance *c, double *begun, int declared) {
+/* Guesses and declared modes, from which all begins; homotopies begin with what is simplified. */
+void begin_start(Instance *c) {
     const Model *m = c->model;
     memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
     evaluate_now(c, &m->tapes.discrete_starts, c->guards);
     for (int k = 0; k < m->n_d; k++)
         if (!c->mode_given[k]) c->d[k] = c->guards[k];
+    if (m->settings->homotopy >= 0) c->d[m->settings->homotopy] = 0;
     share(c);
     start_values(c);
     apply(c, m->start_guess, m->n_start_guess);
-    if (begun) {
-        apply(c, m->start_default, m->n_start_default);
-        if (!apply_direct(c)) return RESULT_ERROR;
-        choose_start_modes(c, NULL, declared);
-        share(c);
+}
+
+/* The solution of what is simplified is led to that of the actual expressions. */
+static Result lead(Instance *c) {
+    int place = c->model->settings->homotopy, steady = c->model->settings->steady;
+    double step = SHARE;
+    begin_start(c);
+    if (!(steady ? start_steady(c) : find_start(c))) return RESULT_ERROR;
+    while (place >= 0 && c->d[place] < 1) {
+        keep_start(c, KEPT_LED);
+        c->d[place] = fmin(c->d[place] + step, 1);
+        if (steady ? find_steady(c, 0, 0) : find_start(c)) continue;
+        step /= 2;
+        if (step < LEAST_SHARE) return RESULT_ERROR;
+        take_start(c, KEPT_LED);
     }
-    for (int round = 0; round < MODE_ROUNDS; round++) {
-        if (!(begun ? find_steady(c, begun)
-                    : apply_direct(c) && solve_start_system(c) && solve_now(c, 0) && check_dependent(c)))
-            return RESULT_ERROR;
-        if (!choose_start_modes(c, begun, 0)) return RESULT_OK;
-        share(c);
-    }
-    if (begun) return RESULT_ERROR;
-    return fail(c, START_NOT_SETTLED, 0);
+    return RESULT_OK;
 }
 
 static Result pass_start(Instance *c) {
-    double *begun = c->model->settings->steady ? c->begun : NULL;
     if (!check_tables(c)) return RESULT_ERROR;
-    if (!start_settled(c, begun, 0) && !(begun && start_settled(c, begun, 1)))
-        return begun ? fail(c, NOT_STEADY, c->state.t) : RESULT_ERROR;
-    rest(c);
-    replace_dependent(c);
-    if (!solve_now(c, 0) || !check_singular(c) || !check_modes_hold(c)) return RESULT_ERROR;
+    c->trying = 1; /* what fails may be found in another way */
+    Result result = lead(c);
+    c->trying = 0;
+    if (!result) return fail_with(c, c->tried.code, c->tried.values[0], c->tried.values[1], c->tried.values[2]);
     c->state.z_valid = c->state.solved = 1;
     c->state.piece_valid = c->state.event_pending = c->variables_valid = 0;
     return RESULT_OK;

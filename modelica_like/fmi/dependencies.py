@@ -128,31 +128,31 @@ class Dependencies(Following):
         for state, position, _ in reversed(tables.direct):
             rows[state] = self._start_value(position)
         solved = self._solved_starts(tables, rows)
-        for place, column in enumerate(tables.columns):
+        for place, column in enumerate(tables.plan.columns):
             if column < len(model.states):
                 rows[column] = solved[place]
         return rows
 
     def _solved_starts(self, tables: StartTables, direct: Rows) -> Rows:
         """Dependencies of the unknowns of the start system, by its block triangular form."""
-        place = {column: k for k, column in enumerate(tables.columns)}
+        place = {column: k for k, column in enumerate(tables.plan.columns)}
         nx = len(self.model.states)
-        ny = tables.system.size1_out(0)
+        ny = tables.plan.system.function.size1_out(0)
         offsets = {"x": 0, "y": nx, "z": nx + ny}
         given = {row: position for position, _, row in tables.rows if position != AT_REST}
         # Undetermined reactions keep their guesses.
         guessed = {nx + ny + z: self._start_value(position) for z, position, _ in tables.z_guesses}
-        every = sparsity_rows(tables.system, output=2) if tables.columns else []
+        every = sparsity_rows(tables.plan.system.function, output=2) if tables.plan.columns else []
         causes_of: list[set[int]] = []
         outer: Rows = []
-        for row in tables.wanted:
+        for row in tables.plan.wanted:
             columns = {offsets[name] + k for name, k in every[row] if name in offsets}
             causes_of.append({place[column] for column in columns if column in place})
             causes = {quantity for quantity in every[row] if quantity[0] in "tpu"}
             outside = columns.difference(place)
             causes = causes.union(*(direct[k] if k < nx else guessed.get(k, set()) for k in outside))
             outer.append(causes | (self._start_value(given[row]) if row in given else set()))
-        return solved_rows(causes_of, outer, len(tables.columns))
+        return solved_rows(causes_of, outer, len(tables.plan.columns))
 
     @cached_property
     def _everything(self) -> set[Known]:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.compile.compiled import TERMINAL, CompiledDae, Reset
+from modelica_like.compile.compiled import HOMOTOPY, TERMINAL, CompiledDae, Reset
 from modelica_like.errors import ExportError
 from modelica_like.fmi.interface import FmuVariable, Interface
 from modelica_like.fmi.sources import Version, runtime_sources
@@ -30,7 +30,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
 """Path of the file in an FMU."""
-FORMAT = 9
+FORMAT = 10
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
 _ENTRY = struct.Struct("<4i")
@@ -55,7 +55,8 @@ _TAPES = (
 )  # fmt: skip
 SECTIONS: dict[str, Any] = {
     "settings": _record(
-        "n_d n_y steady rates_depend_on_time implicit_linear terminal ideal n_edges n_slope_edges n_kinks rests unused",
+        "n_d n_y steady rates_depend_on_time implicit_linear terminal ideal n_edges n_slope_edges n_kinks rests "
+        "homotopy",
         "absolute_to_relative default_tolerance fixed_step",
     ),
     "text": _TEXT,
@@ -195,7 +196,7 @@ def _contents(
                 model.edges.slopes,
                 model.edges.kinks,
                 int(model.settings.get("on_chattering") == "rest"),
-                0,
+                model.discrete_position.get(HOMOTOPY, -1),
                 ABSOLUTE_TO_RELATIVE,
                 tolerance,
                 fixed_step,
@@ -206,7 +207,7 @@ def _contents(
         "parameter_min": [-math.inf if parameter.min is None else parameter.min for parameter in model.flat_parameters],
         "parameter_max": [math.inf if parameter.max is None else parameter.max for parameter in model.flat_parameters],
         "inputs": model.u,
-        "guesses": tables.start.guesses,
+        "guesses": [*model.guesses, *model.z_guesses],
         "nominals": model.nominals,
         "state_names": [text(name) for name in model.states],
         "implicit_names": [text(name) for name in model.implicit],
@@ -330,8 +331,8 @@ def _starts(start: StartTables, n_x: int, n_z: int, n_y: int) -> dict[str, Any]:
         "start_guess": [*start.x_guesses, *((n_x + z, *of) for z, *of in start.z_guesses)],
         "start_rows": start.rows,
         "start_dependent": start.dependent,
-        "start_zero": start.zero,
-        "start_columns": [k if k < n_x else k - n_y if k >= n_x + n_y else k + n_z for k in start.columns],
+        "start_zero": start.plan.zero,
+        "start_columns": [k if k < n_x else k - n_y if k >= n_x + n_y else k + n_z for k in start.plan.columns],
         "steady": () if start.steady is None else (*start.steady, *range(n_x, n_x + n_z)),
     }
 

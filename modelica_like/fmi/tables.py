@@ -67,7 +67,7 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
     for k in range(states):
         diagonal.add_nz(k, k)
     step = jacobian + diagonal
-    sizes = {name: model.ode.size1_in(name) for name in ARGUMENTS[:-1]} | {"y": start.system.size1_out(0)}
+    sizes = {name: model.ode.size1_in(name) for name in ARGUMENTS[:-1]} | {"y": start.plan.system.function.size1_out(0)}
     slots, tapes = write_tapes(functions, sizes)
     return Tables(
         model, start, slots, {tape.name: tape for tape in tapes}, qr_pattern(step), _places(jacobian, step),
@@ -108,10 +108,11 @@ def _functions(model: CompiledDae, start: StartTables) -> tuple[dict[str, Any], 
         "discrete_starts", "determinants", "hold_terms", "derived", "delays",
     )  # fmt: skip
     functions |= {name: getattr(model, name) for name in plain} | {"edges": model.edges.function}
-    y = ca.SX.sym("y", start.system.size1_out(0))
-    order = [y if name == "y" else arguments[name] for name in start.system.name_in()]
-    _, start_jacobian, start_values = start.system(*order)
-    chosen = start_jacobian[list(start.wanted), list(start.columns)] if start.columns else ca.SX(0, 0)
+    plan, system = start.plan, start.plan.system.function
+    y = ca.SX.sym("y", system.size1_out(0))
+    order = [y if name == "y" else arguments[name] for name in system.name_in()]
+    _, start_jacobian, start_values = system(*order)
+    chosen = start_jacobian[list(plan.wanted), list(plan.columns)] if plan.columns else ca.SX(0, 0)
     for name, expression in (("start_system", start_values), ("start_jacobian", _nonzeros(chosen))):
         functions[name] = ca.Function(name, [*symbols, y], [ca.densify(ca.SX(expression))], [*arguments, "y"], [name])
     return functions, jacobian.sparsity(), chosen.sparsity()

@@ -101,15 +101,6 @@ def _start_not_found(one: Failure) -> ModelicaLikeError:
         return error
 
 
-def _not_steady(one: Failure) -> ModelicaLikeError:
-    found = not_steady(one.model, one.point)
-    if found is not None:
-        return found
-    if (one.before != one.point.d).any():
-        return unsettled(one.model, one.before, one.point.d)
-    return InitializationError(one.what, advice="Check that the drive has an equilibrium near its guesses.")
-
-
 def _step_too_small(one: Failure) -> ModelicaLikeError:
     return Integrator(one.model, one.options).failure(one.what, one.point)
 
@@ -172,7 +163,7 @@ WRITTEN: dict[Code, Callable[[Failure], ModelicaLikeError]] = {
     Code.START_NOT_MET: _start_not_met,
     Code.START_NOT_FOUND: _start_not_found,
     Code.START_NOT_SETTLED: lambda one: unsettled(one.model, one.before, one.point.d),
-    Code.NOT_STEADY: _not_steady,
+    Code.NOT_STEADY: lambda one: not_steady(one.model, one.point),
     Code.MODE_NOT_STEADY: lambda one: mode_not_steady(one.model, one.point, one.transition),
     Code.UNKNOWN_SINGULAR: lambda one: implicit_singular(one.model, one.point),
     Code.BLOCK_SINGULAR: lambda one: singular_block(one.model, one.point, one.place),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import weakref
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,13 @@ from modelica_like.compile.sliding import as_asked
 from modelica_like.errors import ModelicaLikeError, NotEnoughMemory, UnknownName, did_you_mean
 from modelica_like.fmi.interface import FmuVariable, interface
 from modelica_like.fmi.model_file import model_file
+from modelica_like.fmi.start_tables import start_tables
 from modelica_like.fmi.tables import make_tables
 from modelica_like.native.codes import Code
 from modelica_like.native.failures import Failure, error_of
 from modelica_like.native.library import MESSAGE_LENGTH, OK, POINT, library
 from modelica_like.options import Options
-from modelica_like.solve.initialize import Point, StartKind
+from modelica_like.solve.initialize import Point, StartKind, StartPlan
 from modelica_like.solve.recorder import Event
 
 
@@ -30,6 +31,7 @@ class NativeModel:
         model: the compiled model.
         start: kind of start, if instances compute it themselves; by default that of the netlist.
         fixed_step: of its instances in s, 0 for adaptive steps.
+        plan: which start values determine what; by default as the parameters and declared modes of the model ask for.
 
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.
@@ -37,10 +39,13 @@ class NativeModel:
         LanguageError: a function has no counterpart in C.
     """
 
-    def __init__(self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0) -> None:
+    def __init__(
+        self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0, plan: StartPlan | None = None
+    ) -> None:
         twin = model.twin(settings={**model.settings, **({"start": start} if start else {})})
         face = interface(twin)
-        data = model_file(make_tables(twin, face.start), face.variables, "{native}", Options.rtol, fixed_step)
+        tables = start_tables(twin, plan) if plan else face.start
+        data = model_file(make_tables(twin, tables), face.variables, "{native}", Options.rtol, fixed_step)
         self.library = library()
         message = ctypes.create_string_buffer(MESSAGE_LENGTH)
         self.address = self.library.open(data, len(data), message)
@@ -48,15 +53,18 @@ class NativeModel:
             raise ModelicaLikeError(message.value.decode())
         weakref.finalize(self, self.library.close, self.address)
         self.start: StartKind = twin.settings.get("start", "given")
+        self.plan = tables.plan
         self.variables = {one.name: one for one in face.variables}
         self.name, self.sizes = model.name, (len(model.states), len(model.implicit), model.discrete_size)
 
     @staticmethod
-    def of(model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0) -> NativeModel:
+    def of(
+        model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0, plan: StartPlan | None = None
+    ) -> NativeModel:
         """Return the cached one of the same model, for any parameter values."""
         model, kind = as_asked(model), start or model.settings.get("start", "given")
-        key = "native", kind, fixed_step, model.settings.get("on_chattering") == "rest"
-        return model.once(key, lambda: NativeModel(model, kind, fixed_step))
+        key = "native", kind, fixed_step, model.settings.get("on_chattering") == "rest", plan and plan.choice
+        return model.once(key, lambda: NativeModel(model, kind, fixed_step, plan))
 
     def references(self, names: Iterable[str]) -> np.ndarray[Any, np.dtype[np.uint32]]:
         """Return the value references of variables.
@@ -77,11 +85,13 @@ class Instance:
 
     Args:
         model: the compiled model; its parameters and inputs are those of the instance.
-        start, fixed_step: as of `NativeModel`.
+        start, fixed_step, plan: as of `NativeModel`.
     """
 
-    def __init__(self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0) -> None:
-        self.model, self.native = model, NativeModel.of(model, start, fixed_step)
+    def __init__(
+        self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0, plan: StartPlan | None = None
+    ) -> None:
+        self.model, self.native = model, NativeModel.of(model, start, fixed_step, plan)
         self.library = self.native.library
         self.address = self.library.new(self.native.address)
         if not self.address:
@@ -133,14 +143,29 @@ class Instance:
         )
         return x, d
 
+    def present(self) -> Point:
+        """Return where it stands."""
+        x, d = self.point()
+        nx = len(self.model.states)
+        return Point(self.time, x[:nx].copy(), x[nx:].copy(), d.copy())
+
+    @property
+    def failed(self) -> Code:
+        """What has failed last."""
+        return Code(self.library.failure(self.address, POINT()).contents.code)
+
     def limit(self, longest: float) -> None:
         """Limit steps from now on, in s."""
         self.library.limit(self.address, longest)
 
     def begin_at(self, point: Point) -> None:
         """Start at a consistent point, before its events."""
+        self.check(self.at(self.library.begin_at, point))
+
+    def at(self, function: Callable[..., int], point: Point) -> int:
+        """Call a function of the run-time that goes to a point, and return its code."""
         arrays = [np.ascontiguousarray(part, dtype=float) for part in (point.x, point.z, point.d)]
-        self.check(self.library.begin_at(self.address, *(_at(one) for one in arrays)))
+        return function(self.address, *(_at(one) for one in arrays))
 
     def counts(self) -> tuple[int, int, int, int]:
         """Steps, rejected steps, evaluations of the equations, and mode changes since the reset."""

@@ -19,7 +19,8 @@ from modelica_like.fmi.description import About, identifier, model_description
 from modelica_like.fmi.interface import Interface, fmi_name, interface
 from modelica_like.fmi.sources import LOG_CATEGORIES
 from modelica_like.language import Assembly
-from modelica_like.solve.initialize import call, initialize
+from modelica_like.native.start import initialize
+from modelica_like.solve.initialize import call
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLISTS = sorted(

@@ -23,8 +23,9 @@ from components import (
 from components.interfaces import LinearCompliantWithRelativeStates
 from modelica_like import simulate
 from modelica_like.language import Assembly, Component, Equations, Events, Hold, Mode, Parameter, all_of, der, param
+from modelica_like.native.start import initialize
 from modelica_like.netlist import load
-from modelica_like.solve.initialize import call, initialize
+from modelica_like.solve.initialize import call
 
 ROOT = Path(__file__).parents[2]
 

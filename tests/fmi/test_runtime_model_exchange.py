@@ -8,7 +8,7 @@ import pytest
 from fmpy import simulate_fmu
 
 from modelica_like import export_fmu, simulate
-from modelica_like.solve.initialize import initialize
+from modelica_like.native.start import initialize
 
 DRIVES = [
     "msl/rotational/CoupledClutches.toml",

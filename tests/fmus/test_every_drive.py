@@ -14,7 +14,7 @@ import pytest
 from modelica_like import build, simulate
 from modelica_like.compile.soon import TIME_RESOLUTION
 from modelica_like.fmi.validate import validate_fmu
-from modelica_like.solve.initialize import initialize
+from modelica_like.native.start import initialize
 
 SCRIPT = Path(__file__).parents[2] / "docs" / "importers.py"
 INSTANT = 1e-9

@@ -39,9 +39,9 @@ from modelica_like.language import (
     var,
 )
 from modelica_like.language.formula import parse_formula
+from modelica_like.native.start import initialize
 from modelica_like.show.report.run import notices
 from modelica_like.show.report.types import library_table
-from modelica_like.solve.initialize import initialize
 
 
 class Twist(Component, partial=True):

@@ -41,7 +41,7 @@ from modelica_like.language import (
     signal_in,
     var,
 )
-from modelica_like.solve.initialize import initialize
+from modelica_like.native.start import initialize
 from modelica_like.structure import reduce
 
 

@@ -18,7 +18,7 @@ from components import Capacitor, Ground, Inertia, Mass, ThermalMass
 from modelica_like import Assembly, Component, build, load
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.language.fields import Input, Output, Parameter
-from modelica_like.solve.initialize import initialize
+from modelica_like.native.start import initialize
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 END = 0.3

@@ -9,7 +9,8 @@ import pytest
 
 from modelica_like import build
 from modelica_like.language import Component
-from modelica_like.solve.initialize import Point, initialize
+from modelica_like.native.start import initialize
+from modelica_like.solve.initialize import Point
 
 sys.path.insert(0, str(Path(__file__).parent))
 

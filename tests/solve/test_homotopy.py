@@ -10,7 +10,7 @@ from fmpy import simulate_fmu
 from modelica_like import build, export_fmu, load, simulate
 from modelica_like.errors import InitializationError
 from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, homotopy, param, var
-from modelica_like.solve.initialize import initialize
+from modelica_like.native.start import initialize
 
 ROOT = -(cbrt(1 + sqrt(19 / 27)) + cbrt(1 - sqrt(19 / 27)))
 """The real root of x^3 - 2x + 2 (Cardano), from which Newton's method keeps away between 0 and 1 for ever."""

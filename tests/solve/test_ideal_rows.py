@@ -16,7 +16,8 @@ from components import (
     Resistor,
 )
 from modelica_like import build
-from modelica_like.solve.initialize import Point, call, initialize, solve_implicit
+from modelica_like.native.start import initialize
+from modelica_like.solve.initialize import Point, call, solve_implicit
 from modelica_like.solve.initialize import ideal as module
 from modelica_like.solve.initialize.ideal import _dependences, replace_dependent
 from modelica_like.structure.ideal import HEAD, IdealElement, IdealNetwork

@@ -1,13 +1,9 @@
 """Start values of nonlinear equations, and the modes that follow from start values."""
 
 import math
-from types import SimpleNamespace
-from typing import Any
 
-import numpy as np
 import pytest
 
-import modelica_like.solve.initialize.modes as module
 from components import Clutch, ConstantTorque, Inertia
 from modelica_like import simulate
 from modelica_like.errors import InitializationError, SingularAtStart
@@ -26,8 +22,6 @@ from modelica_like.language import (
     series,
     var,
 )
-from modelica_like.solve.initialize import Point
-from modelica_like.solve.initialize.modes import chosen_modes, started
 
 # -- nonlinear -------------------------------------------------------------------------------------------------------
 
@@ -169,35 +163,6 @@ def test_discrete_values_start_from_numbers_quantities_and_formulas():
     run = simulate(Counter(), 1.0, points=1, parameters={"period": "1 s"})
     assert run.final["follows"] == 2.0
     assert simulate(Counter(number=7), 1.0, points=1).final["x"] == 7.0
-
-
-def test_discrete_values_at_the_start_follow_from_modes_and_their_own_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first true condition of a mode wins, else its declared start; of updates, the rows at the start count."""
-    rows = [(3, True), (2, False), (4, True)]
-    modes = [(0, 5, None), (1, 6, None), (0, 7, None), (1, 8, None), (1, 9, None), (2, 10, None)]
-    model: Any = SimpleNamespace(start_conditions="conditions", discrete_starts="starts", updates="updates")
-    model.start_modes = modes
-    model.update_rows = [SimpleNamespace(reset=SimpleNamespace(index=k), at_start=one) for k, one in rows]
-    point = Point(2.0, np.array([3.0]), np.array([4.0]), np.array([1.0, 2.0, 30.0, 40.0, 50.0, 60.0]))
-    d = point.d.tolist()
-
-    def call(owner: Any, function: str, at: Point) -> np.ndarray:
-        assert owner is model
-        assert (at.t, at.x.tolist(), at.z.tolist()) == (2.0, [3.0], [4.0])
-        if function == "conditions":
-            return np.array([1.0, 0.0, 1.0, 1.0, 1.0, 0.0])
-        if function == "starts":
-            assert at.d.tolist() == d
-            return np.array([-1.0, -2.0, -30.0, -40.0, -50.0, -60.0])
-        assert at.d.tolist() == [5.0, 8.0, -30.0, -40.0, -50.0, 60.0]
-        return np.array([300.0, 200.0, 400.0])
-
-    monkeypatch.setattr(module, "call", call)
-    assert chosen_modes(model, point).tolist() == [5.0, 8.0, -30.0, 40.0, 50.0, 60.0]
-    assert started(model, point).tolist() == [5.0, 8.0, -30.0, 300.0, 400.0, 60.0]
-    model.update_rows = []
-    assert started(model, point).tolist() == [5.0, 8.0, -30.0, 40.0, 50.0, 60.0]
-    assert point.d.tolist() == d
 
 
 @pytest.mark.parametrize("speed", [-1000.0, 1000.0])

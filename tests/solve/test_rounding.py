@@ -19,9 +19,9 @@ import pytest
 from modelica_like import simulate, steady
 from modelica_like.compile import CompiledDae, compile
 from modelica_like.flatten import flatten
+from modelica_like.native.start import initialize
 from modelica_like.netlist.document import parse, read_text
 from modelica_like.netlist.read import assemble
-from modelica_like.solve.initialize import initialize
 from modelica_like.solve.recorder import Event
 from modelica_like.structure import reduce
 

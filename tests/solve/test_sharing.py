@@ -9,7 +9,7 @@ import pytest
 from components import Clutch, ConstantTorque, Fixed, Inertia
 from modelica_like import Assembly, build
 from modelica_like.language.holding import UNLIMITED
-from modelica_like.solve.initialize import initialize
+from modelica_like.native.start import initialize
 from modelica_like.solve.initialize.holds import Strike, _capacities, rest
 
 

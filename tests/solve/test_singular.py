@@ -11,7 +11,7 @@ from modelica_like import build
 from modelica_like.errors import SingularAtStart, Source
 from modelica_like.flatten.model import Origin
 from modelica_like.language import Component, Equations, Parameter, Variable, der, param, sin, sqrt, var
-from modelica_like.solve.initialize import initialize
+from modelica_like.native.start import initialize
 from modelica_like.solve.initialize.plan import _generic_matrix
 from modelica_like.solve.initialize.singular import _ANOTHER, _singular, implicit_singular, is_regular, singular_block
 from modelica_like.solve.initialize.slopes import Sizes, implicit_slopes, variable_slopes

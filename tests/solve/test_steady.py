@@ -1,24 +1,18 @@
-"""Steady states: Newton's method, conserved quantities, modes that do not stay; against closed forms."""
+"""Steady states: Newton's method, conserved quantities, derivatives; against closed forms."""
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from modelica_like import build
-from modelica_like.errors import InitializationError, Source
+from modelica_like.errors import InitializationError
 from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, sqrt, var
-from modelica_like.solve.initialize import initialize, steady
+from modelica_like.native.start import initialize
+from modelica_like.solve.initialize import steady
 from modelica_like.solve.initialize.kept import Kept
 from modelica_like.solve.initialize.point import Point
-from modelica_like.solve.initialize.steady import (
-    check_modes_hold,
-    modes_between,
-    moving_states,
-    solve_steady,
-    steady_change,
-)
+from modelica_like.solve.initialize.steady import moving_states, steady_change
 
 
 class Levels(Component):
@@ -57,18 +51,6 @@ def test_newton_finds_the_next_root_and_keeps_what_is_conserved(begins: float, r
     (z,) = [one.real for one in np.roots([1, 0, 1, -root - 4.5]) if abs(one.imag) < 1e-9]
     assert point.z == pytest.approx([z], rel=1e-13)
     assert [model.states[k] for k in moving_states(model)] == ["a", "b", "c"]
-
-
-@pytest.mark.parametrize(("error", "steps"), [(4e-7, 2), (-4e-7, 2), (1e-6, 3)])
-def test_newton_ends_when_only_rounding_moves(monkeypatch: pytest.MonkeyPatch, error: float, steps: int) -> None:
-    """A step leaves a quarter of the squared error: 4e-14 is rounding, 2.5e-13 is not."""
-    model, point = levels(6.0)
-    calls: list[int] = []
-    function = steady._steady_function(model)
-    monkeypatch.setattr(steady, "_steady_function", lambda _: lambda *at: calls.append(1) or function(*at))
-    point.x[model.states.index("a")] += error
-    solve_steady(model, point)
-    assert len(calls) == steps + 1  # and the residual at the end
 
 
 def told(model: Component) -> str:
@@ -161,71 +143,3 @@ def test_changes_of_a_steady_state(monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_allclose(changed(), free + by_r, atol=1e-13)
     of_s = np.outer([0.0, 0.0, 0.0, -2.0], [0.0, 1.0, 1.0, 1.0])
     np.testing.assert_allclose(changed(moved), free + by_r + of_s, atol=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "present", "chosen", "wanted"),
-    [
-        (1.0, -2.0, 0, 2, 1),  # it turns: between lies rest
-        (-1.0, 0.2, 2, 0, 1),
-        (1.0, 2.0, 0, 2, 2),
-        (-1.0, -2.0, 2, 0, 0),
-        (0.5, 0.5, 0, 2, 2),
-        (0.0, 2.0, 0, 2, 2),
-        (1.0, 0.0, 0, 2, 2),
-        (1.0, -2.0, 0, 0, 0),  # its mode stays
-        (1.0, -2.0, 0, 1, 1),
-        (1.0, -2.0, 1, 2, 1),
-    ],
-)
-def test_what_turns_on_the_way_rests(
-    monkeypatch: pytest.MonkeyPatch, before: float, after: float, present: int, chosen: int, wanted: int
-) -> None:
-    """Of two motions the second one stays as it is; mode 1 holds."""
-    holds = [SimpleNamespace(motion=k, mode=k, number=1) for k in (2, 1)]
-    model: Any = SimpleNamespace(holds=holds, variables=SimpleNamespace())
-    begin: Any = SimpleNamespace(values=np.array([9.0, 1.0, before]))
-    end: Any = SimpleNamespace(values=np.array([-9.0, 1.0, after]), d=np.array([3.0, 0.0, present]))
-
-    def values(*given: Any) -> np.ndarray:
-        assert given[:2] == (model, model.variables)
-        return given[2].values
-
-    monkeypatch.setattr(steady, "call", values)
-    modes = np.array([3.0, 2.0, chosen])
-    assert modes_between(model, begin, end, modes).tolist() == [3.0, 2.0, wanted]
-    assert modes.tolist() == [3.0, 2.0, chosen]
-
-
-@pytest.mark.parametrize(
-    ("changes", "leaves"),
-    [
-        ({}, True),
-        ({"timed": True}, False),
-        ({"sources": (0, 2)}, False),
-        ({"target": 1}, False),
-        ({"index": 0}, False),  # its guard is negative
-        ({"index": 1}, False),  # zero: at the limit, it stays
-        ({"index": 3}, True),
-    ],
-)
-def test_a_mode_that_ends_at_once_is_told(monkeypatch: pytest.MonkeyPatch, changes: Any, leaves: bool) -> None:
-    """The last transition counts; the first one is of a mode that is not present."""
-    model: Any = SimpleNamespace(guards=SimpleNamespace())
-    given = {"mode": 1, "timed": False, "sources": (1,), "target": 2, "index": 2, "source": Source("drive.toml")}
-    other = {**given, "mode": 0}
-    model.transitions = [SimpleNamespace(**{**one, **changes}) for one in (other, given)]
-    names = ("forward", "stuck", "backward")
-    model.flat_discretes = [SimpleNamespace(path=path, names=names) for path in ("a.mode", "b.mode")]
-    point: Any = SimpleNamespace(t=2.0, d=np.array([3.0, 1.0]))
-
-    def guards(*given: Any) -> np.ndarray:
-        assert given == (model, model.guards, point)
-        return np.array([-1.0, 0.0, 2.0, 0.5])
-
-    monkeypatch.setattr(steady, "call", guards)
-    if leaves:
-        with pytest.raises(InitializationError, match=r"at t = 2 s: b\.mode does not stay stuck\."):
-            check_modes_hold(model, point)
-    else:
-        check_modes_hold(model, point)

@@ -10,9 +10,10 @@ from modelica_like.analyse.linear.model import LinearModel
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError
 from modelica_like.language.units import ONE, parse_unit, to_si
+from modelica_like.native.start import initialize
 from modelica_like.runs.solution import Solution
 from modelica_like.simulation import Model, build, simulate
-from modelica_like.solve.initialize import Point, StartKind, initialize
+from modelica_like.solve.initialize import Point, StartKind
 from modelica_like.solve.initialize.slopes import columns_of, nodes_of, slopes
 
 Drive = Model | Solution

@@ -11,11 +11,12 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import to_si
+from modelica_like.native.start import initialize, steady_near
 from modelica_like.runs.trajectories import Trajectories
 from modelica_like.simulation import Model, build
-from modelica_like.solve.initialize import Point, call, holding, initialize
+from modelica_like.solve.initialize import Point, call, holding
 from modelica_like.solve.initialize.slopes import Sizes, columns_of, nodes_of, slopes
-from modelica_like.solve.initialize.steady import check_modes_hold, solve_steady, steady_change
+from modelica_like.solve.initialize.steady import steady_change
 from modelica_like.upper import Shown
 
 _MAX_NEWTON = 40
@@ -131,14 +132,11 @@ def steady(
 def _settle(model: CompiledDae, near: Point | None) -> Point:
     if near is None:
         return initialize(model, 0.0, "steady")
-    point = near.copy()
     try:
-        solve_steady(model, point)
-        check_modes_hold(model, point)
+        return steady_near(model, near)
     except InitializationError:
         # The modes of the neighbour are not valid here.
         return initialize(model, 0.0, "steady")
-    return point
 
 
 class _Target:

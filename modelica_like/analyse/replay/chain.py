@@ -25,8 +25,9 @@ from modelica_like.analyse.replay.when import Coincidence, event_time
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import TERMINAL, CompiledDae
 from modelica_like.errors import LanguageError, NoGradient
+from modelica_like.native.start import initialize
 from modelica_like.runs.solution import Solution
-from modelica_like.solve.initialize import Point, StartKind, holding, initialize
+from modelica_like.solve.initialize import Point, StartKind, holding
 from modelica_like.solve.initialize.slopes import Sizes
 from modelica_like.solve.recorder import Event, Segment
 

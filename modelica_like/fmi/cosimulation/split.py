@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from modelica_like import upper
 from modelica_like.errors import DuplicateName, NetlistError
 from modelica_like.fmi.cosimulation.cut import Cut, CutNetlist, cut_netlist
 from modelica_like.fmi.cosimulation.files import write_system
@@ -21,7 +22,6 @@ from modelica_like.language import Assembly, Component
 from modelica_like.netlist import load, save
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.simulation import build, seconds
-from modelica_like.solve.initialize import initialize
 from modelica_like.writing import check_writable
 
 Report = Callable[[str], None]
@@ -169,7 +169,7 @@ def _some(group: Sequence[str]) -> str:
 def _start_values(assembly: Assembly) -> dict[str, float]:
     """Return all variables of the whole drive at its start, in SI units."""
     whole = build(assembly)
-    point = initialize(whole, 0.0, whole.settings.get("start", "given"))
+    point = upper.initialize(whole, 0.0, whole.settings.get("start", "given"))
     column = whole.variables(point.t, point.x, point.z, whole.p, whole.u, point.d).full().ravel()
     return {variable.path: float(value) for variable, value in zip(whole.flat_variables, column, strict=True)}
 

@@ -14,9 +14,10 @@ from modelica_like import upper
 from modelica_like.compile import CompiledDae
 from modelica_like.errors import MissingStart
 from modelica_like.language import Component
+from modelica_like.native.start import initialize
 from modelica_like.options import Options
 from modelica_like.show.report.tables import table
-from modelica_like.solve.initialize import Point, StartKind, StartPlan, call, initialize, start_plan
+from modelica_like.solve.initialize import Point, StartKind, StartPlan, call, start_plan
 from modelica_like.solve.initialize.plan import matrix_and_values, start_name
 
 _AT_ONCE = 64

@@ -52,6 +52,11 @@ class StartPlan:
         """Number of explicit and implicit equations at the beginning of the start system."""
         return len(self.wanted) - len(self.rows) - len(self.resting)
 
+    @property
+    def choice(self) -> tuple[tuple[int, ...], ...]:
+        """All that tells it from other plans of the same model and kind."""
+        return self.rows, self.dependent, self.resting, self.zero, self.columns, self.wanted
+
     @cached_property
     def _part(self) -> tuple[ca.Sparsity, Any]:
         """Pattern of the wanted rows and columns, and positions of its entries in the system's Jacobian."""

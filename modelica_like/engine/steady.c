@@ -1,0 +1,222 @@
+/* Steady starts: all derivatives are zero, except those of states on which nothing depends. They are sought near the
+ * guesses, and else where a drive settles that runs from there in steps of time that grow without bound. */
+#include "core.h"
+
+#define MAX_NEWTON 50
+#define STEADY 1e-6    /* the largest rate, in SI units, that counts as none */
+#define MOST_DENSE 200 /* unknowns with which a drive settles: with more, steps with dense matrices take minutes */
+/* Steps in s: the first one, one that only a settled drive bears, one that nothing bears, the longest after an event,
+ * as coarse ones overshoot and switch for ever. */
+#define FIRST_STEP 1e-4
+#define LAST_STEP 1e6
+#define LEAST_STEP 1e-12
+#define STEP_AFTER_EVENT 1e-3
+/* Steps grow by this factor, by less with every event, and shrink where they fail. */
+#define GROWTH 3.0
+#define LEAST_GROWTH 1.2
+#define CAUTION 0.8
+#define SHRINKAGE 10.0
+#define MOST_STEPS 1000
+#define MOST_ITERATIONS 8
+#define MOST_ROUNDS_OF_STEP 10
+#define STEP_FOUND 1e-9 /* change by Newton's method after which only the end of all counts: it is but a guess */
+
+/* Rates of moving states and residuals of implicit equations, and their slopes by these unknowns, row by row. Tells
+ * whether they are finite. */
+static int steady_equations(Instance *c, double *slopes, double *values) {
+    const Model *m = c->model;
+    int n = m->n_steady, *place = c->steady_places, finite = 1;
+    evaluate_now(c, &m->tapes.rates, c->rhs);
+    tape_run(&m->tapes.jacobian, c->slots, c->jacobian);
+    memset(c->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
+    memset(slopes, 0, (size_t)n * (size_t)n * sizeof(double));
+    for (int k = 0; k < m->n_jacobian; k++) c->matrix[m->jacobian_to_step[k]] = c->jacobian[k];
+    for (int i = 0; i < m->n_unknowns; i++) place[i] = -1;
+    for (int i = 0; i < n; i++) {
+        place[m->steady[i]] = i;
+        values[i] = c->rhs[m->steady[i]];
+        finite &= isfinite(values[i]) != 0;
+    }
+    for (int j = 0; j < n; j++)
+        for (int k = m->step.colind[m->steady[j]]; k < m->step.colind[m->steady[j] + 1]; k++) {
+            if (place[m->step.row[k]] < 0) continue;
+            slopes[(size_t)place[m->step.row[k]] * n + j] = c->matrix[k];
+            finite &= isfinite(c->matrix[k]) != 0;
+        }
+    return finite;
+}
+
+/* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. */
+static Result solve_steady(Instance *c) {
+    const Model *m = c->model;
+    int n = m->n_steady;
+    double *slopes = c->square, *values = c->vector, *step = c->point;
+    for (int round = 0; round < MAX_NEWTON && n > 0; round++) {
+        double change = 0;
+        if (!steady_equations(c, slopes, values)) break;
+        keeping_least_squares(n, n - m->n_z, slopes, slopes + (size_t)n * (size_t)n, values, step);
+        for (int j = 0; j < n; j++) {
+            c->x[m->steady[j]] -= step[j];
+            change = fmax(change, fabs(step[j]));
+        }
+        if (change <= 1e-13) break;
+    }
+    evaluate_now(c, &m->tapes.rates, c->rhs);
+    for (int k = 0; k < n; k++)
+        if (!(fabs(c->rhs[m->steady[k]]) <= STEADY)) return fail(c, NOT_STEADY, c->state.t);
+    return RESULT_OK;
+}
+
+/* What modes hold stops, with the least change of the states. */
+static void stand_still(Instance *c) {
+    int count = 0;
+    if (c->model->n_holds == 0) return;
+    find_held(c, c->terms, c->held);
+    for (int k = 0; k < c->model->n_holds; k++)
+        if (c->held[k]) c->standing[count++] = c->model->holds[k].motion;
+    if (count > 0) move_states(c, c->standing, NULL, count);
+}
+
+static int guard_fires(const Instance *c, const Transition *one) {
+    return !one->timed && is_source(c, one) && c->guards_before[one->index] > 0;
+}
+
+/* Surfaces that stick against too large a torque are not in equilibrium. */
+static Result check_modes_hold(Instance *c) {
+    const Model *m = c->model;
+    if (m->n_guards == 0) return RESULT_OK;
+    evaluate_now(c, &m->tapes.guards, c->guards_before);
+    for (int k = 0; k < m->n_transitions; k++)
+        if (guard_fires(c, &m->transitions[k]) && m->transitions[k].target != (int)c->d[m->transitions[k].mode])
+            return fail(c, MODE_NOT_STEADY, c->state.t, k);
+    return RESULT_OK;
+}
+
+/* The steady state of the present modes near the present point. */
+Result steady_near(Instance *c) {
+    stand_still(c);
+    return solve_steady(c) && check_modes_hold(c);
+}
+
+/* States and modes of a steady state; states have their fixed start values, or also defaults, before each round. */
+Result find_steady(Instance *c, int fixed, int defaults) {
+    const Model *m = c->model;
+    share(c);
+    for (int round = 0; round < MODE_ROUNDS; round++) {
+        if (defaults) apply_defaults(c);
+        if (fixed && !apply_fixed(c)) return RESULT_ERROR;
+        variables_now(c);
+        for (int k = 0; k < m->n_holds; k++) c->begun[k] = c->variables[m->holds[k].motion];
+        stand_still(c);
+        if (!solve_steady(c)) return RESULT_ERROR;
+        if (!choose_start_modes(c, c->begun, 0)) return complete_start(c) && check_modes_hold(c);
+        share(c);
+    }
+    return fail(c, START_NOT_SETTLED, 0);
+}
+
+/* One step by Euler's implicit method; 0 where Newton's method does not find it. */
+static int step_settling(Instance *c, const double *begin, double step) {
+    const Model *m = c->model;
+    int n = m->n_steady, states = n - m->n_z;
+    double *slopes = c->square, *values = c->vector;
+    for (int round = 0; round < MOST_ITERATIONS; round++) {
+        double change = 0;
+        if (!steady_equations(c, slopes, values)) return 0;
+        for (int i = 0; i < states; i++) {
+            values[i] = c->x[m->steady[i]] - begin[m->steady[i]] - step * values[i];
+            for (int j = 0; j < n; j++) slopes[(size_t)i * n + j] = (i == j) - step * slopes[(size_t)i * n + j];
+        }
+        /* Rows count as columns here. A long step is nearly singular by design; what is not finite tells if it is. */
+        lu_factor(n, slopes, c->steady_order);
+        lu_solve_transposed(n, slopes, c->steady_order, values);
+        for (int j = 0; j < n; j++) {
+            double *x = &c->x[m->steady[j]];
+            *x -= values[j];
+            change = fmax(change, isfinite(*x) ? fabs(values[j]) / (1 + fabs(*x)) : INFINITY);
+        }
+        if (change < STEP_FOUND) return 1;
+    }
+    return 0;
+}
+
+/* Fires transitions, of each mode the first, with the states they reset; tells whether a mode changed. */
+static int fire_settling(Instance *c) {
+    const Model *m = c->model;
+    int changed = 0;
+    evaluate_now(c, &m->tapes.guards, c->guards_before);
+    if (m->n_resets > 0) evaluate_now(c, &m->tapes.resets, c->reset_values);
+    memset(c->decided, 0, (size_t)m->n_d);
+    memcpy(c->x_kept, c->x, (size_t)m->n_x * sizeof(double));
+    for (int k = 0; k < m->n_transitions; k++) {
+        const Transition *one = &m->transitions[k];
+        if (c->decided[one->mode] || !guard_fires(c, one)) continue;
+        changed |= c->d[one->mode] != one->target;
+        c->decided[one->mode] = 1;
+        c->d[one->mode] = one->target;
+        for (const Reset *r = m->resets; r < m->resets + m->n_resets; r++)
+            if (r->transition == k && r->place < m->n_x) c->x[r->place] = c->reset_values[r->value] / r->factor;
+    }
+    if (!changed) memcpy(c->x, c->x_kept, (size_t)m->n_x * sizeof(double));
+    return changed;
+}
+
+/* Runs until nothing changes; transitions fire at the ends of steps. It is no simulation: only the end counts. */
+static Result settle_down(Instance *c) {
+    const Model *m = c->model;
+    double step = FIRST_STEP, growth = GROWTH;
+    if (m->n_unknowns > MOST_DENSE || !solve_now(c, 0)) return RESULT_ERROR;
+    for (int k = 0; k < MOST_STEPS; k++) {
+        const double *kept = keep_start(c, KEPT_SETTLING);
+        int found = step_settling(c, kept, step), fired;
+        for (int round = 0; round < MOST_ROUNDS_OF_STEP && found && fire_settling(c); round++) {
+            share(c);
+            stand_still(c);
+            found = solve_now(c, 0);
+        }
+        fired = memcmp(kept + m->n_unknowns, c->d, (size_t)m->n_d * sizeof(double)) != 0;
+        if (!found) {
+            take_start(c, KEPT_SETTLING);
+            step /= SHRINKAGE;
+            if (step < LEAST_STEP) return RESULT_ERROR;
+        } else if (fired) {
+            step = fmin(step, STEP_AFTER_EVENT);
+            growth = fmax(growth * CAUTION, LEAST_GROWTH);
+        } else if (step >= LAST_STEP) return RESULT_OK;
+        else step *= growth;
+    }
+    return RESULT_ERROR;
+}
+
+/* From the modes that guesses choose, or from those that are declared, except which way surfaces slide: nothing but
+ * the guesses can tell that. */
+static Result find_near_guesses(Instance *c, int declared) {
+    begin_start(c);
+    apply_defaults(c);
+    if (!apply_fixed(c)) return RESULT_ERROR;
+    choose_start_modes(c, NULL, declared);
+    return find_steady(c, 1, 1);
+}
+
+static Result find_where_it_settles(Instance *c) {
+    begin_start(c);
+    apply_defaults(c);
+    if (!apply_fixed(c)) return RESULT_ERROR;
+    choose_start_modes(c, NULL, 0);
+    share(c);
+    if (!settle_down(c)) return RESULT_ERROR;
+    choose_start_modes(c, NULL, 0);
+    return find_steady(c, 1, 0);
+}
+
+/* Guesses may drive a controller into its limits, and from there only the other limit is found, or nothing. If nothing
+ * is found in any way, the first one tells why. */
+Result start_steady(Instance *c) {
+    if (find_near_guesses(c, 0)) return RESULT_OK;
+    Refusal first = c->tried;
+    keep_start(c, KEPT_FAILED);
+    if (find_near_guesses(c, 1) || find_where_it_settles(c)) return RESULT_OK;
+    take_start(c, KEPT_FAILED);
+    c->tried = first;
+    return RESULT_ERROR;
+}
