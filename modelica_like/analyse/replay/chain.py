@@ -289,7 +289,7 @@ class _Maker:
         whole = np.concatenate([begin_x, np.eye(size.fixed), begin_d])
         work = Work.at(self.model, point)
         work.resting.update(holding(self.model, point))
-        work.share()
+        work.differentiate_shares()
         chances = work.chances()
         start_x, start_d = begin_x, work.d @ whole
         if changes:

@@ -231,13 +231,16 @@ class Work:
 
     def share(self) -> None:
         """Let elements share what they hold together, and solve the implicit equations."""
-        model, columns = self.model, self.x.shape[1]
-        share(model, self.point)
-        solve_implicit(model, self.point)
-        for circuit in model.circuits:
+        share(self.model, self.point)
+        solve_implicit(self.model, self.point)
+        self.differentiate_shares()
+
+    def differentiate_shares(self) -> None:
+        """Derivatives of the shares at the present point."""
+        for circuit in self.model.circuits:
             entries = circuit.entries
             self.d[entries] = 0.0
-            self.d[entries] = share_slopes(model, self.point, circuit, columns, self._total)
+            self.d[entries] = share_slopes(self.model, self.point, circuit, self.x.shape[1], self._total)
 
     def _stop_motions(self, before: Vector, *, later: bool) -> None:
         """Stop what modes have begun to hold since `before`, also where it stands still already.
