@@ -262,8 +262,7 @@ Result apply_fixed(Instance *c);
 void apply_defaults(Instance *c);
 int choose_start_modes(Instance *c, const double *begun, int declared);
 Result complete_start(Instance *c);
-const double *keep_start(Instance *c, KeptStart which);
-void take_start(Instance *c, KeptStart which);
+const double *keep_start(Instance *c, KeptStart which, int back);
 /* steady.c */
 Result start_steady(Instance *c);
 Result find_steady(Instance *c, int fixed, int defaults);

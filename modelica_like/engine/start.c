@@ -29,28 +29,13 @@ Result apply_fixed(Instance *c) {
     return RESULT_OK;
 }
 
-/* Points to come back to: states and implicit unknowns, d, and d before. */
-static double *kept_start(Instance *c, KeptStart which, size_t *n, size_t *n_d) {
-    *n = (size_t)c->model->n_unknowns;
-    *n_d = (size_t)c->model->n_d;
-    return c->kept_starts + which * (*n + 2 * *n_d);
-}
-
-const double *keep_start(Instance *c, KeptStart which) {
-    size_t n, n_d;
-    double *kept = kept_start(c, which, &n, &n_d);
-    memcpy(kept, c->x, n * sizeof(double));
-    memcpy(kept + n, c->d, n_d * sizeof(double));
-    memcpy(kept + n + n_d, c->d_before, n_d * sizeof(double));
+/* Keeps the present point: states and implicit unknowns, d, d before; or goes back to the kept one. Returns that. */
+const double *keep_start(Instance *c, KeptStart which, int back) {
+    size_t n = (size_t)c->model->n_unknowns, n_d = (size_t)c->model->n_d, sizes[] = {n, n_d, n_d};
+    double *kept = c->kept_starts + which * (n + 2 * n_d), *next = kept, *parts[] = {c->x, c->d, c->d_before};
+    for (int k = 0; k < 3; next += sizes[k++])
+        memcpy(back ? parts[k] : next, back ? next : parts[k], sizes[k] * sizeof(double));
     return kept;
-}
-
-void take_start(Instance *c, KeptStart which) {
-    size_t n, n_d;
-    const double *kept = kept_start(c, which, &n, &n_d);
-    memcpy(c->x, kept, n * sizeof(double));
-    memcpy(c->d, kept + n, n_d * sizeof(double));
-    memcpy(c->d_before, kept + n + n_d, n_d * sizeof(double));
 }
 
 /* Guesses, or defaults: they contradict nothing. */
@@ -209,12 +194,13 @@ static Result lead(Instance *c) {
     begin_start(c);
     if (!(steady ? start_steady(c) : find_start(c))) return RESULT_ERROR;
     while (place >= 0 && c->d[place] < 1) {
-        keep_start(c, KEPT_LED);
+        keep_start(c, KEPT_LED, 0);
         c->d[place] = fmin(c->d[place] + step, 1);
+        share(c);
         if (steady ? find_steady(c, 0, 0) : find_start(c)) continue;
         step /= 2;
         if (step < LEAST_SHARE) return RESULT_ERROR;
-        take_start(c, KEPT_LED);
+        keep_start(c, KEPT_LED, 1);
     }
     return RESULT_OK;
 }

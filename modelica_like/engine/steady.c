@@ -98,10 +98,10 @@ Result steady_near(Instance *c) {
     return solve_steady(c) && check_modes_hold(c);
 }
 
-/* States and modes of a steady state; states have their fixed start values, or also defaults, before each round. */
+/* States and modes of a steady state, from modes whose shares are known; states have their fixed start values, or also
+ * defaults, before each round. */
 Result find_steady(Instance *c, int fixed, int defaults) {
     const Model *m = c->model;
-    share(c);
     for (int round = 0; round < MODE_ROUNDS; round++) {
         if (defaults) apply_defaults(c);
         if (fixed && !apply_fixed(c)) return RESULT_ERROR;
@@ -167,7 +167,7 @@ static Result settle_down(Instance *c) {
     double step = FIRST_STEP, growth = GROWTH;
     if (m->n_unknowns > MOST_DENSE || !solve_now(c, 0)) return RESULT_ERROR;
     for (int k = 0; k < MOST_STEPS; k++) {
-        const double *kept = keep_start(c, KEPT_SETTLING);
+        const double *kept = keep_start(c, KEPT_SETTLING, 0);
         int found = step_settling(c, kept, step), fired;
         for (int round = 0; round < MOST_ROUNDS_OF_STEP && found && fire_settling(c); round++) {
             share(c);
@@ -176,7 +176,7 @@ static Result settle_down(Instance *c) {
         }
         fired = memcmp(kept + m->n_unknowns, c->d, (size_t)m->n_d * sizeof(double)) != 0;
         if (!found) {
-            take_start(c, KEPT_SETTLING);
+            keep_start(c, KEPT_SETTLING, 1);
             step /= SHRINKAGE;
             if (step < LEAST_STEP) return RESULT_ERROR;
         } else if (fired) {
@@ -188,35 +188,30 @@ static Result settle_down(Instance *c) {
     return RESULT_ERROR;
 }
 
-/* From the modes that guesses choose, or from those that are declared, except which way surfaces slide: nothing but
- * the guesses can tell that. */
-static Result find_near_guesses(Instance *c, int declared) {
+/* With the modes that guesses choose, or with those that are declared, except which way surfaces slide: nothing but the
+ * guesses can tell that. */
+static Result begin_at_guesses(Instance *c, int declared) {
     begin_start(c);
     apply_defaults(c);
     if (!apply_fixed(c)) return RESULT_ERROR;
     choose_start_modes(c, NULL, declared);
-    return find_steady(c, 1, 1);
-}
-
-static Result find_where_it_settles(Instance *c) {
-    begin_start(c);
-    apply_defaults(c);
-    if (!apply_fixed(c)) return RESULT_ERROR;
-    choose_start_modes(c, NULL, 0);
     share(c);
-    if (!settle_down(c)) return RESULT_ERROR;
-    choose_start_modes(c, NULL, 0);
-    return find_steady(c, 1, 0);
+    return RESULT_OK;
 }
 
 /* Guesses may drive a controller into its limits, and from there only the other limit is found, or nothing. If nothing
  * is found in any way, the first one tells why. */
 Result start_steady(Instance *c) {
-    if (find_near_guesses(c, 0)) return RESULT_OK;
+    if (begin_at_guesses(c, 0) && find_steady(c, 1, 1)) return RESULT_OK;
     Refusal first = c->tried;
-    keep_start(c, KEPT_FAILED);
-    if (find_near_guesses(c, 1) || find_where_it_settles(c)) return RESULT_OK;
-    take_start(c, KEPT_FAILED);
+    keep_start(c, KEPT_FAILED, 0);
+    if (begin_at_guesses(c, 1) && find_steady(c, 1, 1)) return RESULT_OK;
+    if (begin_at_guesses(c, 0) && settle_down(c)) {
+        choose_start_modes(c, NULL, 0);
+        share(c);
+        if (find_steady(c, 1, 0)) return RESULT_OK;
+    }
+    keep_start(c, KEPT_FAILED, 1);
     c->tried = first;
     return RESULT_ERROR;
 }

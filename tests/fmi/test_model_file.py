@@ -90,7 +90,7 @@ def test_damage_is_told(reader):
     count = len(SECTIONS)
     newer = data[:8] + struct.pack("<i", 99) + data[12:]
     assert told(reader, newer) == (
-        f"The model file has format 99 with {count} tables, but this library reads format 9 with {count}. {AGAIN}"
+        f"The model file has format 99 with {count} tables, but this library reads format 10 with {count}. {AGAIN}"
     )
     number = list(SECTIONS).index("variables")
     offset = struct.unpack_from("<4i", data, 24 + 16 * number)[2]
