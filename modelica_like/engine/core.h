@@ -255,7 +255,7 @@ double input_at(const Instance *c, int k, double t);
 /* start.c */
 void start_values(Instance *c);
 Result start_solve(Instance *c);
-void choose_modes(Instance *c);
+void choose_loose(Instance *c, const unsigned char *loose);
 #define MODE_ROUNDS 5 /* in which modes and start values settle */
 void begin_start(Instance *c);
 Result apply_fixed(Instance *c);
@@ -286,6 +286,7 @@ Result refuse_contradiction(Instance *c);
 Result renew(Instance *c);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before);
+Result strike_here(Instance *c, const unsigned char *entering, unsigned char *knocked, int *hard);
 /* delay.c */
 #define MOST_PAST 16384 /* rows */
 void keep_past(Instance *c, double t, const double *point, double order);

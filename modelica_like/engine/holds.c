@@ -1,6 +1,4 @@
-/* Motions that modes hold, as in solve/initialize/holds.py: which they are, and how elements share what they hold.
- * Behind them ideal elements, as in solve/initialize/ideal.py: equations that replace dependent ones, impulses,
- * conditions on states. */
+/* Motions that modes hold: which they are, and how elements share what they hold. */
 #include "core.h"
 
 #define DEPENDENT 1e-9

@@ -1,6 +1,5 @@
-/* Impacts, as in solve/initialize/holds.py: motions that modes begin to hold are stopped by an impulse. Behind them
- * ideal elements, as in solve/initialize/ideal.py: equations that replace dependent ones, impulses, conditions on
- * states. */
+/* Impacts: motions that modes begin to hold are stopped by an impulse. Behind them ideal elements: equations that
+ * replace dependent ones, impulses, conditions on states. */
 #include "core.h"
 
 #define INSTANT 1e-9 /* duration of an impact; finite forces cancel whatever it is */
@@ -142,29 +141,6 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
     return RESULT_OK;
 }
 
-/* What the impact knocks loose takes the mode that its start would take. */
-static void choose_again(Instance *c, const Strike *strike) {
-    const Model *m = c->model;
-    double *d = c->respond_d;
-    memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
-    memset(c->decided, 1, (size_t)m->n_d);
-    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
-    for (int k = 0; k < m->n_holds; k++) {
-        int mode = m->holds[k].mode;
-        if (!strike->loose[k]) continue;
-        c->d[mode] = c->guards[mode];
-        c->decided[mode] = 0;
-    }
-    choose_modes(c);
-    for (int k = 0; k < m->n_holds; k++) {
-        int mode = m->holds[k].mode, chosen = (int)c->d[mode];
-        if (chosen == (int)d[mode]) continue;
-        c->d[mode] = d[mode];
-        note_change(c, m->holds[k].name, -1, mode, chosen);
-        c->d[mode] = d[mode] = chosen;
-    }
-}
-
 /* Speeds before an impact, and whether it is one. Friction stops nothing at once; where an importer lets it overrun
  * standstill, that is none. */
 static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
@@ -217,8 +193,24 @@ Result stop_motions(Instance *c, const double *before) {
     if (!carry_out(c, strike, first)) return RESULT_ERROR;
     for (int k = 0; k < m->n_holds; k++) entered[k] &= !strike->knocked[k];
     if (!any_of(strike->loose, m->n_holds)) return RESULT_OK;
-    choose_again(c, strike);
+    choose_loose(c, strike->loose);
     return share_and_solve(c);
+}
+
+/* The same for motions that have begun to be held at the present point, for derivatives: tells whether it is `hard`,
+ * and carries it out where it is asked what is `knocked` loose. */
+Result strike_here(Instance *c, const unsigned char *entering, unsigned char *knocked, int *hard) {
+    Strike *strike = &c->strike;
+    size_t size = (size_t)c->model->n_holds;
+    memset(strike->loose, 0, size);
+    memcpy(strike->entering, entering, size);
+    find_held(c, c->strike_terms, c->held);
+    begin_strike(c, strike, c->strike_terms);
+    *hard = strike->hard;
+    if (knocked == NULL) return RESULT_OK;
+    Result result = carry_out(c, strike, 0);
+    memcpy(knocked, strike->knocked, size);
+    return result;
 }
 
 /* Whether it is replaced, an impulse, whether by the norm or a derivative, the combination of equations. */

@@ -169,6 +169,18 @@ EXPORTED int native_steady_near(Native *n, const double *x, const double *z, con
     return code(steady_near(n->c));
 }
 
+/* What is shared at a point in its modes, and what stops that has begun to be held, as strike_here says. */
+EXPORTED void native_share(Native *n, const double *x, const double *z, const double *d) {
+    go_to(n->c, x, z, d);
+    share(n->c);
+}
+
+EXPORTED int native_strike(Native *n, const double *x, const double *z, const double *d, const unsigned char *entering,
+    unsigned char *knocked, int *hard) {
+    go_to(n->c, x, z, d);
+    return code(strike_here(n->c, entering, knocked, hard));
+}
+
 /* Begins at states, implicit unknowns and d that are given; events there have not happened yet. */
 EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const double *d) {
     go_to(n->c, x, z, d);

@@ -124,13 +124,36 @@ static void start_equations(Instance *c) {
 }
 
 /* Choose modes that are not decided by their start conditions: the first that holds wins. */
-void choose_modes(Instance *c) {
+static void choose_modes(Instance *c) {
     evaluate_now(c, &c->model->tapes.start_conditions, c->guards);
     for (int k = 0; k < c->model->n_start_modes; k++) {
         const StartMode *one = &c->model->start_modes[k];
         if (c->guards[k] == 0 || c->decided[one->mode]) continue;
         c->decided[one->mode] = 1;
         c->d[one->mode] = one->target;
+    }
+}
+
+/* What an impact knocks loose takes the mode that its start would take. */
+void choose_loose(Instance *c, const unsigned char *loose) {
+    const Model *m = c->model;
+    double *d = c->respond_d;
+    memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
+    memset(c->decided, 1, (size_t)m->n_d);
+    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
+    for (int k = 0; k < m->n_holds; k++) {
+        int mode = m->holds[k].mode;
+        if (!loose[k]) continue;
+        c->d[mode] = c->guards[mode];
+        c->decided[mode] = 0;
+    }
+    choose_modes(c);
+    for (int k = 0; k < m->n_holds; k++) {
+        int mode = m->holds[k].mode, chosen = (int)c->d[mode];
+        if (chosen == (int)d[mode]) continue;
+        c->d[mode] = d[mode];
+        note_change(c, m->holds[k].name, -1, mode, chosen);
+        c->d[mode] = d[mode] = chosen;
     }
 }
 

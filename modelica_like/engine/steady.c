@@ -147,7 +147,6 @@ static int fire_settling(Instance *c) {
     evaluate_now(c, &m->tapes.guards, c->guards_before);
     if (m->n_resets > 0) evaluate_now(c, &m->tapes.resets, c->reset_values);
     memset(c->decided, 0, (size_t)m->n_d);
-    memcpy(c->x_kept, c->x, (size_t)m->n_x * sizeof(double));
     for (int k = 0; k < m->n_transitions; k++) {
         const Transition *one = &m->transitions[k];
         if (c->decided[one->mode] || !guard_fires(c, one)) continue;
@@ -157,7 +156,6 @@ static int fire_settling(Instance *c) {
         for (const Reset *r = m->resets; r < m->resets + m->n_resets; r++)
             if (r->transition == k && r->place < m->n_x) c->x[r->place] = c->reset_values[r->value] / r->factor;
     }
-    if (!changed) memcpy(c->x, c->x_kept, (size_t)m->n_x * sizeof(double));
     return changed;
 }
 

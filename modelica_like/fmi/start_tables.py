@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.solve.initialize import Point, StartPlan, call, share, start_plan
+from modelica_like.solve.initialize import Point, StartPlan, call, start_plan
 from modelica_like.solve.initialize.plan import is_near, start_name
 from modelica_like.solve.initialize.steady import moving_states
 
@@ -79,7 +79,9 @@ def start_tables(model: CompiledDae, plan: StartPlan | None = None) -> StartTabl
 def _plan(model: CompiledDae) -> StartPlan:
     point = Point(0.0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
     point.d = call(model, model.discrete_starts, point)
-    share(model, point)
+    for one in model.holds:  # what is shared says nothing of motions
+        if point.d[one.mode] == one.number and one.loose >= 0:
+            point.d[one.mode] = one.loose
     values = call(model, model.start_values, point)
     for k, entry in reversed([*enumerate(model.starts)]):  # of several for one state, the first counts
         if entry.strength == "fixed" and entry.state is not None:

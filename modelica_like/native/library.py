@@ -83,6 +83,8 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "begin": (_CODE, [_POINTER]),
     "start": (_CODE, [_POINTER]),
     **dict.fromkeys(("begin_at", "steady_near"), (_CODE, 4 * [_POINTER])),
+    "share": (None, 4 * [_POINTER]),
+    "strike": (_CODE, 7 * [_POINTER]),
     "states": (_CODE, 3 * [_POINTER]),
     "time": (_NUMBER, [_POINTER]),
     "step": (_CODE, [_POINTER, _NUMBER, _COUNT, _POINTER, _POINTER, _COUNT, _POINTER, _POINTER]),

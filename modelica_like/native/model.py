@@ -64,7 +64,16 @@ class NativeModel:
         """Return the cached one of the same model, for any parameter values."""
         model, kind = as_asked(model), start or model.settings.get("start", "given")
         key = "native", kind, fixed_step, model.settings.get("on_chattering") == "rest", plan and plan.choice
+        if not (fixed_step or plan):
+            _made(model).setdefault(kind, None)
         return model.once(key, lambda: NativeModel(model, kind, fixed_step, plan))
+
+    @staticmethod
+    def any_start(model: CompiledDae) -> StartKind:
+        """Return a kind of start of which there is a cached one, or else one that needs no start values."""
+        for kind in _made(as_asked(model)):
+            return kind
+        return "steady"
 
     def references(self, names: Iterable[str]) -> np.ndarray[Any, np.dtype[np.uint32]]:
         """Return the value references of variables.
@@ -78,6 +87,11 @@ class NativeModel:
                 raise UnknownName(f"{self.name} has no variable '{name}'{did_you_mean(name, self.variables) or '.'}")
             found.append(self.variables[name])
         return np.array([one.reference for one in found], np.uint32)
+
+
+def _made(model: CompiledDae) -> dict[StartKind, None]:
+    """Kinds of start of which there is a model in the run-time."""
+    return model.once("native starts", dict)
 
 
 class Instance:
@@ -162,10 +176,10 @@ class Instance:
         """Start at a consistent point, before its events."""
         self.check(self.at(self.library.begin_at, point))
 
-    def at(self, function: Callable[..., int], point: Point) -> int:
+    def at(self, function: Callable[..., int], point: Point, *arguments: Any) -> int:
         """Call a function of the run-time that goes to a point, and return its code."""
         arrays = [np.ascontiguousarray(part, dtype=float) for part in (point.x, point.z, point.d)]
-        return function(self.address, *(_at(one) for one in arrays))
+        return function(self.address, *(_at(one) for one in arrays), *arguments)
 
     def counts(self) -> tuple[int, int, int, int]:
         """Steps, rejected steps, evaluations of the equations, and mode changes since the reset."""

@@ -158,7 +158,8 @@ def exact_jacobian(case, fmu, known, unknown):
 
 
 def values_at(case, fmu):
-    from modelica_like.solve.initialize import Point, share, solve_implicit
+    from modelica_like.native.holds import share
+    from modelica_like.solve.initialize import Point, solve_implicit
 
     model = case.model
     x = vector(fmu.fmi2GetContinuousStates, fmu, len(model.states))

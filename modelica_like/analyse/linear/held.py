@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.solve.initialize import Point, holding, share, variable_slopes
+from modelica_like.native.holds import share
+from modelica_like.solve.initialize import Point, holding, variable_slopes
 from modelica_like.solve.initialize.slopes import slopes
 
 Matrix = np.ndarray[Any, np.dtype[np.float64]]

@@ -18,7 +18,8 @@ from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
-from modelica_like.solve.initialize import Point, call, holding, share, solve_implicit, variable_slopes
+from modelica_like.native.holds import share
+from modelica_like.solve.initialize import Point, call, holding, solve_implicit, variable_slopes
 from modelica_like.solve.initialize.slopes import Sizes, slopes
 
 _STILL = 1e-7

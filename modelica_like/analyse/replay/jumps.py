@@ -12,7 +12,8 @@ from modelica_like.analyse.replay.holds import impact, projection, share_slopes
 from modelica_like.analyse.replay.when import Coincidence, Trigger, When, at_rest, either_first, event_time
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.solve.initialize import Point, Strike, holding, share, solve_implicit
+from modelica_like.native.holds import is_hard, share, strike
+from modelica_like.solve.initialize import Point, holding, solve_implicit
 from modelica_like.solve.initialize.slopes import Sizes, slopes
 from modelica_like.solve.recorder import Event
 
@@ -252,24 +253,23 @@ class Work:
         entering = [k for k in held if before[model.holds[k].mode] != model.holds[k].number]
         if not entering:
             return
-        strike = Strike(model, point.copy(), entering)
-        if strike.hard:
+        hard = is_hard(model, point, entering)
+        if hard:
             # All impacts at this instant are solved together, from the speeds before the first.
             entering = self._begin_again(entering)
             point = self.point
-            strike = Strike(model, point.copy(), entering)
-        strike.run()
+        struck = strike(model, point, entering)
         trial = point.copy()
-        for k in strike.knocked:
+        for k in struck.knocked:
             trial.d[model.holds[k].mode] = model.holds[k].loose
         share(model, trial)
         solve_implicit(model, trial)
-        struck = [k for k in entering if k not in strike.knocked]
-        if later and not strike.hard:
-            self.passing |= {k: self._at_rest(k) for k in struck}
-        if struck:
-            self.x = self.x + self._total(f"impact {struck}", None, lambda: impact(model, struck), at=trial)[1]
-        self.point = strike.point
+        stopped = [k for k in entering if k not in struck.knocked]
+        if later and not hard:
+            self.passing |= {k: self._at_rest(k) for k in stopped}
+        if stopped:
+            self.x = self.x + self._total(f"impact {stopped}", None, lambda: impact(model, stopped), at=trial)[1]
+        self.point = struck.point
 
     def chances(self) -> tuple[Coincidence, ...]:
         """Tell what is zero just at these parameters: motions that rest, and those that stop and go on at once."""

@@ -10,7 +10,8 @@ from modelica_like.analyse.replay.guards import Guards
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
-from modelica_like.solve.initialize import Point, call, holding, share, solve_implicit
+from modelica_like.native.holds import share
+from modelica_like.solve.initialize import Point, call, holding, solve_implicit
 from modelica_like.solve.initialize.slopes import slopes
 from modelica_like.solve.recorder import Event
 

@@ -17,9 +17,10 @@ from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledTransition
 from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import ModelicaLikeError, NoGradient
+from modelica_like.native.holds import share
 from modelica_like.runs.readings import Output
 from modelica_like.simulation import quick_run
-from modelica_like.solve.initialize import Point, call, share, solve_implicit
+from modelica_like.solve.initialize import Point, call, solve_implicit
 from modelica_like.solve.initialize.slopes import Slopes, slopes
 
 _NEAR = 1e-9

@@ -7,10 +7,7 @@ from modelica_like.solve.initialize.contradictions import not_met as not_met
 from modelica_like.solve.initialize.contradictions import same_motion as same_motion
 from modelica_like.solve.initialize.holds import INSTANT as INSTANT
 from modelica_like.solve.initialize.holds import Impact as Impact
-from modelica_like.solve.initialize.holds import Strike as Strike
 from modelica_like.solve.initialize.holds import holding as holding
-from modelica_like.solve.initialize.holds import rest as rest
-from modelica_like.solve.initialize.holds import share as share
 from modelica_like.solve.initialize.holds import sharing as sharing
 from modelica_like.solve.initialize.ideal import contradiction as contradiction
 from modelica_like.solve.initialize.ideal import no_valid_modes as no_valid_modes
