@@ -12,6 +12,7 @@ change and that follow the modes and discrete values in d:
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +24,8 @@ from modelica_like.flatten.model import FlatModel, evaluate
 from modelica_like.structure.system import System
 
 _DEPENDENT = 1e-9
+_CLEAR = 1e-3
+"""Slope of a row, over all its slopes, that rounding cannot have made."""
 _YIELDING = 1e-10
 """In SI units: what passes a dead centre at 1e-3 m/s² meets 1e7 N. Blocks still count as regular, from 1e-12 on."""
 _NEAR = 1e-6
@@ -140,18 +143,62 @@ def find_circuits(
     rigid = [k for k, hold in enumerate(holds) if hold.rigid and hold.reaction >= 0]
     if len(rigid) < 2:
         return []
-    slopes = system.generic(_slopes(system, [holds[k].motion for k in rigid], order, states)).full()
-    sizes = np.linalg.norm(slopes, axis=1)
-    moving = sizes > 0.0
-    rigid = [k for k, moves in zip(rigid, moving, strict=True) if moves]
-    left, values, _ = np.linalg.svd(slopes[moving] / sizes[moving, None])
-    silent = left[:, np.sum(values > _DEPENDENT) :]
-    together = np.abs(silent @ silent.T) > _DEPENDENT
+    slopes = system.generic(_slopes(system, [holds[k].motion for k in rigid], order, states))
+    rows = [dict[int, float]() for _ in rigid]
+    for row, column, slope in zip(*slopes.sparsity().get_triplet(), slopes.nonzeros(), strict=True):
+        if slope != 0.0:
+            rows[row][column] = slope
     first, circuits = system.model.d.numel(), list[Circuit]()
-    for members in _groups(together):
-        circuits.append(Circuit(tuple(rigid[k] for k in members), first))
-        first += len(members) * (1 + len(members))
+    for core in _cores(rows):
+        for members in _dependent([rows[k] for k in core]):
+            circuits.append(Circuit(tuple(rigid[core[k]] for k in members), first))
+            first += len(members) * (1 + len(members))
     return circuits
+
+
+def _cores(rows: list[dict[int, float]]) -> list[list[int]]:
+    """Sets of rows that may depend on each other, in the order of their first ones.
+
+    A row that has a column to itself depends on no other; of a tree of clutches, none is left.
+    """
+    sizes = [math.hypot(*row.values()) for row in rows]
+    users: dict[int, set[int]] = {}
+    for k, row in enumerate(rows):
+        for column in row:
+            users.setdefault(column, set()).add(k)
+    alone = [column for column, using in users.items() if len(using) == 1]
+    left = {k for k, row in enumerate(rows) if row}
+    for column in alone:
+        row = next(iter(users[column]), None)
+        if row is None or abs(rows[row][column]) <= _CLEAR * sizes[row]:
+            continue
+        left.discard(row)
+        for other in rows[row]:
+            users[other].discard(row)
+            if len(users[other]) == 1:
+                alone.append(other)
+    cores: list[list[int]] = []
+    for k in sorted(left):
+        if k in left:
+            core = [k]
+            left.discard(k)
+            for row in core:
+                more = {other for column in rows[row] for other in users[column]} & left
+                core += sorted(more)
+                left -= more
+            cores.append(sorted(core))
+    return cores
+
+
+def _dependent(rows: list[dict[int, float]]) -> list[list[int]]:
+    """Return sets of rows that depend on each other."""
+    columns = {column: place for place, column in enumerate(dict.fromkeys(column for row in rows for column in row))}
+    slopes = np.zeros((len(rows), len(columns)))
+    for k, row in enumerate(rows):
+        slopes[k, [columns[column] for column in row]] = list(row.values())
+    left, values, _ = np.linalg.svd(slopes / np.linalg.norm(slopes, axis=1)[:, None])
+    silent = left[:, np.sum(values > _DEPENDENT) :]
+    return _groups(np.abs(silent @ silent.T) > _DEPENDENT)
 
 
 def _slopes(system: System, nodes: list[int], order: list[tuple[Any, Any]], states: list[int]) -> Any:
@@ -159,7 +206,8 @@ def _slopes(system: System, nodes: list[int], order: list[tuple[Any, Any]], stat
     motions = system.node_values[nodes]
     if order:
         _, (motions,) = ca.substitute_inplace([s for s, _ in order], [e for _, e in order], [motions], False)
-    return ca.jacobian(motions, system.column(level for level in states if system.derivative(level) not in states))
+    among = {*states}
+    return ca.jacobian(motions, system.column(level for level in states if system.derivative(level) not in among))
 
 
 def _groups(together: Any) -> list[list[int]]:

@@ -60,15 +60,20 @@ class System:
     node_values: Any
     inputs: list[int] = field(default_factory=list)
     linear_rows: list[list[int]] = field(default_factory=list)
+    _joined: Any = field(default_factory=lambda: ca.SX(0, 1))
 
     def column(self, levels: Iterable[int]) -> Any:
         """Return the column of symbols of some levels."""
-        return ca.vertcat(ca.SX(0, 1), *(self.symbols[level] for level in levels))
+        return self.everything[list(levels)]
 
     @property
     def everything(self) -> Any:
         """The column of all symbols."""
-        return ca.vertcat(ca.SX(0, 1), *self.symbols)
+        # Symbols are only added; joining tens of thousands of them takes long.
+        known = self._joined.numel()
+        if known < len(self.symbols):
+            self._joined = ca.vertcat(self._joined, *self.symbols[known:])
+        return self._joined
 
     @property
     def volatile(self) -> Any:
