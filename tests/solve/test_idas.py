@@ -1,5 +1,6 @@
 """One interval by IDAS: against closed forms, and where it gives up."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -120,6 +121,10 @@ def test_whole_runs_of_large_models_have_their_own_instances(
     assert len(lengths) == made
 
 
-@pytest.mark.parametrize(("unknowns", "solver"), [(1, "qr"), (49, "qr"), (50, "csparse")])
-def test_which_linear_solver(unknowns: int, solver: str) -> None:
-    assert linear_solver(unknowns) == solver
+@pytest.mark.parametrize(("unknowns", "hub", "solver"), [(49, 48, "qr"), (50, 49, "csparse"), (50, 0, "qr")])
+def test_which_linear_solver(unknowns: int, hub: int, solver: str) -> None:
+    # All unknowns depend on the hub: eliminated last, it fills nothing; eliminated first, everything.
+    others = [k for k in range(unknowns) if k != hub]
+    pairs = [*((k, k) for k in range(unknowns)), *((k, hub) for k in others), *((hub, k) for k in others)]
+    pattern = ca.Sparsity.triplet(unknowns, unknowns, [row for row, _ in pairs], [column for _, column in pairs])
+    assert linear_solver(pattern) == solver
