@@ -64,7 +64,8 @@ class System:
 
     def column(self, levels: Iterable[int]) -> Any:
         """Return the column of symbols of some levels."""
-        return self.everything[list(levels)]
+        places = list(levels)
+        return self.everything[places] if places else ca.SX(0, 1)  # nothing of one symbol would be a row
 
     @property
     def everything(self) -> Any:
