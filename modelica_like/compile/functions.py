@@ -24,7 +24,9 @@ from modelica_like.compile.start_system import start_system
 from modelica_like.compile.updates import updates
 from modelica_like.errors import Source
 from modelica_like.flatten.model import FlatDiscrete, FlatModel, evaluate
+from modelica_like.language.assembly import Assembly
 from modelica_like.language.fields import Input
+from modelica_like.language.inside import inside
 from modelica_like.structure.holds import hold_terms
 from modelica_like.structure.reduce import ReducedDae
 
@@ -79,8 +81,10 @@ def compile(reduced: ReducedDae) -> CompiledDae:
 
 
 def _settings(root: Any) -> dict[str, Any]:
-    display = getattr(root, "_display", {})
-    return {**getattr(root, "_simulate", {}), **({"display": display} if display else {})}
+    if not isinstance(root, Assembly):
+        return {}
+    own = inside(root)
+    return {**own.simulate, **({"display": own.display} if own.display else {})}
 
 
 def _discrete_starts(flat: FlatModel) -> Any:

@@ -16,6 +16,7 @@ from modelica_like.language.discrete import Pre
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, symbols_in
 from modelica_like.language.fields import Field, Input, Parameter, Variable
+from modelica_like.language.inside import inside
 from modelica_like.language.units import ANY, ONE, Unit, parse_unit
 
 _SECOND = parse_unit("s")
@@ -134,8 +135,9 @@ def check_units(
 
 def _by_any_units(component: Component, errors: Sequence[ModelicaLikeError]) -> UnitMismatch | None:
     """Say which units of `*` parameters do not fit together; the equations of a library do not tell that."""
-    given = [(name, unit_of_field(component, name)) for name, field in component.fields.items()
-             if isinstance(field, Parameter) and field.unit_text == "*" and name in component._values]  # fmt: skip
+    fields, values = component.fields.items(), inside(component).values
+    given = [(name, unit_of_field(component, name)) for name, field in fields
+             if isinstance(field, Parameter) and field.unit_text == "*" and name in values]  # fmt: skip
     if len(given) < _PAIR or not all(isinstance(error, UnitMismatch) for error in errors):
         return None
     units = ", ".join(f"{name} in {unit}" for name, unit in given)

@@ -37,6 +37,7 @@ from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.discrete import HOMOTOPY, INITIAL, TERMINAL
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
+from modelica_like.language.inside import inside
 from modelica_like.language.units import ONE, coherent
 
 _WIRE = Source("")
@@ -135,7 +136,7 @@ class _Flattener:
         for component in self.root.walk():
             for part in component.parts.values():
                 for connector in part.connectors.values():
-                    connector.__dict__["_used"] = not connector.optional
+                    inside(connector).used = not connector.optional
             template = template_of(component)
             elaborated.append((component, template))
             for statement in template.connections:
@@ -195,8 +196,8 @@ class _Flattener:
 
     def _start(self, component: Component, name: str, path: str) -> Any:
         """Return a start value, which the owner gives in terms of its names, or the class by default."""
-        given, field = component._starts.get(name), component.fields[name]
-        value, scope = (field.read(field.default), None) if given is None else (given, component._owner)
+        given, field = inside(component).starts.get(name), component.fields[name]
+        value, scope = (field.read(field.default), None) if given is None else (given, inside(component).owner)
         with component.at_its_place(name):
             return self.parameters.evaluate(value, scope or component, path)
 
@@ -296,7 +297,7 @@ class _Flattener:
             node = self.variable_of[id(component), name]
             path = self.variables[node].path
             if (id(component), name) in self.wiring.driven:
-                if name in component._values:
+                if name in inside(component).values:
                     what, advice = f"{path} has a value and a connection: only one can count.", "Remove one of the two."
                     self.errors.append(WrongConnection(what, where=component.place_of(name), advice=advice))
                 continue
@@ -325,7 +326,7 @@ class _Flattener:
         for name, field in component.fields.items():
             if not isinstance(field, Variable) or isinstance(field, Input):
                 continue
-            given = component._starts.get(name)
+            given = inside(component).starts.get(name)
             if given is None and field.default is None:
                 continue
             node = self.variable_of[id(component), name]

@@ -17,6 +17,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id
 from modelica_like.language.fields import Input, Parameter, Value
+from modelica_like.language.inside import inside
 from modelica_like.language.units import Unit, coherent, read_quantity
 
 
@@ -86,7 +87,11 @@ class Parameters:
             )
         self._open.append(path)
         # A value given in an assembly uses the assembly's names, a default those of the component itself.
-        scope = component._owner if name in component._values and isinstance(component._owner, Component) else component
+        scope = (
+            inside(component).owner
+            if name in inside(component).values and isinstance(inside(component).owner, Component)
+            else component
+        )
         expression = self.evaluate(value, scope, path)
         self._open.pop()
         field = component.fields[name]

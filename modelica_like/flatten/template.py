@@ -24,6 +24,7 @@ from modelica_like.language.equation import Connection, Equation, FreeEnd, as_eq
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, symbol_of, symbols_in
 from modelica_like.language.fields import Parameter, Variable
 from modelica_like.language.functions import der
+from modelica_like.language.inside import declarations, inside
 from modelica_like.language.mode import StartMode, Transition
 from modelica_like.language.places import NOWHERE, located
 from modelica_like.language.transition import as_event
@@ -187,8 +188,8 @@ def relative_path(owner: Declared, root: Component, name: str) -> str:
     while node is not root:
         if node is None:
             raise LanguageError(f"{root.label} uses '{name}' of a component that is not part of it.")
-        names.append(node._name)
-        node = node._owner
+        names.append(inside(node).name)
+        node = inside(node).owner
     return ".".join(reversed(names))
 
 
@@ -206,14 +207,12 @@ def template_of(component: Component) -> Template:
     Raises:
         LanguageError, UnitMismatch, ComponentUnbalanced: the class is declared wrongly.
     """
-    if component.parts or component.fields is not component._class_fields:
+    declared = declarations(component)
+    if component.parts or component.fields is not declared.fields:
         with symbols_in_tables(component):
             return _build(component)
-    kind = type(component)
-    if "_templates" not in vars(kind):
-        kind._templates = {}  # type: ignore[attr-defined]
-    cache: dict[Any, Template] = vars(kind)["_templates"]
-    structural = tuple(component.__dict__[name] for name in component._structural)
+    cache: dict[Any, Template] = declared.templates
+    structural = tuple(getattr(component, name) for name in declared.structural)
     used = tuple(name for name, connector in component.connectors.items() if connector.used)
     given = tuple(name for name, field in component.fields.items() if field.default is None and component.given(name))
     units = tuple(str(unit_of_field(component, name)) for name, f in component.fields.items() if f.unit == ANY)

@@ -13,6 +13,7 @@ from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.equation import Connection, FreeEnd
 from modelica_like.language.expr import Symbol
 from modelica_like.language.fields import Input, Output
+from modelica_like.language.inside import inside
 from modelica_like.language.units import Unit, same_dimension
 
 End = tuple[int, bool]
@@ -63,8 +64,8 @@ class Wiring:
         self.errors.append(WrongConnection(what, where=where, advice=advice))
 
     def _key(self, scope: Component, connector: Connector, source: Source) -> End:
-        connector.__dict__["_used"] = True
-        key = (id(connector), connector._owner is not scope)
+        inside(connector).used = True
+        key = (id(connector), inside(connector).owner is not scope)
         self.parent.setdefault(key, key)
         self.connectors[key] = connector
         self.sources.setdefault(key, source)
@@ -121,7 +122,7 @@ class Wiring:
     def check_signal_units(self) -> None:
         """Compare the units along signal connections, after all templates are known."""
         for driver, sink, source in self.signals:
-            if not all((symbol.owner._owner or symbol.owner).units_checked for symbol in (driver, sink)):
+            if not all((inside(symbol.owner).owner or symbol.owner).units_checked for symbol in (driver, sink)):
                 continue
             units = [self.inferred.get((id(s.owner), s.name)) or unit_of_field(s.owner, s.name) for s in (driver, sink)]
             if not same_dimension(*units):
@@ -133,14 +134,14 @@ class Wiring:
         for name, connector in component.connectors.items():
             if connector.may_be_free or self.is_connected(connector) or id(connector) in self.freed:
                 continue
-            label, end, flow = component.label, f"{component._name}.{name}", connector.domain.flow
-            listed = isinstance(component._owner, Assembly)
+            label, end, flow = component.label, f"{inside(component).name}.{name}", connector.domain.flow
+            listed = isinstance(inside(component).owner, Assembly)
             say = f'list it: free = ["{end}"]' if listed else f"yield free(self.{end})"
             self.errors.append(
                 FreeFlange(
                     f"{label}.{name} is free, so {label} ({type(component).__name__}) carries no {flow}.",
                     where=component.place_of(),
-                    advice=f"Connect it, or {say}." if component._owner else "Connect it in a drive.",
+                    advice=f"Connect it, or {say}." if inside(component).owner else "Connect it in a drive.",
                 )
             )
 
@@ -148,7 +149,7 @@ class Wiring:
 def _is_within(end: Connector | Symbol, scope: Component) -> bool:
     node: Declared | None = end.owner if isinstance(end, Symbol) else end
     while node is not None and node is not scope:
-        node = node._owner
+        node = inside(node).owner
     return node is scope
 
 
@@ -161,7 +162,9 @@ def _givers(scope: Component, ends: Iterable[Connector | Symbol]) -> list[Symbol
 
 def taken(scope: Component, connection: Connection) -> list[str]:
     """Return the own signals that a connection determines, and the own connectors in it."""
-    connectors = [end._name for end in connection.ends if isinstance(end, Connector) and end._owner is scope]
+    connectors = [
+        inside(end).name for end in connection.ends if isinstance(end, Connector) and inside(end).owner is scope
+    ]
     givers = [id(giver) for giver in _givers(scope, connection.ends)]
     signals = [end for end in connection.ends if isinstance(end, Symbol) and end.owner is scope]
     return connectors + [signal.name for signal in signals if id(signal) not in givers]
@@ -186,7 +189,7 @@ def _different_kinds(first: Connector, second: Connector, source: Source) -> Wro
 def _fitting(first: Connector, second: Connector) -> str:
     """Return the connection that is meant where a part has one other end of the kind."""
     for end, other in ((first, second), (second, first)):
-        owner = other._owner
+        owner = inside(other).owner
         connectors = owner.connectors.values() if isinstance(owner, Component) else ()
         ends = [connector for connector in connectors if type(connector) is type(end) and not connector.optional]
         if len(ends) == 1:

@@ -28,7 +28,8 @@ from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources, source_files
 from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, icon_name, terminals_and_icons, with_open_ends
-from modelica_like.language import Component
+from modelica_like.language import Assembly, Component
+from modelica_like.language.inside import inside
 from modelica_like.language.tunable import with_tunable_tables
 from modelica_like.options import Options
 from modelica_like.simulation import Model, positive_step, seconds, without_garbage_search
@@ -179,7 +180,8 @@ def compiled_open(
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
     lines = ((i, [source.text or str(source) for source in i.template.sources]) for i in flat.instances)
     equations = [(instance.path, instance.template.component, texts) for instance, texts in lines if texts]
-    return as_asked(compile(reduce(flat))), str(getattr(drive, "_description", "") or ""), equations
+    about = inside(drive).description if isinstance(drive, Assembly) else ""
+    return as_asked(compile(reduce(flat))), about, equations
 
 
 def _loaded(drive: Model) -> CompiledDae | Component:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from modelica_like.compile.compiled import CompiledTerminal
@@ -12,6 +12,7 @@ from modelica_like.fmi.xml import Element, document, element
 from modelica_like.language import Assembly, Component, Connector, Equations, connect
 from modelica_like.language.declared import unknown
 from modelica_like.language.equation import FreeEnd
+from modelica_like.language.inside import declarations, inside
 from modelica_like.netlist.registry import library_types
 
 Takes = Literal["flow", "potential"]
@@ -46,28 +47,27 @@ def with_open_ends(drive: Component, ends: Sequence[str] = (), takes: Takes = "f
         return drive
     adaptors = {path: adaptor_for(connector_at(drive, path), takes) for path in paths}
     twin = drive.copy()
-    twin.__dict__["_name"] = drive._name
-    twin.__class__ = _opened(type(drive))
+    inside(twin).name = inside(drive).name
     pairs = {
         path: (path.replace(".", "_") if "." in path else f"{path}_end", end) for path, (_, end) in adaptors.items()
     }
-    twin.__dict__["_ends"] = pairs
+    twin.__class__ = _opened(type(drive), pairs)
     for path, (kind, _) in adaptors.items():
         setattr(twin, pairs[path][0], kind())
     return twin
 
 
-def _opened(kind: type[Component]) -> type[Component]:
+def _opened(kind: type[Component], pairs: Mapping[str, tuple[str, str]]) -> type[Component]:
     """A drive of the same class that also connects its open ends."""
 
     class Opened(kind):  # type: ignore[misc, valid-type]
         def equations(self) -> Equations:
-            ends = {id(connector_at(self, path)): path for path in self.__dict__["_ends"]}
+            ends = {id(connector_at(self, path)): path for path in pairs}
             for statement in super().equations():
                 # Ends that were declared free are no longer free.
                 if not (isinstance(statement, FreeEnd) and id(statement.connector) in ends):
                     yield statement
-            for path, (part, end) in self.__dict__["_ends"].items():
+            for path, (part, end) in pairs.items():
                 yield connect(connector_at(self, path), self.parts[part].connectors[end])
 
     Opened.__name__, Opened.__qualname__ = kind.__name__, kind.__qualname__
@@ -94,7 +94,7 @@ def adaptor_for(connector: Connector, takes: Takes) -> tuple[type[Component], st
         ExportError: no library has one.
     """
     for kind in library_types().values():
-        ends = {name: c for name, c in kind._class_connectors.items() if type(c) is type(connector)}
+        ends = {name: c for name, c in declarations(kind).connectors.items() if type(c) is type(connector)}
         if kind.terminal is not None and kind.terminal.takes == takes and len(ends) == 1:
             return kind, next(iter(ends))
     raise ExportError(

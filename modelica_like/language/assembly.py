@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from modelica_like.errors import DuplicateName, ModelicaLikeError, Source, WrongConnection, raise_together_or_one
 from modelica_like.language.component import Component
@@ -14,6 +14,7 @@ from modelica_like.language.declared import Connector, unknown
 from modelica_like.language.equation import Equations, connect, free, series
 from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Field, Input, Output, Parameter, Variable, param
+from modelica_like.language.inside import Inside, InsideAssembly, inside
 from modelica_like.language.places import NOWHERE, caller
 
 
@@ -32,93 +33,81 @@ class Assembly(Component):
         description: one phrase.
     """
 
-    _own_connectors: tuple[tuple[str, str], ...]
-    _wires: dict[str, tuple[str, ...]]
-    _chains: dict[str, tuple[str, ...]]
-    _free: tuple[str, ...]
-    _places: dict[str, Source]
-    _made: Source
+    _kept: ClassVar[type[Inside]] = InsideAssembly
+    _inside: InsideAssembly  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __init__(
         self, name: str = "", *, parts: Mapping[str, Component | list[Component]] | None = None,
         connect: Mapping[str, Sequence[str]] | None = None, series: Mapping[str, Sequence[str]] | None = None,
         free: Sequence[str] = (), parameters: Mapping[str, Any] | None = None, description: str = "",
     ) -> None:  # fmt: skip
-        self.__dict__.update(_own_fields={}, _own_connectors=(), _wires={}, _chains={}, _free=(), _places={})
         super().__init__()
-        self.__dict__.update(
-            _name=name, _description=description, _simulate={}, _display={}, _origin="", _sizing="", _made=caller()
-        )
+        own = self._inside
+        own.name, own.description, own.made = name, description, caller()
         for key, value in (parameters or {}).items():
             self.add_parameter(key, value)
         for key, part in (parts or {}).items():
             setattr(self, key, part)
-        self._wires = {key: tuple(ends) for key, ends in (connect or {}).items()}
-        self._chains = {key: tuple(ends) for key, ends in (series or {}).items()}
-        self._free = tuple(free)
+        own.wires = {key: tuple(ends) for key, ends in (connect or {}).items()}
+        own.chains = {key: tuple(ends) for key, ends in (series or {}).items()}
+        own.free = tuple(free)
 
     def add_parameter(self, name: str, value: Any) -> None:
         """Declare a parameter of the assembly; its unit is that of its value."""
         field: Parameter = param("*", default=value)
-        self._declare(name, field)
+        declare(self, name, field)
         field.read(value)
-
-    def _declare(self, name: str, field: Field) -> None:
-        if name in self.fields or name in self._parts or name in self._connectors:
-            raise DuplicateName(f"{self.label}: '{name}' is already in use.")
-        field.owner, field.name = self.label, name
-        self._own_fields = {**self._own_fields, name: field}
 
     def expose(self, name: str, end: str) -> None:
         """Make an inner connector or signal an outer one of the assembly."""
-        inner = self._resolve(end)
+        inner = end_at(self, end)
         if isinstance(inner, Connector):
             setattr(self, name, type(inner)(inner.description, free=inner.may_be_free))
         elif isinstance(field := inner.owner.fields[inner.name], Input | Output):
-            self._declare(name, copy(field))
+            declare(self, name, copy(field))
         else:
             raise unknown("connector", self.label, end, [])
-        self._own_connectors = (*self._own_connectors, (name, end))
+        self._inside.exposed = (*self._inside.exposed, (name, end))
 
     def place(self, key: str, source: Source) -> None:
         """Store the place of a connection, series or part in the netlist."""
-        self._places[key] = source
+        self._inside.places[key] = source
 
     def source_of(self, key: str) -> Source:
         """Return the place of a connection, series or part in the netlist, or of a part in Python."""
-        if not self._places and key.startswith("parts."):
-            return replace(self._made, text=key)
-        return self._places.get(key, NOWHERE)
+        if not self._inside.places and key.startswith("parts."):
+            return replace(self._inside.made, text=key)
+        return self._inside.places.get(key, NOWHERE)
 
     @property
     def wires(self) -> dict[str, tuple[str, ...]]:
         """Connections by name."""
-        return self._wires
+        return self._inside.wires
 
     @property
     def chains(self) -> dict[str, tuple[str, ...]]:
         """Series by name."""
-        return self._chains
+        return self._inside.chains
 
     @property
     def free_ends(self) -> tuple[str, ...]:
         """Connectors that stay unconnected on purpose."""
-        return self._free
+        return self._inside.free
 
     @property
     def exposed(self) -> tuple[tuple[str, str], ...]:
         """Outer connectors and signals, and the inner ones they stand for."""
-        return self._own_connectors
+        return self._inside.exposed
 
     def __getattr__(self, name: str) -> Expr:
-        if name in self.__dict__.get("_own_fields", {}):
+        if name in self._inside.own_fields:
             return symbol_of(self, name)
         if name in ("description", "simulate", "display", "origin", "sizing"):  # unless a part has this name
-            return self.__dict__[f"_{name}"]
-        raise AttributeError(f"{type(self).__name__} '{self.__dict__.get('_name', '')}' has no '{name}'")
+            return getattr(self._inside, name)
+        raise AttributeError(f"{type(self).__name__} '{self._inside.name}' has no '{name}'")
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name in self.__dict__.get("_own_fields", {}) and not isinstance(value, Component | list):
+        if name in self._inside.own_fields and not isinstance(value, Component | list):
             self.give(name, value)
         else:
             super().__setattr__(name, value)
@@ -140,27 +129,27 @@ class Assembly(Component):
 
     def _told(self, key: str) -> Source:
         """Return the place of an entry: its line in a netlist, or the call that created the assembly."""
-        if self._places:
+        if self._inside.places:
             return self.source_of(key)
         kind, _, name = key.partition(".")
-        given = {"connect": self._wires, "series": self._chains}.get(kind, {}).get(name)
-        return replace(self._made, text=key if given is None else f"{key} = {list(given)}")
+        given = {"connect": self._inside.wires, "series": self._inside.chains}.get(kind, {}).get(name)
+        return replace(self._inside.made, text=key if given is None else f"{key} = {list(given)}")
 
     def _wiring(self) -> Iterator[tuple[str, Callable[[], list[Any]]]]:
         """Yield every entry of the netlist with the function that makes its statements."""
-        for key, ends in self._wires.items():
-            yield f"connect.{key}", lambda ends=ends: [connect(*map(self._resolve, ends))]
-        for key, names in self._chains.items():
+        for key, ends in self._inside.wires.items():
+            yield f"connect.{key}", lambda ends=ends: [connect(*(end_at(self, end) for end in ends))]
+        for key, names in self._inside.chains.items():
             yield f"series.{key}", partial(self._series, names)
-        for end in self._free:
+        for end in self._inside.free:
             yield f"free.{end}", lambda end=end: [free(self._connector(end))]
-        for name, end in self._own_connectors:
-            yield f"expose.{name}", lambda name=name, end=end: [connect(self._resolve(name), self._resolve(end))]
+        for name, end in self._inside.exposed:
+            yield f"expose.{name}", lambda name=name, end=end: [connect(end_at(self, name), end_at(self, end))]
 
     def _series(self, names: Sequence[str]) -> list[Any]:
         components: list[Component] = []
         for name in names:
-            part = self._parts.get(name)
+            part = self._inside.parts.get(name)
             components += part if isinstance(part, list) else [self._link(name)]
         return list(series(*components))
 
@@ -175,21 +164,38 @@ class Assembly(Component):
         return self.find(path)
 
     def _connector(self, path: str) -> Connector:
-        end = self._resolve(path)
+        end = end_at(self, path)
         if isinstance(end, Connector):
             return end
         raise unknown("connector", self.label, path, [])
 
-    def _resolve(self, path: str) -> Connector | Symbol:
-        """Find the connector or signal at a path."""
-        owner_path, _, name = path.rpartition(".")
-        owner = self.find(owner_path)
-        if name in owner.connectors:
-            return owner.connectors[name]
-        if name in owner.fields and isinstance(owner.fields[name], Variable):
-            return symbol_of(owner, name)
-        signals = [key for key, field in owner.fields.items() if type(field).__name__ in ("Input", "Output")]
-        label = f"{owner.label} ({type(owner).__name__})" if owner_path else owner.label
-        if name in owner.parts:
-            raise unknown("connector", label, name, [f"{name}.{c}" for c in owner.parts[name].connectors])
-        raise unknown("connector", label, name, [*owner.connectors, *signals], owner.renamed)
+
+# Functions, because parts and parameters of an assembly may have names of methods.
+
+
+def declare(of: Assembly, name: str, field: Field) -> None:
+    """Declare a field that one assembly alone has.
+
+    Raises:
+        DuplicateName: the name is in use.
+    """
+    own = inside(of)
+    if name in of.fields or name in own.parts or name in own.connectors:
+        raise DuplicateName(f"{of.label}: '{name}' is already in use.")
+    field.owner, field.name = of.label, name
+    own.own_fields = {**own.own_fields, name: field}
+
+
+def end_at(of: Assembly, path: str) -> Connector | Symbol:
+    """Find the connector or signal at a path."""
+    owner_path, _, name = path.rpartition(".")
+    owner = of.find(owner_path)
+    if name in owner.connectors:
+        return owner.connectors[name]
+    if name in owner.fields and isinstance(owner.fields[name], Variable):
+        return symbol_of(owner, name)
+    signals = [key for key, field in owner.fields.items() if type(field).__name__ in ("Input", "Output")]
+    label = f"{owner.label} ({type(owner).__name__})" if owner_path else owner.label
+    if name in owner.parts:
+        raise unknown("connector", label, name, [f"{name}.{c}" for c in owner.parts[name].connectors])
+    raise unknown("connector", label, name, [*owner.connectors, *signals], owner.renamed)

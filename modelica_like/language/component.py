@@ -10,11 +10,20 @@ from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like import upper
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
-from modelica_like.language.declared import Connector, Declared, Terminal, annotated, refuse_collection, unknown
+from modelica_like.language.declared import (
+    Connector,
+    Declared,
+    Terminal,
+    annotated,
+    of_kind,
+    refuse_collection,
+    unknown,
+)
 from modelica_like.language.equation import Equations
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
 from modelica_like.language.icon import Icon
+from modelica_like.language.inside import Declarations, Inside, InsideComponent, declarations, inside
 from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
@@ -35,63 +44,53 @@ class Component(Declared):
     icon: ClassVar[Icon | None] = None
     units_checked: ClassVar[bool] = True
     """Whether the units of its equations, of its connections and of the values it gives to parts must fit."""
-    _partial: ClassVar[bool] = True
-    _class_connectors: ClassVar[dict[str, Connector]] = {}
-    _class_parts: ClassVar[dict[str, Component | list[Component]]] = {}
-    _replaceable: ClassVar[frozenset[str]] = frozenset()
-    _structural: ClassVar[dict[str, Any]] = {}
-    _tables: ClassVar[dict[str, Rows]] = {}
-    _given_tables: Mapping[str, Any] = {}
-    _measured: Mapping[str, str] = {}
-    _class_modes: ClassVar[dict[str, Mode]] = {}
+    _kept: ClassVar[type[Inside]] = InsideComponent
+    _inside: InsideComponent  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __init_subclass__(cls, partial: bool = False, **options: Any) -> None:
         super().__init_subclass__(**options)
-        cls._partial = partial
         body = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
         hints = {name: str(text) for name, text in annotated(cls).items() if not name.startswith("_")}
         annotations = [name for name, text in hints.items() if not text.startswith(("ClassVar", "typing.ClassVar"))]
         # A class may extend several bases, as in Modelica: declarations are collected along all ancestors.
-        ancestors = [base for base in reversed(cls.__mro__[1:]) if issubclass(base, Component)]
-        cls._class_connectors = _of_kind(cls, Connector)
-        cls._class_modes = _of_kind(cls, Mode)
+        above = [declarations(base) for base in reversed(cls.__mro__[1:]) if issubclass(base, Component)]
         parts = {name: value for name, value in body.items() if _is_part(value)}
-        cls._class_parts = {name: part for base in ancestors for name, part in base._class_parts.items()} | parts
-        cls._replaceable = frozenset(parts.keys() & {*annotations}).union(*(base._replaceable for base in ancestors))
-        declared = (Field, Connector, Mode)
+        symbolic = (Field, Connector, Mode)
         for name, value in body.items():
             if type(value) is list and name not in parts and (name in annotations or name not in hints):
                 refuse_collection(f"{cls.__name__}.{name}", cast(object, value))
         plain = {
-            n: body.get(n, REQUIRED) for n in annotations if not isinstance(body.get(n), declared) and n not in parts
+            n: body.get(n, REQUIRED) for n in annotations if not isinstance(body.get(n), symbolic) and n not in parts
         }
         tables = {name: value for name, value in plain.items() if isinstance(value, Rows)}
         plain |= {name: table.default for name, table in tables.items()}
-        cls._tables = {name: table for base in ancestors for name, table in base._tables.items()} | tables
-        cls._structural = {name: value for base in ancestors for name, value in base._structural.items()} | plain
-        kinds = (cls._class_fields, cls._class_connectors, cls._class_modes, cls._class_parts, cls._structural)
-        for name in chain.from_iterable(kinds):
+        cls._declared = own = Declarations(
+            fields=cls._declared.fields,
+            connectors=of_kind(cls, Connector),
+            modes=of_kind(cls, Mode),
+            parts=_joined(*(base.parts for base in above), parts),
+            replaceable=frozenset(parts.keys() & {*annotations}).union(*(base.replaceable for base in above)),
+            structural=_joined(*(base.structural for base in above), plain),
+            tables=_joined(*(base.tables for base in above), tables),
+            partial=partial,
+        )
+        for name in chain(own.fields, own.connectors, own.modes, own.parts, own.structural):
             require_identifier(name, cls.__name__)
             if hasattr(Component, name):
                 what = f"{cls.__name__} declares '{name}', which every component has already."
                 raise DuplicateName(what, where=caller(), advice="Choose another name.")
-        for mode in cls._class_modes.values():
+        for mode in own.modes.values():
             mode.check()
 
     def __init__(self, **values: Any) -> None:
-        if self._partial:
+        if self._declared.partial:
             what = f"{type(self).__name__} is partial: it is only a base class."
             raise LanguageError(what, where=caller())
-        self._values: dict[str, Value] = {}
-        self._starts: dict[str, Value] = {}
-        self._start_modes: dict[str, str] = {}
-        self._parts: dict[str, Component | list[Component]] = {}
-        self._connectors: dict[str, Connector] = {}
-        for name, connector in self._class_connectors.items():
+        for name, connector in self._declared.connectors.items():
             self._adopt_connector(name, connector)
-        for name, part in self._class_parts.items():
-            setattr(self, name, values.pop(name) if name in values and name in self._replaceable else part)
-        for name, default in self._structural.items():
+        for name, part in self._declared.parts.items():
+            setattr(self, name, values.pop(name) if name in values and name in self._declared.replaceable else part)
+        for name, default in self._declared.structural.items():
             self._set_structural(name, values.pop(name, default))
         for name, value in values.items():
             self.give(name, value)
@@ -133,7 +132,7 @@ class Component(Declared):
 
     def given(self, name: str) -> bool:
         """Return whether a parameter or input has a value (its own or a default)."""
-        return name in self._values or self.fields[name].default is not None
+        return name in self._inside.values or self.fields[name].default is not None
 
     # -- values ------------------------------------------------------------------------------------------------------
 
@@ -146,21 +145,21 @@ class Component(Declared):
         """
         if name in self.fields:
             self.set_value(self.fields[name], value)
-        elif name in self._class_modes:
-            self._class_modes[name].__set__(self, value)
-        elif name in self._structural:
+        elif name in self._declared.modes:
+            self._declared.modes[name].__set__(self, value)
+        elif name in self._declared.structural:
             self._set_structural(name, value)
             self.build()
-        elif name in self._parts and name in self._replaceable and _is_part(value):
+        elif name in self._inside.parts and name in self._declared.replaceable and _is_part(value):
             setattr(self, name, value)
-        elif name in self._parts:
+        elif name in self._inside.parts:
             raise LanguageError(
                 f"{self.label}.{name} cannot be replaced.", where=caller(),
                 advice=f"Annotate the part in {type(self).__name__} to make it replaceable, or set its values by path.",
             )  # fmt: skip
         else:
             refuse_collection(f"{type(self).__name__}.{name}", value, caller)
-            names = [*self.fields, *self._class_modes, *self._structural, *self._replaceable]
+            names = [*self.fields, *self._declared.modes, *self._declared.structural, *self._declared.replaceable]
             error = unknown("parameter or variable", type(self).__name__, name, names, self.renamed)
             error.where = (caller(),)
             raise error
@@ -172,9 +171,9 @@ class Component(Declared):
         except ModelicaLikeError as error:
             error.where = error.where or (caller(),)
             raise
-        if field.name in self._measured:
-            raise both_given(self._measured[field.name], field.name)
-        store = self._values if isinstance(field, Parameter | Input) else self._starts
+        if field.name in self._inside.measured:
+            raise both_given(self._inside.measured[field.name], field.name)
+        store = self._inside.values if isinstance(field, Parameter | Input) else self._inside.starts
         store[field.name] = understood
 
     @classmethod
@@ -185,12 +184,12 @@ class Component(Declared):
             NetlistError: it has another type.
             UnitError, ValueOutOfRange: a cell of a table has another dimension or is not finite.
         """
-        if name in cls._tables:
-            cls._tables[name].read(f"{cls.__name__}.{name}", cls._class_fields, frozen_rows(value))
+        if name in cls._declared.tables:
+            cls._declared.tables[name].read(f"{cls.__name__}.{name}", cls._declared.fields, frozen_rows(value))
             return
         if type(value) is int and abs(value) > _MOST:  # it may be a number of parts to create
             raise NetlistError(f"{cls.__name__}.{name} is larger than {_MOST}; no drive has that many parts.")
-        default, hint = cls._structural[name], cls._hint(name)
+        default, hint = cls._declared.structural[name], cls._hint(name)
         if (choices := cls.choices(name)) and value not in choices:
             raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {' or '.join(choices)}.")
         wanted: Any = next((k for k in _PLAIN if hint == k.__name__), object) if default is REQUIRED else type(default)
@@ -201,52 +200,54 @@ class Component(Declared):
     def _set_structural(self, name: str, value: Any) -> None:
         if value is REQUIRED:
             raise LanguageError(f"{type(self).__name__} needs a value for {name}.", where=caller())
-        if name not in self._tables:
+        if name not in self._declared.tables:
             self.check_structural(name, value)
         frozen = frozen_rows(value)
-        self.__dict__[name] = self._tables[name].store(self, name, frozen) if name in self._tables else frozen
+        self.__dict__[name] = (
+            self._declared.tables[name].store(self, name, frozen) if name in self._declared.tables else frozen
+        )
 
     def value(self, name: str) -> Value | None:
         """Return the value of a parameter or input: given, default, or None."""
-        if name in self._values:
-            return self._values[name]
+        if name in self._inside.values:
+            return self._inside.values[name]
         field = self.fields[name]
         return None if field.default is None else field.read(field.default)
 
     def start(self, name: str) -> Value | None:
         """Return the start value of a variable or discrete value: given, default of a discrete value, or None."""
-        if name in self._starts:
-            return self._starts[name]
+        if name in self._inside.starts:
+            return self._inside.starts[name]
         field = self.fields[name]
         return field.read(field.default) if isinstance(field, Discrete) else None
 
     def start_mode(self, name: str) -> str:
         """Return the name of the mode at the start."""
-        return self._start_modes.get(name, self._class_modes[name].start)
+        return self._inside.start_modes.get(name, self._declared.modes[name].start)
 
     # -- the tree ----------------------------------------------------------------------------------------------------
 
     @property
     def connectors(self) -> dict[str, Connector]:
         """Connectors by name."""
-        return self._connectors
+        return self._inside.connectors
 
     @property
     def modes(self) -> dict[str, Mode]:
         """Declared modes by name."""
-        return self._class_modes
+        return self._declared.modes
 
     @property
     def parts(self) -> Mapping[str, Component]:
         """Parts by name; parts of arrays as `name[1]`, `name[2]` and so on."""
-        named: dict[str, Component] | None = self.__dict__.get("_named")
+        named = self._inside.elements
         if named is None:
-            named = {}
-            for name, part in self._parts.items():
+            named = dict[str, Component]()
+            for name, part in self._inside.parts.items():
                 listed = isinstance(part, list)
                 named |= {f"{name}[{k}]": element for k, element in enumerate(part, 1)} if listed else {name: part}
-            self.__dict__["_named"] = named
-        return MappingProxyType(named)
+            named = self._inside.elements = MappingProxyType(named)
+        return named
 
     def walk(self) -> Iterator[Component]:
         """Yield this component and all parts below it, owners first."""
@@ -254,7 +255,7 @@ class Component(Declared):
         while pending:
             component = pending.pop()
             yield component
-            pending += reversed([*component.parts.values()] if component._parts else [])
+            pending += reversed([*component.parts.values()] if component._inside.parts else [])
 
     def find(self, path: str) -> Component:
         """Return the part at a dotted path.
@@ -287,10 +288,10 @@ class Component(Declared):
         root, path = self.root, f"{self.path}.{name}".lstrip(".")
         source = root.source_of(f"set.{path}") if isinstance(root, Component) else NOWHERE
         source = source if source.file else self.source_of(f"parameters.{name}")
-        if source.file or not isinstance(self._owner, Component):
+        if source.file or not isinstance(self._inside.owner, Component):
             return source
         # All elements of an array are in one line.
-        return self._owner.source_of(f"parts.{self._name.partition('[')[0]}")
+        return self._inside.owner.source_of(f"parts.{self._inside.name.partition('[')[0]}")
 
     @contextmanager
     def at_its_place(self, name: str = "") -> Generator[None]:
@@ -320,10 +321,12 @@ class Component(Declared):
 
     def _end(self, which: str) -> Connector:
         names = getattr(type(self), which).split()
-        connector = next((self._connectors[name] for name in names if name in self._connectors), None)
+        connector = next((self._inside.connectors[name] for name in names if name in self._inside.connectors), None)
         if connector is None:
-            error = unknown(which, f"{self.label} ({type(self).__name__})", " or ".join(names), list(self._connectors))
-            ends = [*self._connectors, *self.terminal_members()]
+            error = unknown(
+                which, f"{self.label} ({type(self).__name__})", " or ".join(names), list(self._inside.connectors)
+            )
+            ends = [*self._inside.connectors, *self.terminal_members()]
             example = f': joint = ["{self.label}.{min(ends)}", …]' if ends else "."
             error.advice = f"Join it in [connect], not in a series{example}"
             raise error
@@ -334,7 +337,7 @@ class Component(Declared):
             self._adopt(name, value)
         elif isinstance(value, Connector):
             self._adopt_connector(name, value)
-        elif name in self._structural:
+        elif name in self._declared.structural:
             self.give(name, value)
         elif name.startswith("_") or isinstance(getattr(type(self), name, None), Field | Mode):
             super().__setattr__(name, value)
@@ -344,7 +347,7 @@ class Component(Declared):
             self.give(name, value)
 
     def _adopt(self, name: str, value: Component | list[Component]) -> None:
-        taken = (self.fields, self._connectors, self._structural, self._class_modes)
+        taken = (self.fields, self._inside.connectors, self._declared.structural, self._declared.modes)
         if any(name in names for names in taken) or hasattr(Component, name):
             hint = ": every component has something of this name" * hasattr(Component, name)
             raise DuplicateName(f"{self.label}: '{name}' is already in use{hint}.", where=caller())
@@ -353,34 +356,37 @@ class Component(Declared):
             adopted: Any = [self._owned(f"{name}[{k}]", part) for k, part in enumerate(value, 1)]
         else:
             adopted = self._owned(name, value)
-        self._parts[name] = adopted
+        self._inside.parts[name] = adopted
         self.__dict__[name] = adopted
-        self.__dict__.pop("_named", None)
+        self._inside.elements = None
 
     def _owned(self, name: str, part: Component) -> Component:
         twin = part.copy()
-        twin.__dict__.update(_owner=self, _name=name)
+        twin._inside.owner, twin._inside.name = self, name
         return twin
 
     def _adopt_connector(self, name: str, connector: Connector) -> None:
         twin = connector._detached_copy()
-        twin.__dict__.update(_owner=self, _name=name)
-        self._connectors[name] = twin
+        inside(twin).owner, inside(twin).name = self, name
+        self._inside.connectors[name] = twin
         self.__dict__[name] = twin
 
     def copy(self) -> Self:
         """Return an independent copy of this component and its parts, without an owner."""
         twin = self._detached_copy()
-        fresh = {key: dict(self.__dict__[key]) for key in ("_values", "_starts", "_start_modes")}
-        twin.__dict__.update(fresh, _parts={}, _connectors={})
-        for name, connector in self._connectors.items():
+        own = twin._inside
+        own.values, own.starts, own.start_modes = own.values.copy(), own.starts.copy(), own.start_modes.copy()
+        own.parts, own.connectors = {}, {}
+        for name, connector in self._inside.connectors.items():
             twin._adopt_connector(name, connector)
-        for name, part in self._parts.items():
+        for name, part in self._inside.parts.items():
             twin._adopt(name, part)
         return twin
 
     def __repr__(self) -> str:
-        values = [f"{name}={value.given!r}" for name, value in (*self._values.items(), *self._starts.items())]
+        values = [
+            f"{name}={value.given!r}" for name, value in (*self._inside.values.items(), *self._inside.starts.items())
+        ]
         return f"{type(self).__name__}({', '.join(values)})"
 
 
@@ -396,6 +402,5 @@ def _is_part(value: object) -> bool:
     return isinstance(value, Component)
 
 
-def _of_kind(cls: type, kind: type[_Kind]) -> dict[str, _Kind]:
-    lineage = reversed(cls.__mro__)
-    return {name: value for base in lineage for name, value in vars(base).items() if isinstance(value, kind)}
+def _joined(*named: Mapping[str, _Kind]) -> dict[str, _Kind]:
+    return {name: value for some in named for name, value in some.items()}

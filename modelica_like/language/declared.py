@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Self, cast
+from typing import Any, ClassVar, Literal, Self, TypeVar, cast
 
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Field, Variable
 from modelica_like.language.icon import Stroke
+from modelica_like.language.inside import Declarations, Inside, InsideConnector
+
+_Kind = TypeVar("_Kind")
 
 
 def annotated(cls: type) -> Mapping[str, Any]:
@@ -18,20 +21,30 @@ def annotated(cls: type) -> Mapping[str, Any]:
     return vars(cls).get("__annotations__", {})
 
 
+def of_kind(cls: type, kind: type[_Kind]) -> dict[str, _Kind]:
+    """Return the declarations of one kind in the bodies of a class and its bases."""
+    lineage = reversed(cls.__mro__)
+    return {name: value for base in lineage for name, value in vars(base).items() if isinstance(value, kind)}
+
+
 class Declared:
     """An object with declared fields, an owner and a name there."""
 
     renamed: ClassVar[Mapping[str, str]] = {}
     """What to write instead of names of earlier versions, by them: `{"pulses": "n"}`; bases add theirs."""
-    _class_fields: ClassVar[dict[str, Field]] = {}
-    _own_fields: Mapping[str, Field] = {}
-    _owner: Declared | None = None
-    _name: str = ""
+    _declared: ClassVar[Declarations] = Declarations()
+    _kept: ClassVar[type[Inside]] = Inside
+    _inside: Inside
+
+    def __new__(cls, *_: Any, **__: Any) -> Self:
+        """Make the record of the framework; `__init__` of a user's class may call the one here late."""
+        one = super().__new__(cls)
+        one.__dict__["_inside"] = cls._kept()
+        return one
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        lineage = reversed(cls.__mro__)
-        cls._class_fields = {name: f for base in lineage for name, f in vars(base).items() if isinstance(f, Field)}
+        cls._declared = Declarations(fields=of_kind(cls, Field))
         former = (vars(base).get("renamed", {}) for base in reversed(cls.__mro__))
         cls.renamed = {name: instead for names in former for name, instead in names.items()}
 
@@ -47,13 +60,9 @@ class Declared:
     @property
     def fields(self) -> dict[str, Field]:
         """Declared parameters, variables, signals and discrete values, and those that this one alone has, by name."""
-        own = self._own_fields
-        if not own:
-            return self._class_fields
-        # Every change makes a new dictionary; a netlist of thousands of parameters asks for each of them.
-        if (joined := self.__dict__.get("_joined_fields")) is None or joined[0] is not own:
-            joined = self.__dict__["_joined_fields"] = own, {**self._class_fields, **own}
-        return joined[1]
+        return (
+            {**self._declared.fields, **self._inside.own_fields} if self._inside.own_fields else self._declared.fields
+        )
 
     def declare_array(self, name: str, size: int, field: Field) -> None:
         """Declare variables or signals `name[1]` to `name[size]`, in `build`: structural fields say how many.
@@ -63,15 +72,15 @@ class Declared:
             size: how many; what was declared under this name before is gone.
             field: of each, such as `var("N.m", "torque")`.
         """
-        kept = {key: f for key, f in self._own_fields.items() if not key.startswith(f"{name}[")}
+        kept = {key: f for key, f in self._inside.own_fields.items() if not key.startswith(f"{name}[")}
         for key in (f"{name}[{k}]" for k in range(1, size + 1)):
             kept[key] = copy(field)
             kept[key].owner, kept[key].name = type(self).__name__, key
-        self.__dict__["_own_fields"] = kept
+        self._inside.own_fields = kept
 
     def array(self, name: str) -> list[Symbol]:
         """Return the variables or signals of an array."""
-        return [symbol_of(self, key) for key in self._own_fields if key.startswith(f"{name}[")]
+        return [symbol_of(self, key) for key in self._inside.own_fields if key.startswith(f"{name}[")]
 
     def is_constant(self, name: str) -> bool:
         """Return whether a field keeps its value between events."""
@@ -82,32 +91,31 @@ class Declared:
         """Dotted name from the root of the tree; empty for the root itself."""
         names: list[str] = []
         node: Declared = self
-        while node._owner is not None:
-            names.append(node._name)
-            node = node._owner
+        while node._inside.owner is not None:
+            names.append(node._inside.name)
+            node = node._inside.owner
         return ".".join(reversed(names))
 
     @property
     def root(self) -> Declared:
         """The whole tree."""
         node: Declared = self
-        while node._owner is not None:
-            node = node._owner
+        while node._inside.owner is not None:
+            node = node._inside.owner
         return node
 
     @property
     def label(self) -> str:
         """Name for messages: the path, or the type for the root."""
-        return self.path or self._name or type(self).__name__
+        return self.path or self._inside.name or type(self).__name__
 
     def __getstate__(self) -> dict[str, Any]:
-        # Symbols are valid in one process only, and the parts by name follow from the parts.
-        return {key: value for key, value in self.__dict__.items() if key not in ("_symbols", "_markers", "_named")}
+        return {**self.__dict__, "_inside": self._inside.detached()}
 
     def _detached_copy(self) -> Self:
         twin = object.__new__(type(self))
         twin.__dict__.update(self.__getstate__())
-        twin.__dict__["_owner"] = None
+        twin._inside.owner = None
         return twin
 
 
@@ -144,17 +152,19 @@ class Connector(Declared):
     domain: ClassVar[Domain] = Domain()
     stroke: ClassVar[Stroke | None] = None
     """Line style of its connections."""
+    _kept: ClassVar[type[Inside]] = InsideConnector
+    _inside: InsideConnector  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __init__(self, description: str = "", *, free: bool = False, optional: bool = False) -> None:
         self.description = description
         self.may_be_free = free or optional
         self.optional = optional
-        self._used = not optional
+        self._inside.used = not optional
 
     @property
     def used(self) -> bool:
         """Whether an optional connector is connected."""
-        return self._used
+        return self._inside.used
 
     @property
     def quantities(self) -> dict[str, Variable]:

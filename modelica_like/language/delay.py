@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, cast
 
 import casadi as ca
@@ -29,12 +30,11 @@ class Part(Marker):
         self.whole = whole
 
 
-def parts(delay: Marker) -> list[Part]:
+def parts(delay: Marker) -> Sequence[Part]:
     """Return the numbers of a delay, always the same ones."""
-    if "_parts" not in delay.__dict__:
-        units = [delay.of] * TERMS + [TIME, 1 / TIME]
-        delay.__dict__["_parts"] = [Part(delay, unit) for unit in units]
-    return delay.__dict__["_parts"]
+    if not delay.numbers:
+        delay.numbers = [Part(delay, unit) for unit in (*[delay.of] * TERMS, TIME, 1 / TIME)]
+    return delay.numbers
 
 
 def delay(value: Expr, time: Scalar) -> Expr:

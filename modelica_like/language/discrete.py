@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
 
@@ -12,6 +12,7 @@ import casadi as ca
 from modelica_like.errors import LanguageError, Source
 from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Variable
+from modelica_like.language.inside import Inside, inside
 from modelica_like.language.places import NOWHERE, caller
 
 MarkerKind = Literal["relation", "floor", "was", "once", "clock", "delay", "sample", "previous", "ending"]
@@ -28,11 +29,13 @@ class Marker(Symbol):
         of: the condition or value.
         offset: time of the first tick of a clock, or a delay, in s.
         name: path from the component, given when its template is made.
+        numbers: of a delay; see `delay.parts`.
     """
 
     kind: MarkerKind
     of: Expr
     offset: Expr
+    numbers: Sequence[Any] = ()
 
     def __init__(self, kind: MarkerKind, of: Expr, offset: Scalar = 0.0) -> None:
         super().__init__(None, kind)
@@ -67,12 +70,18 @@ def marker(kind: MarkerKind, of: Expr, offset: Scalar = 0.0) -> Marker:
     """Return the marker for an expression, the same one for equal expressions."""
     wanted: Any = ca.vertcat(of, offset)
     owner = _owner_in(of)
-    markers: list[Marker] = _timed if owner is None else owner.__dict__.setdefault("_markers", [])
+    markers = _timed if owner is None else _markers_of(owner)
     same = (m for m in markers if m.kind == kind and ca.is_equal(ca.vertcat(m.of, m.offset), wanted, 99))
     match = next(same, None)
     if match is None:
         markers.append(match := Marker(kind, of, offset))
     return match
+
+
+def _markers_of(owner: Any) -> list[Marker]:
+    kept: Inside = inside(owner)
+    kept.markers = [] if kept.markers is None else kept.markers
+    return kept.markers
 
 
 def _owner_in(expression: Expr) -> Any:
@@ -173,9 +182,8 @@ def pre(value: Expr) -> Expr:
         what = f"pre({value}): only a discrete, Boolean or integer variable has a value before an event."
         raise LanguageError(what, where=caller(), advice="For a mode, declare boolean(…) and set it by an equation.")
     symbol = cast(Symbol, value)
-    if "_pre" not in symbol.__dict__:
-        symbol.__dict__["_pre"] = Pre(symbol)
-    return symbol.__dict__["_pre"]
+    symbol.before = Pre(symbol) if symbol.before is None else symbol.before
+    return symbol.before
 
 
 def edge(condition: Expr) -> Expr:

@@ -8,6 +8,8 @@ from weakref import WeakValueDictionary
 
 import casadi as ca
 
+from modelica_like.language.inside import Inside, inside
+
 if TYPE_CHECKING:
 
     class Expr:
@@ -52,6 +54,8 @@ class Symbol(Expr):
     owner: Any
     name: str
     order: int
+    before: Symbol | None = None
+    """Its value before an event; made by `pre`."""
 
     def __init__(self, owner: Any, name: str, order: int = 0) -> None:
         label = f"{'der(' * order}{name}{')' * order}"
@@ -84,10 +88,12 @@ def symbol_of(owner: Any, name: str, order: int = 0) -> Symbol:
         name: of the field.
         order: order of the time derivative.
     """
-    cache: dict[tuple[str, int], Symbol] = owner.__dict__.setdefault("_symbols", {})
-    if (name, order) not in cache:
-        cache[name, order] = Symbol(owner, name, order)
-    return cache[name, order]
+    kept: Inside = inside(owner)
+    if kept.symbols is None:
+        kept.symbols = {}
+    if (name, order) not in kept.symbols:
+        kept.symbols[name, order] = Symbol(owner, name, order)
+    return kept.symbols[name, order]
 
 
 def symbols_in(expression: Expr) -> list[Symbol]:

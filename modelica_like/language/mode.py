@@ -12,6 +12,7 @@ from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mea
 from modelica_like.language.discrete import eventful, marker
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
 from modelica_like.language.holding import Hold
+from modelica_like.language.inside import inside
 from modelica_like.language.places import NOWHERE, caller
 
 
@@ -85,7 +86,7 @@ class Mode:
 
     def __set__(self, instance: Any, value: str) -> None:
         self.number(value)
-        instance._start_modes[self.name] = value
+        inside(instance).start_modes[self.name] = value
 
     def number(self, name: str) -> int:
         """Return the number of a mode.

@@ -11,6 +11,7 @@ from typing import Any, cast
 from modelica_like.errors import ModelicaLikeError, NetlistError, ValueOutOfRange
 from modelica_like.language.expr import Expr
 from modelica_like.language.fields import Field
+from modelica_like.language.inside import inside
 from modelica_like.language.places import caller
 from modelica_like.language.units import ANY, Unit, parse_unit, to_si
 
@@ -109,13 +110,14 @@ class Rows:
         label = f"{type(owner).__name__}.{name}"
         try:
             understood, measured = self.read(label, owner.fields, given)
-            for scale in measured & owner._values.keys():
+            for scale in measured & inside(owner).values.keys():
                 raise both_given(label, scale)
         except ModelicaLikeError as error:
             error.where = error.where or (caller(),)
             raise
-        owner._given_tables = {**owner._given_tables, name: given}
-        owner._measured = {k: v for k, v in owner._measured.items() if v != label} | dict.fromkeys(measured, label)
+        kept = inside(owner)
+        kept.given_tables = {**kept.given_tables, name: given}
+        kept.measured = {k: v for k, v in kept.measured.items() if v != label} | dict.fromkeys(measured, label)
         return understood
 
     def _check_rising(self, label: str, table: list[tuple[Any, ...]]) -> None:

@@ -12,6 +12,7 @@ from modelica_like.errors import LanguageError, UnknownName, did_you_mean
 from modelica_like.language.component import Component
 from modelica_like.language.expr import symbol_of
 from modelica_like.language.fields import Parameter, param
+from modelica_like.language.inside import declarations, inside
 from modelica_like.language.tables import Rows
 
 _Root = TypeVar("_Root", bound=Component)
@@ -30,9 +31,7 @@ def with_tunable_tables(root: _Root, patterns: Iterable[str]) -> _Root:
         LanguageError: a named table has texts, or is passed on to parts.
     """
     root = copy.deepcopy(root)
-    with_tables = [
-        (part, name, rows) for part in cast("Iterable[Any]", root.walk()) for name, rows in part._tables.items()
-    ]
+    with_tables = [(part, name, rows) for part in root.walk() for name, rows in declarations(part).tables.items()]
     tables = {f"{table[0].path}.{table[1]}".lstrip("."): table for table in with_tables}
     for pattern in patterns:
         met = [path for path in tables if fnmatchcase(path, pattern.replace("[", "[[]"))]
@@ -51,14 +50,14 @@ def with_tunable_tables(root: _Root, patterns: Iterable[str]) -> _Root:
                     advice="Name the table of the part." if owner.parts else "",
                 )
             if not kept:
-                owner.__dict__["_own_fields"] = {**owner._own_fields, **_cells(owner, name, rows)}
+                inside(owner).own_fields = {**inside(owner).own_fields, **_cells(owner, name, rows)}
     return root
 
 
 def _cells(owner: Component, table: str, rows: Rows) -> dict[str, Parameter]:
     """Return a parameter for every number of a table, row by row."""
     cells: dict[str, Parameter] = {}
-    for i, row in enumerate(owner.__dict__[table], 1):
+    for i, row in enumerate(getattr(owner, table), 1):
         numbers: tuple[float, ...] = (row,) if rows.flat else row
         for j, number in enumerate(numbers, 1):
             column = rows.columns[min(j, len(rows.columns)) - 1]
@@ -74,17 +73,19 @@ def _cells(owner: Component, table: str, rows: Rows) -> dict[str, Parameter]:
 def symbols_in_tables(component: Any) -> Generator[None]:
     """Let the equations of a component see symbols in the tables whose numbers are parameters."""
     numbers: dict[str, Any] = {}
-    for name, rows in component._tables.items():
-        table = component.__dict__[name]
+    for name, rows in declarations(component).tables.items():
+        table = getattr(component, name)
         if f"{name}[1]" in component.fields or f"{name}[1,1]" in component.fields:
             numbers[name] = table
-            component.__dict__[name] = tuple(
+            symbols = tuple(
                 symbol_of(component, f"{name}[{i}]")
                 if rows.flat
                 else tuple(symbol_of(component, f"{name}[{i},{j}]") for j in range(1, len(row) + 1))
                 for i, row in enumerate(table, 1)
             )
+            object.__setattr__(component, name, symbols)  # past the check of new rows
     try:
         yield
     finally:
-        component.__dict__.update(numbers)
+        for name, table in numbers.items():
+            object.__setattr__(component, name, table)

@@ -8,6 +8,7 @@ from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component, Connector
 from modelica_like.language.equation import Connection, FreeEnd, as_statement
 from modelica_like.language.fields import Parameter
+from modelica_like.language.inside import inside
 from modelica_like.language.places import located
 
 
@@ -25,7 +26,7 @@ def as_assembly(component: Component) -> Assembly:
     if names or root.modes:
         raise _not_only_wires(component, ", ".join([*names, *root.modes]))
     parameters = {name: value_text(root, name) for name in root.fields}
-    parts: dict[str, Any] = dict(root._parts)
+    parts: dict[str, Any] = dict(inside(root).parts)
     wires: list[list[str]] = []
     free: list[str] = []
     exposed: dict[str, str] = {}
@@ -39,7 +40,7 @@ def as_assembly(component: Component) -> Assembly:
             raise _not_only_wires(component, f"the equation {source}")
     named = {f"wire_{k}": ends for k, ends in enumerate((ends for ends in wires if len(ends) > 1), 1)}
     assembly = Assembly(
-        component._name or type(component).__name__, parts=parts, connect=named, free=free, parameters=parameters
+        inside(component).name or type(component).__name__, parts=parts, connect=named, free=free, parameters=parameters
     )
     for name, end in exposed.items():
         assembly.expose(name, end)
@@ -60,7 +61,7 @@ def _expose(connection: Connection, root: Component, exposed: dict[str, str]) ->
 
 
 def _owner(end: Any) -> Any:
-    return end._owner if isinstance(end, Connector) else end.owner
+    return inside(end).owner if isinstance(end, Connector) else end.owner
 
 
 def _path(end: Any) -> str:

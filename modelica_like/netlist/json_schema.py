@@ -8,6 +8,7 @@ from typing import Any, get_args
 
 from modelica_like.language import Component, Input, Parameter, Variable
 from modelica_like.language.fields import Discrete, Field
+from modelica_like.language.inside import declarations
 from modelica_like.language.places import texts_of_fields
 from modelica_like.language.tables import REQUIRED, Column, Rows
 from modelica_like.language.units import ANY, parse_unit
@@ -56,9 +57,9 @@ def chosen(types: Iterable[str], others: Iterable[dict[str, Any]] = ()) -> dict[
 
 
 def _units(types: Iterable[type[Component]]) -> set[str]:
-    fields = {field.unit_text for kind in types for field in kind._class_fields.values()}
+    fields = {field.unit_text for kind in types for field in declarations(kind).fields.values()}
     columns = {
-        str(column.unit_in(kind._class_fields)) for kind in types for table in kind._tables.values()
+        str(column.unit_in(declarations(kind).fields)) for kind in types for table in declarations(kind).tables.values()
         for column in table.columns if not column.text
     }  # fmt: skip
     return fields | columns
@@ -130,21 +131,25 @@ def _component(kind: type[Component], quantities: Quantities) -> dict[str, Any]:
     count = {**_COUNT, "description": "number of parts in an array"}
     properties: dict[str, Any] = {"is": {"const": kind.__name__}, "count": count}
     properties |= {
-        name: _field(field, quantities) for name, field in kind._class_fields.items() if isinstance(field, described)
+        name: _field(field, quantities)
+        for name, field in declarations(kind).fields.items()
+        if isinstance(field, described)
     }
     properties |= {
         name: {"enum": list(mode.names), "description": f"{mode.description}, at the start"}
-        for name, mode in kind._class_modes.items()
+        for name, mode in declarations(kind).modes.items()
     }
     texts = texts_of_fields(kind)
     properties |= {
         name: {"description": texts.get(name, ""), **_structural(kind, name)}
-        for name in kind._structural if name not in kind._tables
+        for name in declarations(kind).structural if name not in declarations(kind).tables
     }  # fmt: skip
-    properties |= {name: _table(table, kind._class_fields, quantities) for name, table in kind._tables.items()}
+    properties |= {
+        name: _table(table, declarations(kind).fields, quantities) for name, table in declarations(kind).tables.items()
+    }
     properties |= {
         name: {"type": "object", "description": "values of a part", "additionalProperties": True}
-        for name in kind._class_parts
+        for name in declarations(kind).parts
     }
     return {
         "type": "object",
@@ -188,7 +193,7 @@ def _cell(column: Column, fields: Mapping[str, Field], quantities: Quantities) -
 
 
 def _structural(kind: type[Component], name: str) -> dict[str, Any]:
-    default = kind._structural[name]
+    default = declarations(kind).structural[name]
     entry: dict[str, Any] = (
         {"type": json_type, "default": default} if (json_type := _JSON_TYPES.get(type(default))) else {}
     )

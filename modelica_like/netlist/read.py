@@ -19,6 +19,7 @@ from modelica_like.errors import (
 )
 from modelica_like.language import Assembly, Component, Variable, guess
 from modelica_like.language.fields import Discrete
+from modelica_like.language.inside import declarations, inside
 from modelica_like.netlist.document import Document, check_part, parse, read_text
 from modelica_like.netlist.registry import find_type
 from modelica_like.trust import trusting
@@ -108,9 +109,10 @@ class _Loader:
             document.name, connect=document.connect, series=document.series, free=document.free,
             description=document.description,
         )  # fmt: skip
-        assembly.__dict__.update(_origin=str(chain[-1]), _simulate=document.simulate, _display=document.display)
+        own = inside(assembly)
+        own.origin, own.simulate, own.display = str(chain[-1]), document.simulate, document.display
         if document.sizing:
-            assembly.__dict__["_sizing"] = str(chain[-1].parent / document.sizing)
+            own.sizing = str(chain[-1].parent / document.sizing)
         task = _Task(document, assembly, chain, self)
         task.run()
         if task.errors:
@@ -185,7 +187,7 @@ class _Task:
         Assembly.place(self.assembly, f"parts.{name}", self.document.lines.source("parts", name))
         if isinstance(entry, dict):
             first = part[0] if isinstance(part, list) else part
-            for key in first._starts.keys() & entry.keys():
+            for key in inside(first).starts.keys() & entry.keys():
                 Assembly.place(self.assembly, f"parts.{name}.{key}", self.document.lines.source("parts", name, key))
 
     def _part(self, name: str, table: Mapping[str, Any]) -> Component:
@@ -227,7 +229,7 @@ class _Task:
         owner_path, _, name = path.rpartition(".")
         owner = self.assembly.find(owner_path)
         can_start = name in owner.modes or isinstance(owner.fields.get(name), Variable | Discrete)
-        if not can_start and (name in owner.fields or name in owner._structural):
+        if not can_start and (name in owner.fields or name in declarations(owner).structural):
             raise UnknownName(
                 f"{path} is a parameter, not a variable.", advice="Give its value where the part is declared."
             )
@@ -241,7 +243,7 @@ def is_modelica(path: str | Path) -> bool:
 
 def new_component(kind: type[Component], values: dict[str, Any]) -> Component:
     """Create a component; its structural fields must be known now, because they decide its parts."""
-    structural = {key: values.pop(key) for key in kind._structural if key in values}
+    structural = {key: values.pop(key) for key in declarations(kind).structural if key in values}
     for key, value in structural.items():
         kind.check_structural(key, value)
     try:

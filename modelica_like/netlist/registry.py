@@ -16,6 +16,7 @@ from types import MappingProxyType, ModuleType
 
 from modelica_like.errors import NetlistError, UnknownName, UntrustedModule, did_you_mean
 from modelica_like.language import Component
+from modelica_like.language.inside import declarations
 from modelica_like.trust import may_run
 
 GROUP = "modelica_like.libraries"
@@ -83,7 +84,12 @@ def _type_in(name: str, modules: Mapping[str, ModuleType]) -> type[Component] | 
     for library, module in modules.items():
         with _importing(f"The library '{library}'"):
             kind = getattr(module, name)
-        if isinstance(kind, type) and issubclass(kind, Component) and not kind._partial and kind not in kinds:
+        if (
+            isinstance(kind, type)
+            and issubclass(kind, Component)
+            and not declarations(kind).partial
+            and kind not in kinds
+        ):
             kinds.append(kind)
     if len(kinds) > 1:
         raise NetlistError(

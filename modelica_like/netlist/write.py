@@ -14,6 +14,7 @@ from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component
 from modelica_like.language.fields import Field, Parameter, Value
 from modelica_like.language.formula import Formula
+from modelica_like.language.inside import declarations, inside
 from modelica_like.language.tables import frozen_rows
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.read import load, new_component
@@ -49,7 +50,7 @@ class _Writer:
         self.guess: dict[str, Any] = {}
 
     def document(self, assembly: Assembly) -> tomlkit.TOMLDocument:
-        parts = {name: self.part(name, part) for name, part in assembly._parts.items()}
+        parts = {name: self.part(name, part) for name, part in inside(assembly).parts.items()}
         sections: dict[str, Mapping[str, Any]] = {
             "parameters": {
                 name: plain(_given(assembly, name).given)
@@ -62,15 +63,15 @@ class _Writer:
             "expose": dict(assembly.exposed),
             "start": self.start,
             "guess": self.guess,
-            "simulate": assembly.__dict__["_simulate"],
-            "display": assembly.__dict__["_display"],
+            "simulate": inside(assembly).simulate,
+            "display": inside(assembly).display,
         }
         document = tomlkit.document()
-        document.add("name", tomlkit.item(assembly._name))
-        if assembly.__dict__["_description"]:
-            document.add("description", tomlkit.item(assembly.__dict__["_description"]))
-        if assembly.__dict__["_sizing"]:
-            sizing = Path(os.path.relpath(assembly.__dict__["_sizing"], self.folder.resolve()))
+        document.add("name", tomlkit.item(inside(assembly).name))
+        if inside(assembly).description:
+            document.add("description", tomlkit.item(inside(assembly).description))
+        if inside(assembly).sizing:
+            sizing = Path(os.path.relpath(inside(assembly).sizing, self.folder.resolve()))
             document.add("sizing", tomlkit.item(sizing.as_posix()))
         if assembly.free_ends:
             document.add("free", tomlkit.item(list(assembly.free_ends)))
@@ -89,7 +90,7 @@ class _Writer:
     def entry(self, path: str, part: Component) -> dict[str, Any]:
         """Return the table of one part: its type, and the differences from a new one of that type."""
         if isinstance(part, Assembly):
-            origin = part.__dict__["_origin"]
+            origin = inside(part).origin
             if not origin:
                 raise NetlistError(
                     f"{part.label} is an assembly without a file, so a netlist cannot name it.",
@@ -98,20 +99,26 @@ class _Writer:
             relative = Path(os.path.relpath(origin, self.folder.resolve())).as_posix()
             return {
                 "is": (relative if relative.startswith(".") else f"./{relative}"),
-                **self.changes(path, part, load(part.__dict__["_origin"])),
+                **self.changes(path, part, load(inside(part).origin)),
             }
-        structural = {key: plain(part._given_tables.get(key, part.__dict__[key])) for key in part._structural}
+        structural = {
+            key: plain(inside(part).given_tables.get(key, getattr(part, key))) for key in declarations(part).structural
+        }
         reference = new_component(type(part), dict(structural))
-        different = {key: value for key, value in structural.items() if frozen_rows(value) != part._structural[key]}
+        different = {
+            key: value for key, value in structural.items() if frozen_rows(value) != declarations(part).structural[key]
+        }
         return {"is": type_name(type(part)), **different, **self.changes(path, part, reference)}
 
     def changes(self, path: str, part: Component, reference: Component) -> dict[str, Any]:
         """Return the values that differ from those of `reference`; start values go to their sections."""
         table = {
-            name: plain(value.given) for name, value in part._values.items() if value != reference._values.get(name)
+            name: plain(value.given)
+            for name, value in inside(part).values.items()
+            if value != inside(reference).values.get(name)
         }
-        for name, value in part._starts.items():
-            if value != reference._starts.get(name):
+        for name, value in inside(part).starts.items():
+            if value != inside(reference).starts.get(name):
                 section = self.start if value.fixed else self.guess
                 section[f"{path}.{name}"] = plain(value.given)
         for name in part.modes:

@@ -10,6 +10,7 @@ import numpy as np
 
 from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language import Assembly, Component, Input
+from modelica_like.language.inside import inside
 from modelica_like.language.units import ANY, parse_unit, to_si
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.read import load
@@ -130,11 +131,11 @@ def _drive(drive: Assembly, path: str, rows: list[list[float]]) -> None:
             f"The input '{path}' is connected already.", advice="Inputs over time are for open inputs of parts."
         )
     part = drive.find(owner)
-    part._values.pop(name, None)  # the trajectory replaces the value
+    inside(part).values.pop(name, None)  # the trajectory replaces the value
     unit = part.fields[name].unit
     scale = 1.0 if unit == ANY or str(unit) == "1" else f"1 {unit}"
     label = f"{inner}_over_time".translate(str.maketrans(".[", "__", "]"))
     setattr(drive, label, find_type("Table")(table=rows, scale=scale))
-    drive.__dict__["_own_connectors"] = tuple(pair for pair in drive.exposed if pair[0] != path)
-    drive.__dict__["_own_fields"] = {key: field for key, field in drive._own_fields.items() if key != path}
-    drive.__dict__["_wires"] = {**drive.wires, label: (f"{label}.y", inner)}
+    inside(drive).exposed = tuple(pair for pair in drive.exposed if pair[0] != path)
+    inside(drive).own_fields = {key: field for key, field in inside(drive).own_fields.items() if key != path}
+    inside(drive).wires = {**drive.wires, label: (f"{label}.y", inner)}

@@ -26,6 +26,7 @@ from modelica_like.language import (
     var,
     when,
 )
+from modelica_like.language.inside import declarations
 from modelica_like.language.units import parse_unit, to_si
 from modelica_like.netlist import library_types, load, schema
 from modelica_like.netlist.json_units import Quantities
@@ -78,7 +79,11 @@ def test_nothing_in_equations_is_left_undefined(name: str) -> None:
     source = Source(library_types()[name])
     lines = [line.strip() for some in statements(source.kind).values() for line in some]
     defined = {re.split(r"[(:= ]", line)[0] for line in lines}
-    fields = {*source.kind._class_fields, *source.kind._class_modes, *source.kind._structural}
+    fields = {
+        *declarations(source.kind).fields,
+        *declarations(source.kind).modes,
+        *declarations(source.kind).structural,
+    }
     for line in lines:
         words = set(re.findall(r"(?<![\w.'])[A-Za-z_]\w*\b(?!=[^=])", line))
         methods = {word for word in words if source.method(word) or source.method(f"_{word}")} - fields
@@ -93,7 +98,12 @@ def test_private_names_have_no_underscore_and_meet_no_other() -> None:
     assert re.search(r"^ +FAINT = 1e-10 *$", text, re.MULTILINE)
     for kind in library_types().values():
         source = Source(kind)
-        public = {*kind._class_fields, *kind._class_modes, *kind._structural, *kind._class_connectors}
+        public = {
+            *declarations(kind).fields,
+            *declarations(kind).modes,
+            *declarations(kind).structural,
+            *declarations(kind).connectors,
+        }
         private = {name for base in kind.__mro__ for name in vars(base) if re.match("_[a-z]", name)}
         assert [name for name in private if source.method(name) and name.lstrip("_") in public] == []
         assert [name for name in private if source.method(name) and source.method(name.lstrip("_"))] == []
@@ -110,8 +120,10 @@ def test_conditions_parts_and_codes_are_told() -> None:
     assert "free (0), stuck (1), start_forward (2)" in "\n".join(clutch)
     servo = library_types()["ServoMotor"]
     begin = lines("ServoMotor").index("parts")
-    told = {line.split()[0]: line.split()[1] for line in lines("ServoMotor")[begin + 2 :][: len(servo._class_parts)]}
-    assert told == {name: type(part).__name__ for name, part in servo._class_parts.items()}
+    told = {
+        line.split()[0]: line.split()[1] for line in lines("ServoMotor")[begin + 2 :][: len(declarations(servo).parts)]
+    }
+    assert told == {name: type(part).__name__ for name, part in declarations(servo).parts.items()}
 
 
 def test_a_netlist_is_described_with_the_parts_of_its_assemblies() -> None:
@@ -215,7 +227,8 @@ def test_a_quantity_passes_the_schema_if_and_only_if_a_netlist_takes_it() -> Non
     """For the units of all declarations, against the units of all declarations."""
     known = schema()["definitions"]
     units = sorted(
-        {field.unit_text for kind in library_types().values() for field in kind._class_fields.values()} - {"*", "1"}
+        {field.unit_text for kind in library_types().values() for field in declarations(kind).fields.values()}
+        - {"*", "1"}
     )
     told = 0
     for unit in units:
@@ -240,7 +253,7 @@ def test_every_entry_is_explained() -> None:
     )
     for name, kind in library_types().items():
         properties = known["definitions"][name]["properties"]
-        for field in kind._class_fields.values():
+        for field in declarations(kind).fields.values():
             if field.name in properties:
                 unit = "" if field.unit_text == "1" else f" [{field.unit_text}]"
                 assert properties[field.name]["description"] == field.description + unit

@@ -15,6 +15,7 @@ from inputs import document
 from modelica_like import build, simulate
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.language import Input, Output, Parameter
+from modelica_like.language.inside import declarations
 from modelica_like.language.tables import REQUIRED
 from modelica_like.netlist import library_types, loads
 
@@ -46,9 +47,9 @@ def valid_parts() -> dict[str, list[dict[str, Any]]]:
 
 
 def _needed(kind: Any) -> dict[str, Any]:
-    fields = {name: field for name, field in kind._class_fields.items() if isinstance(field, Parameter)}
+    fields = {name: field for name, field in declarations(kind).fields.items() if isinstance(field, Parameter)}
     numbers = {name: max(field.min or 0, 1.0) for name, field in fields.items() if field.default is None}
-    texts = {name: kind.choices(name)[0] for name, value in kind._structural.items()
+    texts = {name: kind.choices(name)[0] for name, value in declarations(kind).structural.items()
              if value is REQUIRED and kind.choices(name)}  # fmt: skip
     return numbers | texts
 

@@ -34,6 +34,7 @@ from modelica_like.cli import TASKS, command
 from modelica_like.cli import run as call
 from modelica_like.cli.reader import parameters
 from modelica_like.errors import ModelicaLikeError
+from modelica_like.language.inside import declarations
 from modelica_like.language.units import parse_unit, read_quantity, to_si
 from modelica_like.netlist import library_types, loads
 from modelica_like.netlist.write import dumps
@@ -92,7 +93,12 @@ def netlist(chance: random.Random) -> tuple[str, Callable[[], object]]:
 def part(chance: random.Random) -> tuple[str, Callable[[], object]]:
     """Load a part of any type with strange values; some are compiled, with all that they need."""
     name, kind = chance.choice(list(library_types().items()))
-    known = [*kind._class_fields, *kind._structural, *kind._class_modes, *kind._class_parts]
+    known = [
+        *declarations(kind).fields,
+        *declarations(kind).structural,
+        *declarations(kind).modes,
+        *declarations(kind).parts,
+    ]
     values = {
         key: deepcopy(chance.choice(STRANGE)) for key in chance.sample(known, min(len(known), chance.randrange(4)))
     }

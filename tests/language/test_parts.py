@@ -22,6 +22,7 @@ from modelica_like.language import (
     series,
     var,
 )
+from modelica_like.language.inside import inside
 
 
 class End(Connector):
@@ -129,7 +130,7 @@ def test_the_parts_by_name_follow_what_replaces_them():
     assert list(known) == ["masses[1]", "masses[2]", "masses[3]", "springs[1]", "springs[2]"]
     for one in copies:
         assert list(one.parts) == list(known)
-        assert all(part._owner is one and part is not known[name] for name, part in one.parts.items())
+        assert all(inside(part).owner is one and part is not known[name] for name, part in one.parts.items())
 
 
 def test_an_annotated_part_is_replaceable():
@@ -211,7 +212,7 @@ def test_copies_are_independent():
     for twin in (drive.copy(), copy.deepcopy(drive), pickle.loads(pickle.dumps(drive))):
         assert twin.first is not drive.first
         assert twin.first.path == "first"
-        assert twin.first._owner is twin
+        assert inside(twin.first).owner is twin
         assert twin.first.s is not drive.first.s
         assert twin.first.value("m") == drive.first.value("m")
         assert twin.first.start("s").fixed is False  # type: ignore[union-attr]

@@ -13,6 +13,7 @@ import pytest
 import components
 from modelica_like import Component
 from modelica_like.language.declared import Connector
+from modelica_like.language.inside import declarations
 from modelica_like.language.tables import Rows
 from modelica_like.netlist import library_types
 
@@ -21,17 +22,17 @@ COLUMNS = ("unit", "scale", "rising", "text", "min", "max")
 SHOWN = ("unit_text", "default", "min", "max", "above", "nominal", "guess", "state", "tunable")
 
 
-def declarations() -> Iterator[str]:
+def declared_ones() -> Iterator[str]:
     """One line for each declaration of each component, inherited ones included."""
     for name, kind in sorted(library_types().items()):
         yield name
-        yield from (f"  {key}: {_connector(one)}" for key, one in kind._class_connectors.items())
-        for field in kind._class_fields.values():
+        yield from (f"  {key}: {_connector(one)}" for key, one in declarations(kind).connectors.items())
+        for field in declarations(kind).fields.values():
             about = (f"{what} {getattr(field, what)}" for what in SHOWN if getattr(field, what, None) is not None)
             yield f"  {field.name}: {type(field).__name__}, {', '.join(about)}"
-        yield from (f"  {field} = {_told(default)}" for field, default in kind._structural.items())
-        yield from (f"  {field}: {_table(table)}" for field, table in kind._tables.items())
-        yield from (f"  {mode}: {' '.join(one.names)}" for mode, one in kind._class_modes.items())
+        yield from (f"  {field} = {_told(default)}" for field, default in declarations(kind).structural.items())
+        yield from (f"  {field}: {_table(table)}" for field, table in declarations(kind).tables.items())
+        yield from (f"  {mode}: {' '.join(one.names)}" for mode, one in declarations(kind).modes.items())
 
 
 def _names(lines: Iterable[str]) -> dict[str, dict[str, list[str]]]:
@@ -73,7 +74,7 @@ def _table(table: Rows) -> str:
 
 
 def test_declarations_are_what_netlists_rely_on() -> None:
-    known, found = LIST.read_text(encoding="utf-8").splitlines(), list(declarations())
+    known, found = LIST.read_text(encoding="utf-8").splitlines(), list(declared_ones())
     changed = [f"- {line}" for line in known if line not in set(found)]
     changed += [f"+ {line}" for line in found if line not in set(known)]
     assert changed == []
@@ -82,7 +83,7 @@ def test_declarations_are_what_netlists_rely_on() -> None:
 
 def test_what_runs_today_is_never_without_a_successor() -> None:
     known = LIST.read_text(encoding="utf-8").splitlines()
-    assert broken(known, declarations()) == []
+    assert broken(known, declared_ones()) == []
     turned = [line.replace("mode: free stuck", "mode: stuck free") for line in known]
     assert "Clutch.mode: modes have other numbers; new ones go behind" in "\n".join(broken(turned, known))
     assert "Brake.capacity is gone: what replaces it is written in `renamed`" in broken(
@@ -117,11 +118,11 @@ def test_what_netlists_cannot_name_is_only_a_base() -> None:
     modules = (import_module(one.name) for one in walk_packages(components.__path__, "components."))
     kinds = {kind for module in modules for kind in vars(module).values() if isinstance(kind, type)}
     ours = {kind for kind in kinds if issubclass(kind, Component) and kind.__module__.startswith("components.")}
-    whole = {kind.__name__ for kind in ours if not kind._partial}
+    whole = {kind.__name__ for kind in ours if not declarations(kind).partial}
     assert whole - {*library_types()} == {"Chained"}  # of which a transfer function consists
 
 
 if __name__ == "__main__":
-    if faults := broken(LIST.read_text(encoding="utf-8").splitlines(), declarations()):
+    if faults := broken(LIST.read_text(encoding="utf-8").splitlines(), declared_ones()):
         raise SystemExit("\n".join(faults))
-    LIST.write_text("\n".join(declarations()) + "\n", encoding="utf-8")
+    LIST.write_text("\n".join(declared_ones()) + "\n", encoding="utf-8")

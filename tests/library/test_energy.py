@@ -61,6 +61,7 @@ from components import (
 )
 from modelica_like import Assembly, Component, Solution, load, simulate
 from modelica_like.errors import UnknownName
+from modelica_like.language.inside import declarations, inside
 
 CLOSES = 1e-8
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -79,7 +80,7 @@ def rigid(part: Component) -> Assembly:
     """The same where the part joins both masses rigidly."""
     drive = slide(part) if isinstance(part, ForceSensor) else through(part)
     second = drive.parts["m2" if isinstance(part, ForceSensor) else "J2"]
-    second._starts.clear()
+    inside(second).starts.clear()
     return drive
 
 
@@ -282,8 +283,8 @@ def _types(part: Component) -> set[type[Component]]:
 def test_every_component_is_in_some_energy_balance() -> None:
     """Here, or in a netlist of the examples; of all of these the balance is tested, component by component."""
     exported = [getattr(components, name) for name in components.__all__]
-    kinds = {kind for kind in exported if issubclass(kind, Component) and not kind._partial}
-    powered = {kind for kind in kinds if kind._class_connectors}
+    kinds = {kind for kind in exported if issubclass(kind, Component) and not declarations(kind).partial}
+    powered = {kind for kind in kinds if declarations(kind).connectors}
     assert len(powered) > 120
     netlists = [path for path in EXAMPLES.rglob("*.toml") if not {"sizing", "cosim"} & set(path.parts)]
     missing = powered - set(DRIVES) - set().union(*(_types(load(path)) for path in netlists))

@@ -8,6 +8,7 @@ from calls import called
 
 from modelica_like import load, simulate
 from modelica_like.errors import ModelicaTextError
+from modelica_like.language.inside import declarations
 from modelica_like.netlist import library_types, loads
 from modelica_like.netlist.modelica.library import known_classes
 from modelica_like.netlist.modelica.netlist_form import netlist_text
@@ -97,7 +98,7 @@ def test_two_masses_obey_the_law_of_momentum() -> None:
 def test_every_class_of_the_table_has_its_component_with_its_names() -> None:
     for known in known_classes().values():
         kind = library_types()[known.component]
-        names = {*kind._class_fields, *kind._structural, *kind._class_connectors}
+        names = {*declarations(kind).fields, *declarations(kind).structural, *declarations(kind).connectors}
         assert {*known.set, *known.fix} <= names, known.path
         own = {here for here in known.names if here in names}
         assert len({known.names[here] for here in own}) == len(own), known.path

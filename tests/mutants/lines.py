@@ -102,13 +102,13 @@ def _used() -> Iterator[Any]:
     while kinds:
         kind = kinds.pop()
         kinds += kind.__subclasses__()
-        if vars(kind).get("_templates"):
+        if kind._declared.templates:
             yield kind
 
 
 def _forget() -> None:
     for kind in _used():
-        kind._templates = {}
+        kind._declared.templates.clear()
     for one in gc.get_objects():
         if isinstance(one, _lru_cache_wrapper) and str(one.__module__).startswith(("modelica_like", "components")):
             one.cache_clear()

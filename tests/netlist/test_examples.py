@@ -7,6 +7,7 @@ import jsonschema
 import pytest
 from some import some
 
+from modelica_like.language.inside import declarations, inside
 from modelica_like.netlist import dumps, load, loads, schema
 
 EXAMPLES = sorted(
@@ -31,10 +32,10 @@ def test_example_is_read_and_written_without_loss(path: Path, validator: jsonsch
     assert [part.path for part in again.walk()] == [part.path for part in original.walk()]
     for ours, theirs in zip(again.walk(), original.walk(), strict=True):
         assert type(ours) is type(theirs)
-        assert ours._values == theirs._values
-        assert ours._starts == theirs._starts
-        assert ours._start_modes == theirs._start_modes
-        assert all(ours.__dict__[key] == theirs.__dict__[key] for key in ours._structural)
+        assert inside(ours).values == inside(theirs).values
+        assert inside(ours).starts == inside(theirs).starts
+        assert inside(ours).start_modes == inside(theirs).start_modes
+        assert all(getattr(ours, key) == getattr(theirs, key) for key in declarations(ours).structural)
     assert (again.wires, again.chains, again.free_ends) == (original.wires, original.chains, original.free_ends)
     assert again.simulate == original.simulate
     validator.validate(tomllib.loads(path.read_text(encoding="utf-8")))

@@ -26,6 +26,7 @@ from modelica_like.language import (
     series,
     var,
 )
+from modelica_like.language.inside import declarations, inside
 from modelica_like.netlist import dumps, load, loads, save
 
 NUMBERS = st.floats(1e-3, 1e3)
@@ -72,15 +73,15 @@ def assemblies(draw: st.DrawFn) -> Assembly:
 
 def assert_same(ours: Component, theirs: Component) -> None:
     assert type(ours) is type(theirs)
-    assert {k: (v.given, v.number, v.unit) for k, v in ours._values.items()} == {
-        k: (v.given, v.number, v.unit) for k, v in theirs._values.items()
+    assert {k: (v.given, v.number, v.unit) for k, v in inside(ours).values.items()} == {
+        k: (v.given, v.number, v.unit) for k, v in inside(theirs).values.items()
     }
-    assert {k: (v.number, v.fixed) for k, v in ours._starts.items()} == {
-        k: (v.number, v.fixed) for k, v in theirs._starts.items()
+    assert {k: (v.number, v.fixed) for k, v in inside(ours).starts.items()} == {
+        k: (v.number, v.fixed) for k, v in inside(theirs).starts.items()
     }
     assert [ours.start_mode(name) for name in ours.modes] == [theirs.start_mode(name) for name in theirs.modes]
-    assert {key: ours.__dict__[key] for key in ours._structural} == {
-        key: theirs.__dict__[key] for key in theirs._structural
+    assert {key: getattr(ours, key) for key in declarations(ours).structural} == {
+        key: getattr(theirs, key) for key in declarations(theirs).structural
     }
     assert list(ours.parts) == list(theirs.parts)
     for name in ours.parts:
@@ -93,7 +94,7 @@ def test_round_trip_loses_nothing(assembly: Assembly) -> None:
     text = dumps(assembly)
     again = loads(text)
     assert_same(again, assembly)
-    assert (again._name, again.description) == (assembly._name, assembly.description)
+    assert (inside(again).name, again.description) == (inside(assembly).name, assembly.description)
     assert (again.wires, again.chains, again.free_ends) == (assembly.wires, assembly.chains, assembly.free_ends)
     assert {k: f.default for k, f in again.fields.items()} == {k: f.default for k, f in assembly.fields.items()}
     assert dumps(again) == text

@@ -18,6 +18,7 @@ from components import Capacitor, Ground, Inertia, Mass, ThermalMass
 from modelica_like import Assembly, Component, build, load
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.language.fields import Input, Output, Parameter
+from modelica_like.language.inside import declarations, inside
 from modelica_like.native.start import initialize
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -45,7 +46,7 @@ def kinds() -> dict[str, list[Kind]]:
         if {"sizing", "cosim", "calibration"} & set(path.parts):
             continue
         drive = load(path)
-        numbers = {name: value.number for name, value in drive._values.items()}
+        numbers = {name: value.number for name, value in inside(drive).values.items()}
         for part in drive.parts.values():
             if type(part).__name__ in components.__all__ and type(part).__name__ not in _ALONE:
                 kind = _kind(part, numbers)
@@ -54,8 +55,8 @@ def kinds() -> dict[str, list[Kind]]:
 
 
 def _kind(part: Component, numbers: dict[str, Any]) -> Kind | None:
-    values = {name: part.__dict__[name] for name in {*part._structural, *part._tables}}
-    for name, value in part._values.items():
+    values = {name: getattr(part, name) for name in {*declarations(part).structural, *declarations(part).tables}}
+    for name, value in inside(part).values.items():
         if not isinstance(part.fields.get(name), Parameter | Input):
             continue  # start values are drawn anew
         number = value.number
@@ -153,7 +154,7 @@ class _Builder:
     def feed(self, name: str, part: Component, depth: int) -> None:
         """Give signals to the inputs of a part."""
         for field, declared in part.fields.items():
-            if not isinstance(declared, Input) or field in part._values:
+            if not isinstance(declared, Input) or field in inside(part).values:
                 continue
             if declared.default is None or self.chance.random() < 0.4:
                 self.wires[f"{name}_{field}"] = [self.source(str(declared.unit), depth), f"{name}.{field}"]

@@ -28,6 +28,7 @@ from modelica_like.language import (
     var,
 )
 from modelica_like.language import rows as table_rows
+from modelica_like.language.inside import declarations
 from modelica_like.netlist import library_types, loads
 from modelica_like.show.report.component_pages import latex_names
 from modelica_like.show.report.component_pages.latex import Path, Unwritable
@@ -52,7 +53,12 @@ def test_every_type_occurs_in_an_example() -> None:
 def test_every_page_says_everything(pages: dict[File, str]) -> None:
     for name, kind in library_types().items():
         text = next(page for file, page in pages.items() if file.name == f"{name}.md")
-        declared = [*kind._class_fields, *kind._class_connectors, *kind._class_modes, *kind._structural]
+        declared = [
+            *declarations(kind).fields,
+            *declarations(kind).connectors,
+            *declarations(kind).modes,
+            *declarations(kind).structural,
+        ]
         assert [one for one in declared if f"| `{one}` |" not in text] == []
         assert "<summary>Equations</summary>" in text or "## Parts" in text
 
@@ -62,7 +68,7 @@ def test_a_page_begins_with_symbol_example_and_parameters(pages: dict[File, str]
         text = next(page for file, page in pages.items() if file.name == f"{name}.md")
         symbol, example, first = text.index("![symbol of"), text.index("```toml"), text.index("\n## ")
         assert symbol < example < first
-        if any(isinstance(field, Parameter) for field in kind._class_fields.values()):
+        if any(isinstance(field, Parameter) for field in declarations(kind).fields.values()):
             assert text[first:].startswith("\n## Parameters\n")
         (line,) = re.findall(r"```toml\n(.*)\n```", text)
         assert isinstance(next(iter(loads(f"[parts]\n{line}\n").parts.values())), kind)
@@ -71,8 +77,8 @@ def test_a_page_begins_with_symbol_example_and_parameters(pages: dict[File, str]
 def test_every_page_has_its_symbol_with_all_leads(pages: dict[File, str]) -> None:
     for name, kind in library_types().items():
         drawing = ElementTree.fromstring(next(text for file, text in pages.items() if file.name == f"{name}.svg"))
-        signals = [one for one in kind._class_fields.values() if isinstance(one, Input | Output)]
-        ends = [one for one in kind._class_connectors.values() if not one.optional]
+        signals = [one for one in declarations(kind).fields.values() if isinstance(one, Input | Output)]
+        ends = [one for one in declarations(kind).connectors.values() if not one.optional]
         leads = [one for one in drawing.iter() if one.get("class", "").startswith("on-") and one.get("stroke")]
         assert len(leads) == len(signals) + len(ends), name
         assert (float(drawing.get("width", 0)) < 400, float(drawing.get("height", 0)) < 200) == (True, True)
@@ -136,10 +142,10 @@ def test_the_mathematics_is_well_formed(pages: dict[File, str]) -> None:
 
 def test_no_two_fields_of_a_page_have_one_symbol(pages: dict[File, str]) -> None:
     for kind in library_types().values():
-        fields = [latex_names.name(name) for name in kind._class_fields]
+        fields = [latex_names.name(name) for name in declarations(kind).fields]
         ends = [
             latex_names.name(f"{name}.{field}")
-            for name, connector in kind._class_connectors.items()
+            for name, connector in declarations(kind).connectors.items()
             for field in connector.fields
         ]
         assert [symbol for symbol, n in Counter(fields + ends).items() if n > 1] == [], kind.__name__

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from modelica_like.language import Component
+from modelica_like.language.inside import declarations
 from modelica_like.netlist import library_types
 from modelica_like.show.report.component_pages import latex_names
 from modelica_like.show.report.component_pages.latex import Path, Unwritable, Writer
@@ -315,8 +316,8 @@ def test_formulas_are_worth_what_the_class_says() -> None:
     seen: set[tuple[FunctionType, tuple[tuple[str, str], ...]]] = set()
     count = 0
     for kind in library_types().values():
-        for active in range(max((len(mode.names) for mode in kind._class_modes.values()), default=1)):
-            modes = {name: mode.names[active % len(mode.names)] for name, mode in kind._class_modes.items()}
+        for active in range(max((len(mode.names) for mode in declarations(kind).modes.values()), default=1)):
+            modes = {name: mode.names[active % len(mode.names)] for name, mode in declarations(kind).modes.items()}
             for function in functions(kind):
                 key = function, tuple(modes.items())
                 if key not in seen:

@@ -10,6 +10,7 @@ from modelica_like.errors import ModelicaLikeError, NetlistError, Source, Unknow
 from modelica_like.language import Assembly, Connector
 from modelica_like.language.equation import Connection
 from modelica_like.language.expr import Symbol
+from modelica_like.language.inside import inside
 
 _TRIED, _SHOWN = 40, 8
 """Parts that are tried and named for a list of possible cuts."""
@@ -180,7 +181,7 @@ def _nowhere(assembly: Assembly, name: str, connected: Sequence[str]) -> Excepti
             f"{name} is a whole series: {chain}.", where=assembly.source_of(f"series.{name}"),
             advice="Name the part behind which to cut.",
         )  # fmt: skip
-    if part_of(name) in assembly._parts and name.count(".") > 1:
+    if part_of(name) in inside(assembly).parts and name.count(".") > 1:
         return NetlistError(
             f"{name} is inside {part_of(name)}; only connections of the netlist itself can be cut.",
             advice=f"Split {part_of(name)}'s own netlist, or cut at one of its ends.",
@@ -207,7 +208,7 @@ def as_name(text: str) -> str:
 
 
 def _groups(assembly: Assembly, wires: Iterable[Wire]) -> tuple[tuple[str, ...], ...]:
-    names = list(assembly._parts)
+    names = list(inside(assembly).parts)
     groups = [{name} for name in names]
     for wire in wires:
         parts = {part_of(end) for end in wire.ends}

@@ -17,6 +17,7 @@ from modelica_like.fmi.terminals import adaptor_for, connector_at
 from modelica_like.language import Assembly, Component, guess
 from modelica_like.language.fields import Input, Output
 from modelica_like.language.formula import Formula
+from modelica_like.language.inside import declarations, inside
 from modelica_like.netlist.convert import value_text
 from modelica_like.structure import reduce
 
@@ -70,7 +71,7 @@ class Maker:
     def bare(self, group: int, ends: Sequence[End]) -> Assembly:
         """Return a group with adaptors at its open ends, and the given start values of its parts."""
         names = self.found.groups[group]
-        parts: dict[str, Any] = {name: self.assembly._parts[name] for name in names}
+        parts: dict[str, Any] = {name: inside(self.assembly).parts[name] for name in names}
         wires = {wire.name: wire.ends for wire in self.found.wires if part_of(wire.ends[0]) in names}
         for end in ends:
             parts[end.adaptor], inner = self.adaptor(end)
@@ -81,13 +82,13 @@ class Maker:
             f"{self.assembly.label}_{names[0]}", parts=parts, connect=wires, free=free, parameters=parameters
         )
         # The part starts with numbers, whatever the kind of start of the drive.
-        part.__dict__["_simulate"] = {**self.assembly.__dict__["_simulate"], "start": "given"}
+        inside(part).simulate = {**inside(self.assembly).simulate, "start": "given"}
         return part
 
     def adaptor(self, end: End) -> tuple[Component, str]:
         """Return an adaptor for an end, without acceleration, and the name of its connector."""
         kind, inner = adaptor_for(connector_at(self.assembly, end.path), end.takes)
-        return kind(**({"use_a": False} if "use_a" in kind._structural else {})), inner
+        return kind(**({"use_a": False} if "use_a" in declarations(kind).structural else {})), inner
 
     def members(self, end: End) -> tuple[str, ...]:
         """Return the signals that pass an end: the flow, the potential, and its rate."""
@@ -115,7 +116,7 @@ class Maker:
             elif entry.state is None and path in values and model.following:
                 kept[path] = values[path]  # states that follow the motion have no start values of their own
             else:  # other variables follow, and two start values of one motion could contradict each other
-                part.find(owner)._starts.pop(name, None)
+                inside(part.find(owner)).starts.pop(name, None)
         for place, path in enumerate(model.states):
             if place not in given and path in values:
                 part.set(path, values[path])
@@ -130,7 +131,7 @@ class Maker:
         queue = [name for part in parts for name in _names(part)]
         for name in queue:
             if "." in name:
-                if part_of(name) in self.assembly._parts and part_of(name) not in self.found.groups[group]:
+                if part_of(name) in inside(self.assembly).parts and part_of(name) not in self.found.groups[group]:
                     raise NetlistError(
                         f"A formula needs {name}, which the cut puts into another FMU.",
                         why=f"It is in one of {', '.join(self.found.groups[group])}.",
@@ -146,7 +147,11 @@ class Maker:
 def _names(part: Component | list[Component]) -> list[str]:
     """Return the names in the formulas of a part."""
     components = [node for item in (part if isinstance(part, list) else [part]) for node in item.walk()]
-    values = [value for component in components for value in (*component._values.values(), *component._starts.values())]
+    values = [
+        value
+        for component in components
+        for value in (*inside(component).values.values(), *inside(component).starts.values())
+    ]
     formulas: list[Formula] = [value.formula for value in values if value.formula is not None]
     return [name for formula in formulas for name in formula.names()]
 

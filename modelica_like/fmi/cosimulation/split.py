@@ -19,6 +19,7 @@ from modelica_like.fmi.cosimulation.system import Bond, Link, Port, Settings, Sy
 from modelica_like.fmi.export import export_fmu
 from modelica_like.fmi.package import known_version, target_file
 from modelica_like.language import Assembly, Component
+from modelica_like.language.inside import inside
 from modelica_like.netlist import load, save
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.simulation import build, seconds
@@ -86,7 +87,7 @@ def split(
     assembly = _assembly(drive)
     cut = cut_netlist(assembly, [at] if isinstance(at, str) else at)
     titles = _titles(cut, names)
-    settings = _settings(assembly.__dict__["_simulate"].get("until"), step, master)
+    settings = _settings(inside(assembly).simulate.get("until"), step, master)
     maker = Maker(assembly, cut)
     tell("choosing the causality")
     chosen = orient(maker)
@@ -99,7 +100,7 @@ def split(
         note = _export(maker.started(k, ends, values), title, file, version, check=check)
         notes += [f"{title}: {note}"] if note else []
         units.append(Unit(title, file, maker.not_passed_on(ends)))
-    system = System(assembly._name, tuple(units), *_couplings(maker, chosen, titles), settings, own_names=True)
+    system = System(inside(assembly).name, tuple(units), *_couplings(maker, chosen, titles), settings, own_names=True)
     write_system(system, target / _SYSTEM)
     taken: dict[str, Takes] = {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)}
     return Split(system, target / _SYSTEM, taken, tuple(notes))
@@ -129,7 +130,7 @@ def split_to_ssp(
 
 def _export(part: Assembly, title: str, file: Path, version: str, *, check: bool) -> str:
     """Write a part as a netlist and as an FMU, and return the result of its check."""
-    part.__dict__["_name"] = title
+    inside(part).name = title
     save(part, file.with_suffix(".toml"))
     return export_fmu(part, file, version, {"cs"}, check=check).check.sentence
 

@@ -21,7 +21,9 @@ from modelica_like.language import (
     signal_out,
     var,
 )
+from modelica_like.language.assembly import declare, end_at
 from modelica_like.language.fields import Discrete, Field, Input
+from modelica_like.language.inside import inside
 from modelica_like.language.units import parse_unit, same_dimension
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
@@ -89,12 +91,10 @@ class _Builder:
             self._attempt(place, self._member, name, member)
         if self.errors:
             raise raise_together_or_one(self.errors)
-        self.component.__dict__.update(
-            _statements=tuple(self.statements.equations), _initial=tuple(self.statements.initial),
-            _happenings=tuple(self.statements.happenings),
-            _instants=frozenset(name for name, instant in self.statements.outputs.items() if instant),
-        )  # fmt: skip
-        component.__dict__.update(_simulate={}, _display={}, _class=text.path)
+        own, found = inside(component), self.statements
+        own.text, own.statements, own.initial = text.path, tuple(found.equations), tuple(found.initial)
+        own.happenings = tuple(found.happenings)
+        own.instants = frozenset(name for name, instant in found.outputs.items() if instant)
         self._connect()
         if self.errors:
             raise raise_together_or_one(self.errors)
@@ -173,11 +173,11 @@ class _Builder:
             self.notes.tell(f"{f'{self.instance.path}.{name}'.lstrip('.')} has no value; its start value is taken.")
         low, high = (self._number(basic.given.inner.get(limit)) for limit in ("min", "max"))
         fixed = self._known(basic.given.inner.get("fixed")) is not False
-        parameter = param(self._unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
+        parameter = param(self.unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
         outside = given.scope is not None and given.scope[0] is not self.instance
         if given.value is not None and not outside:
             parameter.default = self._value(given, self.instance, "")
-        self.component._declare(name, parameter)
+        declare(self.component, name, parameter)
         if given.value is not None and outside:
             self.component.give(name, self._value(given, self.instance.owner, ""))
 
@@ -211,20 +211,20 @@ class _Builder:
         elif basic.kind == "Integer" and not signal:
             declared = integer(description)
         elif path in self.statements.assigned or "discrete" in basic.prefixes:
-            declared = discrete(self._unit(basic), description, start=0.0)
+            declared = discrete(self.unit(basic), description, start=0.0)
         elif "input" in basic.prefixes and signal:
-            declared = signal_in(self._unit(basic), description)
+            declared = signal_in(self.unit(basic), description)
         elif "output" in basic.prefixes and signal:
-            declared = signal_out(self._unit(basic), description)
+            declared = signal_out(self.unit(basic), description)
         else:
             nominal = self._number(basic.given.inner.get("nominal"))
             select: Any = _STATE_SELECT.get(self._known(basic.given.inner.get("stateSelect")), "default")
-            declared = var(self._unit(basic), description, state=select, nominal=nominal or 1.0)
+            declared = var(self.unit(basic), description, state=select, nominal=nominal or 1.0)
         if path in self.statements.outputs:
             memory = boolean(description)
-            self.component._declare(f"{path}{MEMORY}", memory)
+            declare(self.component, f"{path}{MEMORY}", memory)
             self._start(path, basic, memory)
-        self.component._declare(path, declared)
+        declare(self.component, path, declared)
         self._display(path, basic)
         self._start(path, basic, declared)
 
@@ -269,7 +269,7 @@ class _Builder:
         value = self._known(given)
         return value if isinstance(value, float) and abs(value) < 1e50 else None
 
-    def _unit(self, basic: Basic) -> str:
+    def unit(self, basic: Basic) -> str:
         """Return the unit; one that is not coherent is left out, because Modelica converts nothing."""
         unit = self._known(basic.given.inner.get("unit"))
         try:
@@ -285,7 +285,7 @@ class _Builder:
     def _display(self, path: str, basic: Basic) -> None:
         unit = str(self._known(basic.given.inner.get("displayUnit")) or "")
         with suppress(UnitError):  # it is only shown
-            if unit and same_dimension(parse_unit(unit), parse_unit(self._unit(basic))):
+            if unit and same_dimension(parse_unit(unit), parse_unit(self.unit(basic))):
                 self.notes.display[f"{self.instance.path}.{path}".lstrip(".")] = unit
 
     # -- equations and connections -----------------------------------------------------------------------------------
@@ -303,8 +303,8 @@ class _Builder:
             joined.update(ends)
             Assembly.place(component, f"connect.{key}", wire.source)
             self._attempt(wire.source, self._check_ends, ends)
-        component.__dict__["_wires"] = wires
-        component.__dict__["_free"] = tuple(
+        inside(component).wires = wires
+        inside(component).free = tuple(
             f"{name}.{end}"
             for name, part in component.parts.items()
             for end, connector in part.connectors.items()
@@ -312,12 +312,14 @@ class _Builder:
         )
 
     def _check_ends(self, ends: tuple[str, ...]) -> None:
-        connectors = [self.component._resolve(end) for end in ends]
+        connectors = [end_at(self.component, end) for end in ends]
         kinds = {tuple(c.fields) for c in connectors if isinstance(c, WrittenConnector)}
         if len(kinds) > 1:
             raise ModelicaTextError(f"The connectors {', '.join(ends)} differ.")
         for end, connector in zip(ends, connectors, strict=True):
-            if not isinstance(connector, Connector) and connector.name in getattr(connector.owner, "_instants", ()):
+            if isinstance(connector, Connector) or not isinstance(connector.owner, Written):
+                continue
+            if connector.name in inside(connector.owner).instants:
                 raise ModelicaTextError(
                     f"{end} is true for instants only, which a connection does not carry here.",
                     advice="Write the 'when' in the class of the sample, or name the variable: when block.y then.",
@@ -340,9 +342,9 @@ def _connector(instance: Instance) -> WrittenConnector:
         if basic is None or basic.kind != "Real" or member.declaration.dimensions:
             raise refused(f"{name} in a connector", member.text, member.declaration.line)
         builder = _Builder(instance, Notes())
-        unit = builder._unit(basic)
+        unit = builder.unit(basic)
         quantity = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
         quantity.owner, quantity.name = instance.text.name, name
-        connector.__dict__["_own_fields"] = {**connector._own_fields, name: quantity}
-    connector.__dict__["kind"] = instance.text.path
+        inside(connector).own_fields = {**inside(connector).own_fields, name: quantity}
+    connector.kind = instance.text.path
     return connector

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from modelica_like.errors import Source, UnknownName, did_you_mean
 from modelica_like.language import Component, Parameter, Variable, guess
 from modelica_like.language.fields import Input, Output
+from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
@@ -68,7 +69,7 @@ class _Part:
         )
         self.entries = dict(self._entries())
         self.kind = self._kind()
-        self.fields = self.kind._class_fields
+        self.fields, self.structural = declarations(self.kind).fields, declarations(self.kind).structural
         self.values: dict[str, Expr] = {}
         self.used: set[str] = set()
         self.initial: list[tuple[Expr, Expr, Source]] = []
@@ -84,7 +85,7 @@ class _Part:
                     self.values.pop(name, None)
             elif name in self.known.ignore and name not in used:
                 continue
-            elif name in used or isinstance(self.fields.get(here), Parameter | Input) or here in self.kind._structural:
+            elif here in self.structural or name in used or isinstance(self.fields.get(here), Parameter | Input):
                 self._read(name, start)
             elif isinstance(self.fields.get(here), Variable) or "." in here:
                 starts.append((here, start))
@@ -95,9 +96,7 @@ class _Part:
         for here, text in self.known.set.items():
             if here not in driven:
                 settings[here] = self._owners()(substituted(parse_expression(str(text)), self.values))
-        structural = {
-            here: self._plain(here, value) for here, value in settings.items() if here in self.kind._structural
-        }
+        structural = {here: self._plain(here, value) for here, value in settings.items() if here in self.structural}
         part = new_component(self.kind, {**structural, **self.known.fix})
         for here, value in settings.items():
             if here not in structural:
@@ -173,7 +172,7 @@ class _Part:
     def _defaults(self) -> None:
         for name, value in self.known.default.items():
             here = self.known.here(name)
-            has = here in self.fields or here in self.kind._structural or name in (*self.known.only, *self.used)
+            has = here in self.fields or here in self.structural or name in (*self.known.only, *self.used)
             demanded = name in self.known.only and name in self.entries and self.entries[name].value is not None
             if name not in self.values and has and not demanded:
                 text = str(value).lower() if isinstance(value, bool) else str(value)
@@ -206,7 +205,7 @@ class _Part:
         if value.kind == "array":
             items = tuple(self._plain(here, argument) for argument in value.args)
             return _without_jumps(items, self.name, self.notes) if here == "table" else items
-        if value.kind == "number" and isinstance(self.kind._structural[here], int):
+        if value.kind == "number" and isinstance(self.structural[here], int):
             return int(value.args[0])
         return value.args[0]
 
@@ -262,7 +261,7 @@ class _Part:
         if given.value is None and given.inner and (fixed is None or fixed.value is None or not fixed.value.args[0]):
             return  # attributes of a variable that the component does not have
         ours = {back: front for front, back in self.known.names.items()}
-        names = [self.known.names.get(key, key) for key in (*self.fields, *self.kind._structural)]
+        names = [self.known.names.get(key, key) for key in (*self.fields, *self.structural)]
         raise UnknownName(
             f"{self.known.path} has no '{name}' here{did_you_mean(name, [*names, *ours]) or '.'}",
             where=self.member.text.place(given.line or self.member.declaration.line),

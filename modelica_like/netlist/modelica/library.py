@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like.language import Component, Connector
+from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica.parse import parse_modelica
 from modelica_like.netlist.modelica.tree import ClassText
 from modelica_like.netlist.registry import find_type
@@ -124,4 +125,4 @@ def connector_type(path: str) -> type[Connector] | None:
     if entry is None:
         return None
     component, _, name = entry.partition(".")
-    return type(find_type(component)._class_connectors[name])
+    return type(declarations(find_type(component)).connectors[name])

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from modelica_like.errors import ModelicaTextError, UnknownName
+from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold, resolve
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, refused, unknown_class
 from modelica_like.netlist.modelica.library import Known
@@ -189,7 +190,7 @@ def value_of_known(owner: Instance, member: Member, part: Known, name: str, text
     given = member.given.inner.get(part.names.get(name, name))
     if given is not None and given.value is not None and given.scope is not None:
         return resolve.Resolver(*given.scope, numeric=True)(given.value)
-    field = part.type._class_fields.get(name)
+    field = declarations(part.type).fields.get(name)
     if field is not None and isinstance(field.default, int | float):
         return Expr("number", (float(field.default),), line)
     raise ModelicaTextError(

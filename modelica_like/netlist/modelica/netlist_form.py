@@ -10,8 +10,10 @@ import casadi as ca
 from modelica_like.errors import ModelicaLikeError, ModelicaTextError, UnitError
 from modelica_like.flatten.dimensions import Dimensions
 from modelica_like.language import Assembly, Component, Connector, Input, Output, Parameter, guess
+from modelica_like.language.assembly import end_at
 from modelica_like.language.fields import Field, Value
 from modelica_like.language.formula import Formula
+from modelica_like.language.inside import inside
 from modelica_like.language.units import ANY, ONE, Unit, parse_unit, same_dimension
 from modelica_like.netlist import dumps, loads
 from modelica_like.netlist.modelica.written import Written
@@ -54,7 +56,7 @@ class _Form:
             name: [self._part(f"{name}[{k}]", element) for k, element in enumerate(part, 1)]
             if isinstance(part, list)
             else self._part(name, part)
-            for name, part in self.model._parts.items()
+            for name, part in inside(self.model).parts.items()
         }
         parameters: dict[str, Any] = {}
         for name, unit in self.parameters.items():
@@ -63,24 +65,23 @@ class _Form:
                 raise ModelicaTextError(f"{name} has no value.")
             parameters[name] = self._text(value, unit, name)
         assembly = Assembly(
-            self.model._name, parts=parts, free=self.model.free_ends, description=self.model.__dict__["_description"],
+            inside(self.model).name, parts=parts, free=self.model.free_ends, description=inside(self.model).description,
             parameters=parameters, connect={_wire_name(ends, k): ends for k, ends in enumerate(self.wires, 1)},
         )  # fmt: skip
-        shown = {
-            path: unit for path, unit in self.model.__dict__["_display"].items() if _is_shown(assembly, path, unit)
-        }
-        assembly.__dict__.update(_simulate=dict(self.model.__dict__["_simulate"]), _display=shown)
+        shown = {path: unit for path, unit in inside(self.model).display.items() if _is_shown(assembly, path, unit)}
+        inside(assembly).simulate, inside(assembly).display = dict(inside(self.model).simulate), shown
         return assembly
 
     def _left_out(self) -> None:
         """Leave out variables that are only computed from the parts; refuse equations that the parts depend on."""
         signals = {name for name, field in self.model.fields.items() if not isinstance(field, Parameter)}
         joined = {end for ends in self.wires for end in ends}
-        defined = {left.args[0][0] for left, _, _ in self.model._statements if left.kind == "name"}
-        if defined != signals or signals & joined or self.model._happenings or self.model._initial:
+        own = inside(self.model)
+        defined = {left.args[0][0] for left, _, _ in own.statements if left.kind == "name"}
+        if defined != signals or signals & joined or own.happenings or own.initial:
             raise ModelicaTextError(
-                f"{self.model._name} has equations of its own; a netlist contains only parts and connections.",
-                where=[source for _, _, source in (*self.model._initial, *self.model._statements)[:1]],
+                f"{inside(self.model).name} has equations of its own; a netlist contains only parts and connections.",
+                where=[source for _, _, source in (*own.initial, *own.statements)[:1]],
                 advice="Load the text itself: load and all commands read it like a netlist.",
             )  # fmt: skip
         if signals:
@@ -90,7 +91,7 @@ class _Form:
 
     def _end(self, end: str) -> tuple[Component, str] | None:
         """Return part and name of a signal, None for a connector."""
-        resolved = self.model._resolve(end)
+        resolved = end_at(self.model, end)
         return None if isinstance(resolved, Connector) else (resolved.owner, resolved.name)
 
     def _signal_units(self) -> None:
@@ -173,7 +174,7 @@ class _Form:
     def _parameter_units(self) -> None:
         """A parameter without a unit takes that of the value it is given to as it is."""
         for part in self.model.parts.values():
-            for name, value in part._values.items():
+            for name, value in inside(part).values.items():
                 formula = value.formula
                 if formula is not None and formula.operation == "name" and self.parameters.get(str(formula)) == ONE:
                     wanted = part.fields[name].unit
@@ -199,7 +200,7 @@ class _Form:
         if isinstance(twin, Written):
             return twin
         for name, field in part.fields.items():
-            value = part._values.get(name)
+            value = inside(part).values.get(name)
             free = isinstance(field, Parameter) and field.unit == ANY
             unit = self._own_unit(part, name) if free else field.unit
             default = field.default if value is None and free and isinstance(field.default, int | float) else None
@@ -207,7 +208,7 @@ class _Form:
                 twin.give(name, self._text(value, unit, f"{path}.{name}"))
             elif default and not same_dimension(unit, ONE):
                 twin.give(name, _quantity(float(default), unit))
-            start = part._starts.get(name)
+            start = inside(part).starts.get(name)
             if start is not None:
                 text = self._text(start, field.unit, f"{path}.{name}")
                 twin.give(name, text if start.fixed else guess(text))

@@ -17,6 +17,7 @@ from modelica_like.language.equation import Equation, as_statement
 from modelica_like.language.expr import TIME, Symbol, operands, symbols_in
 from modelica_like.language.fields import Discrete
 from modelica_like.language.formula import Formula
+from modelica_like.language.inside import inside
 from modelica_like.language.mode import StartMode, Transition
 from modelica_like.language.places import located
 from modelica_like.language.units.unit import coherent
@@ -158,7 +159,7 @@ def _declarations(component: Component, write_formula: Callable[[Formula], str],
             value = component.value(key)
             if value is None:
                 continue
-            given, default = key in component._values, ""
+            given, default = key in inside(component).values, ""
             if not given:
                 default = f" = {value.number!r}" if value.formula is None else f" = {write_formula(value.formula)}"
             lines.append(f"  parameter Real {identifier(key)}{_attributes(str(coherent(value.unit)))}{default};")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from modelica_like.errors import ModelicaTextError
+from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.build import Notes, build_component
 from modelica_like.netlist.modelica.classes import Classes
 from modelica_like.netlist.modelica.instance import Given, Instance
@@ -40,8 +41,8 @@ def read_modelica(path: Path, name: str = "") -> tuple[Written, list[str]]:
     settings = {"start": "rest", "on_chattering": "rest"} | (
         {"until": f"{text.experiment['StopTime']:g} s"} if "StopTime" in text.experiment else {}
     )
-    component.__dict__.update(_simulate=settings, _display=notes.display, _origin=f"{path.resolve()}:{text.path}")
+    inside(component).simulate, inside(component).display = settings, notes.display
     for part in component.walk():
-        if isinstance(part, Written) and part is not component:
-            part.__dict__["_origin"] = f"{path.resolve()}:{part.__dict__['_class']}"
+        if isinstance(part, Written):
+            inside(part).origin = f"{path.resolve()}:{inside(part).text}"
     return component, notes.told

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from modelica_like.errors import ModelicaTextError, did_you_mean
+from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold, members
 from modelica_like.netlist.modelica.classes import Classes
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
@@ -224,7 +225,7 @@ class Resolver:
             inner = part.here(inner)
             if self.numeric:
                 return members.value_of_known(owner, member, part, inner, self.text, line)
-            fields = part.type._class_fields
+            fields = declarations(part.type).fields
             for below in table()["rates"].get(inner, "").split() if inner not in fields else ():
                 if below in fields:
                     return Expr("call", ("der", (Expr("name", ((f"{path}.{below}", ()),), line),), ()), line)

@@ -11,6 +11,7 @@ from modelica_like.errors import ModelicaTextError
 from modelica_like.language import Assembly, Component, Connector, Input, Output, Parameter
 from modelica_like.language.fields import Value
 from modelica_like.language.formula import Formula
+from modelica_like.language.inside import declarations, inside
 from modelica_like.language.units import coherent, parse_unit, read_quantity, to_si
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.modelica import fold
@@ -51,7 +52,7 @@ class _Writer:
     def model(self, assembly: Assembly, name: str) -> str:
         """Return the class of an assembly."""
         joined = {_path(assembly, end) for ends in self._wires(assembly) for end in ends}
-        quoted = assembly.__dict__["_description"].replace("\\", "\\\\").replace('"', '\\"')
+        quoted = inside(assembly).description.replace("\\", "\\\\").replace('"', '\\"')
         lines = [f'model {name} "{quoted}"' if quoted else f"model {name}"]
         for key, field in assembly.fields.items():
             if isinstance(field, Parameter):
@@ -60,16 +61,16 @@ class _Writer:
                     raise ModelicaTextError(f"{assembly.label}.{key} has no value.")
                 unit = str(coherent(value.unit))
                 attribute = f'(unit = "{unit}")' if unit not in ("1", "") else ""
-                lines.append(f"  parameter Real {identifier(key)}{attribute} = {self._value(value, assembly)};")
+                lines.append(f"  parameter Real {identifier(key)}{attribute} = {self.value(value, assembly)};")
         lines += [f"  {connector_class(c)} {identifier(key)};" for key, c in assembly.connectors.items()]
         for key, field in assembly.fields.items():
             if isinstance(field, Input | Output):
                 lines.append(f"  {_BLOCKS}{type(field).__name__} {identifier(key)};")
-        for key, part in assembly._parts.items():
+        for key, part in inside(assembly).parts.items():
             lines.append(f"  {self._declaration(assembly, key, part, joined)};")
         lines.append("equation")
         lines += [f"  connect({left}, {right});" for left, right in self._pairs(assembly)]
-        until = assembly.__dict__["_simulate"].get("until")
+        until = inside(assembly).simulate.get("until")
         if until is not None:
             seconds = to_si(until, parse_unit("s"), "until")
             lines.append(f"  annotation(experiment(StopTime = {_number(seconds)}));")
@@ -110,26 +111,27 @@ class _Writer:
         known = by_component().get(type(part).__name__)
         if known is None or known.type is not type(part):
             for key, connector in part.connectors.items():
-                connector.__dict__["_used"] = not connector.optional or f"{path}.{key}" in joined
+                inside(connector).used = not connector.optional or f"{path}.{key}" in joined
             name = f"{type(part).__name__}_{re.sub('[^a-zA-Z0-9]', '_', path)}"
             driven = frozenset(key for key in part.fields if f"{path}.{key}" in joined)
             text = class_of_equations(part, name, lambda formula: formula_text(formula, part), driven)
             self.made[name] = text
-            given = {identifier(key): self._value(value, owner) for key, value in part._values.items()}
+            given = {identifier(key): self.value(value, owner) for key, value in inside(part).values.items()}
             return name, {**given, **self._starts(part, None, owner)}
         values = _Arguments(self, owner, path, part, known, joined)
         return known.path, {**values.read(), **self._starts(part, known, owner)}
 
     def _starts(self, part: Component, known: Known | None, owner: Assembly) -> dict[str, str]:
         starts: dict[str, dict[str, Value]] = {}
-        inside = [(f"{node.path.removeprefix(f'{part.path}.')}.", node) for node in part.walk() if node is not part]
-        given = [(f"{path}{name}", value) for path, c in [("", part), *inside] for name, value in c._starts.items()]
+        below = [(f"{node.path.removeprefix(f'{part.path}.')}.", node) for node in part.walk() if node is not part]
+        every = [("", part), *below]
+        given = [(f"{path}{name}", value) for path, node in every for name, value in inside(node).starts.items()]
         for name, value in given:
             there = known.there(name) if known else name
             if "." in there:
                 raise ModelicaTextError(f"The start value of {part.label}.{name} has no counterpart in Modelica text.")
             starts.setdefault(there.partition("[")[0], {})[there] = value
-        if part._start_modes:
+        if inside(part).start_modes:
             raise ModelicaTextError(f"{part.label} has a start mode, which Modelica text does not say here.")
         return dict.fromkeys((self._start(base, start, part, owner) for base, start in starts.items()), "")
 
@@ -137,13 +139,13 @@ class _Writer:
         """Return the modification of a start value, or of those of all elements of an array."""
         if base in given:
             fixed = ", fixed = true" if given[base].fixed else ""
-            return f"{identifier(base)}(start = {self._value(given[base], owner)}{fixed})"
+            return f"{identifier(base)}(start = {self.value(given[base], owner)}{fixed})"
         elements = [given.get(name) for name in part.fields if name.startswith(f"{base}[")]
-        values = ", ".join("0" if element is None else self._value(element, owner) for element in elements)
+        values = ", ".join("0" if element is None else self.value(element, owner) for element in elements)
         fixed = ", ".join(str(element is not None and element.fixed).lower() for element in elements)
         return f"{identifier(base)}(start = {{{values}}}, fixed = {{{fixed}}})"
 
-    def _value(self, value: Value, owner: Component) -> str:
+    def value(self, value: Value, owner: Component) -> str:
         return _number(value.number or 0.0) if value.formula is None else formula_text(value.formula, owner)
 
     # -- connections -------------------------------------------------------------------------------------------------
@@ -175,12 +177,13 @@ class _Arguments:
             known,
             joined,
         )
+        self.declared, self.values = declarations(part), inside(part).values
         self.done: dict[str, str] = {}
 
     def read(self) -> dict[str, str]:
         replaced = {name for text in self.known.put.values() for name in _fields(text)}
-        replaced |= {scale for name in self.part._tables for scale in self._scales(name)}
-        for name, value in self.part._values.items():
+        replaced |= {scale for name in self.declared.tables for scale in self._scales(name)}
+        for name, value in self.values.items():
             if name in self.known.instead:
                 for there, text in self.known.instead[name].items():
                     self.done[there] = self._expression(text)
@@ -188,17 +191,17 @@ class _Arguments:
                 raise self._refused(name, value.given)
             elif name not in replaced:
                 there = self.known.there(name)
-                self.done.setdefault(there, self.writer._value(value, self.owner))
-        for name in self.part._structural:
+                self.done.setdefault(there, self.writer.value(value, self.owner))
+        for name in self.declared.structural:
             if name not in replaced:
-                self._structural(name, self.part.__dict__[name])
+                self._structural(name, getattr(self.part, name))
         for there, text in self.known.put.items():
             self._put(there, text)
         self._defaults()
         for name, field in self.part.fields.items():
             value = self.part.value(name) if isinstance(field, Input) else None
             if value is not None and name not in replaced and f"{self.path}.{name}" not in self.joined:
-                self.done.setdefault(self.known.there(name), self.writer._value(value, self.owner))
+                self.done.setdefault(self.known.there(name), self.writer.value(value, self.owner))
         for name, flag in (("support", "useSupport"), ("heat_port", "useHeatPort")):
             if f"{self.path}.{name}" in self.joined:
                 self.done[flag] = "true"
@@ -210,20 +213,20 @@ class _Arguments:
                 # The last value holds: a row more makes the last slope zero.
                 if name != "extrapolate" or value != "hold":
                     raise self._refused(name, value)
-                for one in self.part._tables:
-                    rows = self.part.__dict__[one]
+                for one in self.declared.tables:
+                    rows = getattr(self.part, one)
                     if len(rows) > 1 and rows[-1][1:] != rows[-2][1:]:
                         more = (*rows, (rows[-1][0] + max(abs(rows[-1][0]), 1.0), *rows[-1][1:]))
                         self.done[self.known.there(one)] = self._plain(one, more)
-        elif value != self.part._structural[name] or any(self._scales(name)):
+        elif value != self.declared.structural[name] or any(self._scales(name)):
             if name in self.known.absent:
                 raise self._refused(name, value)
             self.done.setdefault(self.known.there(name), self._plain(name, value))
 
     def _scales(self, name: str) -> list[str]:
         """Return the parameters that scale the columns of a table, empty where none is given."""
-        columns = self.part._tables[name].columns if name in self.part._tables else ()
-        given = (column.scale in self.part._values and column.scale not in self.known.names for column in columns)
+        columns = self.declared.tables[name].columns if name in self.declared.tables else ()
+        given = (column.scale in self.values and column.scale not in self.known.names for column in columns)
         return [column.scale if scaled else "" for column, scaled in zip(columns, given, strict=True)]
 
     def _put(self, there: str, text: str) -> None:
@@ -234,19 +237,19 @@ class _Arguments:
         names = _fields(text)
         if any(f"{self.path}.{name}" in self.joined for name in names):
             return
-        given = [name for name in names if name in self.part._values or name in self.part._structural]
-        if given or all(name in self.part._structural or self.part.value(name) is not None for name in names):
+        given = [name for name in names if name in self.values or name in self.declared.structural]
+        if given or all(name in self.declared.structural or self.part.value(name) is not None for name in names):
             self.done[there] = self._expression(text)
 
     def _expression(self, text: str) -> str:
         """Return an expression of the component's fields with their values."""
         result = text
         for name in _fields(text):
-            if name in self.part._structural:
-                value = self._plain(name, self.part.__dict__[name])
+            if name in self.declared.structural:
+                value = self._plain(name, getattr(self.part, name))
             else:
                 field_value = self.part.value(name)
-                value = self.writer._value(field_value, self.owner) if field_value is not None else name
+                value = self.writer.value(field_value, self.owner) if field_value is not None else name
                 value = value if re.fullmatch(r"[\w.]+", value) else f"({value})"
             result = re.sub(rf"(?<![\w.]){name}(?![\w.])", lambda _, value=value: value, result)
         node = parse_expression(result)
@@ -261,12 +264,12 @@ class _Arguments:
             here = self.known.here(there)
             if there in self.done or there in self.known.only or there in self.known.put:
                 continue
-            if here in self.part._structural:
-                self.done[there] = self._plain(here, self.part.__dict__[here])
+            if here in self.declared.structural:
+                self.done[there] = self._plain(here, getattr(self.part, here))
                 continue
             value = self.part.value(here) if here in self.part.fields else None
             if value is not None:
-                self.done[there] = self.writer._value(value, self.owner)
+                self.done[there] = self.writer.value(value, self.owner)
         for there, only in self.known.only.items():
             default = self.known.default.get(there, only)
             if default != only:
@@ -351,7 +354,7 @@ def _path(assembly: Assembly, end: Any) -> str:
 
 def _class_name(assembly: Assembly) -> str:
     name = re.sub(
-        r"\W", "_", (assembly.__dict__["_description"] and Path(assembly.__dict__["_origin"]).stem) or assembly._name
+        r"\W", "_", (inside(assembly).description and Path(inside(assembly).origin).stem) or inside(assembly).name
     )
     name = name or "drive"
     return name[:1].upper() + name[1:] if not name[0].isdigit() else f"Drive_{name}"

@@ -39,6 +39,7 @@ from modelica_like.language.equation import Equation
 from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field
 from modelica_like.language.formula import Formula
+from modelica_like.language.inside import InsideAssembly
 from modelica_like.netlist.modelica.tree import Expr as Node
 
 
@@ -64,6 +65,25 @@ MEMORY = "_condition"
 """Behind the name of a Boolean signal: the condition itself, which has a value before events."""
 
 
+@dataclass(eq=False)
+class InsideWritten(InsideAssembly):
+    """Of a component whose class is Modelica text.
+
+    Attributes:
+        text: path of its class in the text.
+        statements: left and right sides of its equations, with their places.
+        initial: likewise, of its initial equations.
+        happenings: its whens and assertions.
+        instants: Boolean signals that are true for instants only.
+    """
+
+    text: str = ""
+    statements: tuple[tuple[Node, Node, Source], ...] = ()
+    initial: tuple[tuple[Node, Node, Source], ...] = ()
+    happenings: tuple[Happening, ...] = ()
+    instants: frozenset[str] = frozenset()
+
+
 class Written(Assembly):
     """A component whose class is Modelica text.
 
@@ -72,10 +92,8 @@ class Written(Assembly):
     """
 
     units_checked = False
-    _statements: tuple[tuple[Node, Node, Source], ...] = ()
-    _initial: tuple[tuple[Node, Node, Source], ...] = ()
-    _happenings: tuple[Happening, ...] = ()
-    _instants: frozenset[str] = frozenset()
+    _kept = InsideWritten
+    _inside: InsideWritten  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __reduce__(self) -> Any:
         # The class is made for one text; another process makes it again.
@@ -87,16 +105,16 @@ class Written(Assembly):
     @property
     def fields(self) -> dict[str, Field]:
         """Declared fields; a copy, because the text of a class decides its equations, and not the class here."""
-        return dict(self._own_fields)
+        return dict(self._inside.own_fields)
 
     def equations(self) -> Equations:
         """Yield the connections and the equations, each with its place in the text."""
         yield from super().equations()
-        yield from self._equations(self._statements)
+        yield from self._equations(self._inside.statements)
 
     def initial_equations(self) -> Equations:
         """Yield the equations of the start."""
-        yield from self._equations(self._initial)
+        yield from self._equations(self._inside.initial)
 
     def _equations(self, statements: Iterable[tuple[Node, Node, Source]]) -> Equations:
         for left, right, source in statements:
@@ -104,7 +122,7 @@ class Written(Assembly):
 
     def events(self) -> Events:
         """Yield the whens and the assertions."""
-        for happening in self._happenings:
+        for happening in self._inside.happenings:
             if happening.text:
                 yield replace(
                     assert_(self.symbolic(happening.branches[0][0][0]), happening.text), source=happening.source

@@ -13,6 +13,7 @@ from modelica_like.language.equation import Connection
 from modelica_like.language.expr import Symbol
 from modelica_like.language.fields import Input, Output
 from modelica_like.language.icon import PLAIN, SIGNAL, Icon, Side, Stroke
+from modelica_like.language.inside import declarations, inside
 
 _USUAL: dict[str, Side] = {
     "flange_b": "E", "n": "E", "port_b": "E", "flange_t": "E", "support": "S", "heat_port": "S",
@@ -145,11 +146,11 @@ def diagram(component: Component, depth: int, notes: Notes | None = None) -> Dia
 def alone(kind: type[Component]) -> Node:
     """Return a component type as a node, with the connectors that it always has and its signals as ports."""
     node = Node("", None, kind.icon)
-    for name, connector in kind._class_connectors.items():
+    for name, connector in declarations(kind).connectors.items():
         if not connector.optional:
             side, along = _place(kind.icon, name, 0)
             node.ports[name] = Port(name, node, side, along, connector.stroke or PLAIN)
-    for name, one in kind._class_fields.items():
+    for name, one in declarations(kind).fields.items():
         if isinstance(one, Input | Output):
             drives = 1 if isinstance(one, Output) else -1
             side, along = _place(kind.icon, name, drives)
@@ -181,11 +182,11 @@ def _joined(component: Component) -> Iterator[list[Connector | Symbol]]:
 
 def _port(end: Connector | Symbol, scope: Component, nodes: dict[str, Node], outer: dict[str, Node]) -> Port:
     """The port of a part, or of a node for an outer connector."""
-    names = [end.name if isinstance(end, Symbol) else end._name]
-    owner = cast("Declared", end.owner if isinstance(end, Symbol) else end._owner)
+    names = [end.name if isinstance(end, Symbol) else inside(end).name]
+    owner = cast("Declared", end.owner if isinstance(end, Symbol) else inside(end).owner)
     while owner is not scope:
-        names.append(owner._name)
-        owner = cast("Declared", owner._owner)
+        names.append(inside(owner).name)
+        owner = cast("Declared", inside(owner).owner)
     *_, first = names
     inner = first in nodes and len(names) > 1
     node = nodes[first] if inner else outer.setdefault(first, Node(first, None))

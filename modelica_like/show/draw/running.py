@@ -12,6 +12,7 @@ import numpy as np
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector
+from modelica_like.language.inside import inside
 from modelica_like.language.units import parse_unit
 from modelica_like.runs.energy import EnergyBalance
 from modelica_like.runs.trajectories import Trajectories
@@ -194,9 +195,9 @@ def _looks(part: Component, run: Trajectories) -> Iterator[tuple[float, str, str
 def path_of(part: Component) -> str:
     """Return the path of a part in the whole drive."""
     names = list[str]()
-    while part._owner is not None:
-        names.append(part._name)
-        part = cast("Component", part._owner)
+    while inside(part).owner is not None:
+        names.append(inside(part).name)
+        part = cast("Component", inside(part).owner)
     return ".".join(reversed(names))
 
 

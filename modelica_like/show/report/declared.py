@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from modelica_like.language import Component, Connector, Discrete, Input, Output, Parameter, Variable
 from modelica_like.language.fields import Field
+from modelica_like.language.inside import declarations
 from modelica_like.language.places import texts_of_fields
 
 _SORTS = {
@@ -53,14 +54,14 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
     listings = [
         filled(
             "connectors", ("name", "type", "potential, flow", "may be", "description"),
-            (_connector_row(name, connector, notation) for name, connector in kind._class_connectors.items()),
+            (_connector_row(name, connector, notation) for name, connector in declarations(kind).connectors.items()),
         )
     ]  # fmt: skip
     for title, sort in _SORTS.items():
-        fields = [field for field in kind._class_fields.values() if sort is _sort_of(field)]
+        fields = [field for field in declarations(kind).fields.values() if sort is _sort_of(field)]
         head = ("name", "symbol", "unit", "default", "range", "description")
         listings.append(filled(title, head, (_field_row(field, notation) for field in fields)))
-    described = {name: table.description for name, table in kind._tables.items()}
+    described = {name: table.description for name, table in declarations(kind).tables.items()}
     described |= {name: words for name, words in texts_of_fields(kind).items() if words}
     structure = (
         (
@@ -68,12 +69,12 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
             code(str(default)) if isinstance(default, bool | int | float | str | tuple | None) else "required",
             text(described.get(name, "")),
         )
-        for name, default in kind._structural.items()
+        for name, default in declarations(kind).structural.items()
     )
     listings.append(filled("structure", ("name", "default", "description"), structure))
     modes = (
         (code(name), ", ".join(f"{n} ({k})" for k, n in enumerate(mode.names)), mode.start, text(mode.description))
-        for name, mode in kind._class_modes.items()
+        for name, mode in declarations(kind).modes.items()
     )
     listings.append(filled("modes", ("name", "one of (number)", "start", "description"), modes))
     return [listing for listing in listings if listing.rows]

@@ -15,6 +15,7 @@ from modelica_like.analyse.operating.curves import Curves
 from modelica_like.analyse.operating.steady import OperatingPoint
 from modelica_like.analyse.sensitivity.result import Sensitivities
 from modelica_like.language import Component, Parameter
+from modelica_like.language.inside import inside
 from modelica_like.runs.trajectories import Trajectories
 from modelica_like.show.draw import schematic
 from modelica_like.show.draw.running import path_of
@@ -52,7 +53,7 @@ def _given(drive: Component) -> Iterator[tuple[str, str, str]]:
     for part in drive.walk():
         fields: Container[str] = getattr(part, "_own_fields", ())
         for name, field in part.fields.items():
-            value = part.value(name) if name in part._values or name in fields else None
+            value = part.value(name) if name in inside(part).values or name in fields else None
             if isinstance(field, Parameter) and value is not None:
                 yield f"{path_of(part)}.{name}".removeprefix("."), str(value.given), field.description
 

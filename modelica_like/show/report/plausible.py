@@ -11,6 +11,7 @@ from modelica_like.compile.compiled import Vector
 from modelica_like.errors import MissingValue, ModelicaLikeError
 from modelica_like.language.component import Component
 from modelica_like.language.fields import Input, Output, Parameter
+from modelica_like.language.inside import inside
 from modelica_like.language.units import parse_unit
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Trajectories
@@ -108,7 +109,7 @@ def _size(part: Component, unit: str) -> tuple[str, float] | None:
             continue
         value = part.value(name)
         if value is not None and value.number is not None and value.number > 0:
-            return f"{part._name}.{name}", value.number
+            return f"{inside(part).name}.{name}", value.number
     return None
 
 

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.language import Assembly, Component, Parameter
+from modelica_like.language.inside import declarations, inside
 from modelica_like.show.report.component_pages.source import Source
 from modelica_like.show.report.declared import Notation, declared, filled
 from modelica_like.show.report.statements import statements
@@ -74,7 +75,7 @@ def describe(kind: type[Component]) -> RenderableType:
     bases = [base.__name__ for base in kind.__mro__[1:] if issubclass(base, Component) and base is not Component]
     heading = Text.assemble((kind.__name__, "bold"), f"  {kind.__module__}", f"  ({', '.join(bases)})" if bases else "")
     tables = declared(kind, _TERMINAL)
-    parts = [row for name in kind._class_parts for row in _part_rows(kind, name)]
+    parts = [row for name in declarations(kind).parts for row in _part_rows(kind, name)]
     tables += [filled("parts", ("name", "type", "values", "description"), parts)] if parts else []
     tables_shown = [table(title, f"{first}*", *others, rows=rows) for title, (first, *others), rows in tables]
     lists = [Lines(title, lines) for title, lines in _lines(kind).items()]
@@ -91,7 +92,7 @@ def describe_netlist(drive: Assembly) -> RenderableType:
     joined = {**{name: " - ".join(ends) for name, ends in drive.chains.items()},
               **{name: " = ".join(ends) for name, ends in drive.wires.items()}}  # fmt: skip
     sections: list[RenderableType] = [
-        Text.assemble((drive._name, "bold"), f"  {drive._description}"),
+        Text.assemble((inside(drive).name, "bold"), f"  {inside(drive).description}"),
         *([table("parameters", "name*", "value", rows=parameters)] if parameters else []),
         table("parts", "name*", "type", "values", "what it is", rows=parts),
         Lines("connections", [f"{name}: {ends}" for name, ends in joined.items()]),
@@ -101,15 +102,15 @@ def describe_netlist(drive: Assembly) -> RenderableType:
 
 
 def _part_rows(kind: type[Component], name: str) -> list[tuple[str, ...]]:
-    part = kind._class_parts[name]
-    which = "replaceable" if name in kind._replaceable else ""
+    part = declarations(kind).parts[name]
+    which = "replaceable" if name in declarations(kind).replaceable else ""
     if isinstance(part, list):
         return [(f"{name}[{k}]", type(element).__name__, _given(element), which) for k, element in enumerate(part, 1)]
     return [(name, type(part).__name__, _given(part), which)]
 
 
 def _given(part: Component) -> str:
-    return ", ".join(f"{name} = {value.given}" for name, value in part._values.items())
+    return ", ".join(f"{name} = {value.given}" for name, value in inside(part).values.items())
 
 
 def _lines(kind: type[Component]) -> dict[str, list[str]]:

@@ -10,6 +10,7 @@ from typing import Any, cast
 
 from modelica_like.errors import NetlistError
 from modelica_like.language import Component
+from modelica_like.language.inside import declarations
 from modelica_like.netlist.document import parse, read_text
 from modelica_like.netlist.registry import find_type, library_types
 from modelica_like.show.draw.symbol import symbol
@@ -139,7 +140,7 @@ def domain(kind: type[Component]) -> str:
 
     Connectors that may be missing count only if there are no others.
     """
-    connectors = kind._class_connectors.values()
+    connectors = declarations(kind).connectors.values()
     always = [connector for connector in connectors if not connector.optional] or connectors
     names = sorted({a.stroke.name if a.stroke else type(a).__name__ for a in always})
     return " and ".join(names) or _SIGNALS

@@ -11,6 +11,7 @@ from textwrap import dedent
 from typing import NamedTuple
 
 from modelica_like.language import Component
+from modelica_like.language.inside import declarations, inside
 from modelica_like.show.report.component_pages import latex_names as names
 from modelica_like.show.report.component_pages.markdown import (
     cell,
@@ -120,7 +121,7 @@ def _optional(source: Source) -> dict[str, str]:
 
 def _parts(kind: type[Component]) -> list[str]:
     """Return the parts that the class declares, and how it builds others."""
-    by_name = {name: part if isinstance(part, list) else [part] for name, part in kind._class_parts.items()}
+    by_name = {name: part if isinstance(part, list) else [part] for name, part in declarations(kind).parts.items()}
     rows = ((f"`{name}`", page_link(type(e)), _values(e)) for name, part in by_name.items() for e in part)
     code = dedent(inspect.getsource(kind.build)).strip() if kind.build is not Component.build else ""
     parts = [table("", ("part", "type", "values"), rows), code and f"```python\n{code}\n```"]
@@ -128,7 +129,7 @@ def _parts(kind: type[Component]) -> list[str]:
 
 
 def _values(part: Component) -> str:
-    given = ", ".join(f"{name} = {value.given}" for name, value in part._values.items())
+    given = ", ".join(f"{name} = {value.given}" for name, value in inside(part).values.items())
     return f"`{given}`" if given else ""
 
 

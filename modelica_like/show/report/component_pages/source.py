@@ -13,6 +13,7 @@ from types import FunctionType
 from typing import Any, NamedTuple
 
 from modelica_like.language import Component
+from modelica_like.language.inside import declarations
 from modelica_like.show.report.component_pages import latex_names as names
 from modelica_like.show.report.component_pages.latex import (
     OR,
@@ -105,7 +106,7 @@ class Source:
     def symbol(self, name: str, dots: int = 0) -> str:
         """Return the symbol of a method or property: words if a connector has the same symbol."""
         letter = names.name(name.lstrip("_"), dots)
-        ends = (f"{end}.{q}" for end, connector in self.kind._class_connectors.items() for q in connector.fields)
+        ends = (f"{end}.{q}" for end, connector in declarations(self.kind).connectors.items() for q in connector.fields)
         return names.text(name) if letter in map(names.name, ends) else letter
 
     def method(self, name: str, after: type | None = None) -> Function | None:
@@ -147,7 +148,7 @@ class _Reader(Writer):
         if (method := self.source.method(path)) is not None:
             self.source.found.setdefault(path, method)
             return self.source.symbol(path, dots)
-        if path in self.source.kind._class_fields:
+        if path in declarations(self.source.kind).fields:
             self.source.uses.setdefault(path, []).append(dict(self.source.conditions))
         return names.name(path, dots)
 
@@ -159,7 +160,7 @@ class _Reader(Writer):
         return True
 
     def which_mode(self, path: str) -> str:
-        return f"{path}: " if len(self.source.kind._class_modes) > 1 else ""
+        return f"{path}: " if len(declarations(self.source.kind).modes) > 1 else ""
 
     def inherited(self, name: str) -> str:
         method = self.source.method(name, self.of.owner)

@@ -1,0 +1,170 @@
+"""What the framework keeps of components and connectors, apart from the names that their users choose.
+
+A component's attributes are its fields, parts and whatever its author puts there. So everything else stands in two
+records: `declarations` of a class, and what is `inside` of each of its instances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
+
+from modelica_like.errors import Source
+from modelica_like.language.places import NOWHERE
+
+if TYPE_CHECKING:
+    from modelica_like.language.component import Component
+    from modelica_like.language.declared import Connector, Declared
+    from modelica_like.language.discrete import Marker
+    from modelica_like.language.expr import Symbol
+    from modelica_like.language.fields import Field, Value
+    from modelica_like.language.mode import Mode
+    from modelica_like.language.tables import Rows
+
+_Inside = TypeVar("_Inside", covariant=True)
+
+
+def _empty() -> dict[Any, Any]:
+    return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Declarations:
+    """What a class and its bases declare, by name; connectors declare fields only.
+
+    Attributes:
+        fields: parameters, variables, signals and discrete values.
+        connectors: where its instances are joined.
+        modes: discrete states.
+        parts: a component or a list of them.
+        replaceable: names of the parts that can be replaced.
+        structural: fields that decide on parts and equations, with their defaults.
+        tables: the structural fields that are tables.
+        partial: whether it is only a base class.
+        templates: of `flatten`, by what they depend on.
+    """
+
+    fields: dict[str, Field] = field(default_factory=_empty)
+    connectors: dict[str, Connector] = field(default_factory=_empty)
+    modes: dict[str, Mode] = field(default_factory=_empty)
+    parts: dict[str, Component | list[Component]] = field(default_factory=_empty)
+    replaceable: frozenset[str] = frozenset()
+    structural: dict[str, Any] = field(default_factory=_empty)
+    tables: dict[str, Rows] = field(default_factory=_empty)
+    partial: bool = True
+    templates: dict[Any, Any] = field(default_factory=_empty)
+
+
+@dataclass(eq=False)
+class Inside:
+    """Of a component or connector.
+
+    Attributes:
+        owner: the component it belongs to.
+        name: there.
+        own_fields: fields that this one alone has, by name.
+        symbols: of its fields, by name and order of the derivative.
+        markers: of expressions of these symbols.
+    """
+
+    owner: Declared | None = None
+    name: str = ""
+    own_fields: dict[str, Field] = field(default_factory=_empty)
+    symbols: dict[tuple[str, int], Symbol] | None = None
+    markers: list[Marker] | None = None
+
+    def detached(self) -> Self:
+        """Return a copy without what is valid in one process, and for one instance, only."""
+        twin = copy(self)
+        twin.symbols = twin.markers = None
+        return twin
+
+
+@dataclass(eq=False)
+class InsideConnector(Inside):
+    """Of a connector.
+
+    Attributes:
+        used: whether it is connected, if it is optional.
+    """
+
+    used: bool = True
+
+
+@dataclass(eq=False)
+class InsideComponent(Inside):
+    """Of a component.
+
+    Attributes:
+        values: given parameters and inputs.
+        starts: given start values.
+        start_modes: given modes at the start.
+        parts: a component or a list of them.
+        connectors: where it is joined.
+        given_tables: tables as they were written.
+        measured: scale parameters that must have no value, by name: the table with quantities that forbids it.
+        elements: parts, with those of lists one by one; made on first use.
+    """
+
+    values: dict[str, Value] = field(default_factory=_empty)
+    starts: dict[str, Value] = field(default_factory=_empty)
+    start_modes: dict[str, str] = field(default_factory=_empty)
+    parts: dict[str, Component | list[Component]] = field(default_factory=_empty)
+    connectors: dict[str, Connector] = field(default_factory=_empty)
+    given_tables: dict[str, Any] = field(default_factory=_empty)
+    measured: dict[str, str] = field(default_factory=_empty)
+    elements: Mapping[str, Component] | None = None
+
+    def detached(self) -> Self:
+        """Return a copy without what is valid in one process, and for one instance, only."""
+        twin = super().detached()
+        twin.elements = None
+        return twin
+
+
+@dataclass(eq=False)
+class InsideAssembly(InsideComponent):
+    """Of an assembly.
+
+    Attributes:
+        description: one phrase.
+        wires: paths of the ends of each connection, by its name.
+        chains: names of the parts of each series, by its name.
+        free: paths of connectors that stay unconnected on purpose.
+        exposed: outer connectors and signals, and the inner ones they stand for.
+        simulate: arguments of a run.
+        display: units of pictures and tables.
+        origin: path of its file.
+        sizing: path of its sizing file.
+        places: in the netlist, by section and name.
+        made: the call that created it.
+    """
+
+    description: str = ""
+    wires: dict[str, tuple[str, ...]] = field(default_factory=_empty)
+    chains: dict[str, tuple[str, ...]] = field(default_factory=_empty)
+    free: tuple[str, ...] = ()
+    exposed: tuple[tuple[str, str], ...] = ()
+    simulate: dict[str, Any] = field(default_factory=_empty)
+    display: dict[str, str] = field(default_factory=_empty)
+    origin: str = ""
+    sizing: str = ""
+    places: dict[str, Source] = field(default_factory=_empty)
+    made: Source = NOWHERE
+
+
+class _Instance(Protocol[_Inside]):
+    @property
+    def _inside(self) -> _Inside: ...
+
+
+def inside(of: _Instance[_Inside]) -> _Inside:
+    """Return what the framework keeps of a component or connector."""
+    return of._inside  # pyright: ignore[reportPrivateUsage]
+
+
+def declarations(of: Declared | type[Declared]) -> Declarations:
+    """Return what a class declares; of an instance, what its class does."""
+    return of._declared  # pyright: ignore[reportPrivateUsage]
