@@ -347,7 +347,8 @@ class Component(Declared):
             self.give(name, value)
 
     def _adopt(self, name: str, value: Component | list[Component]) -> None:
-        taken = (self.fields, self._inside.connectors, self._declared.structural, self._declared.modes)
+        own = self._inside
+        taken = (self.fields, own.connectors, self._declared.structural, self._declared.modes)
         if any(name in names for names in taken) or hasattr(Component, name):
             hint = ": every component has something of this name" * hasattr(Component, name)
             raise DuplicateName(f"{self.label}: '{name}' is already in use{hint}.", where=caller())
@@ -356,18 +357,20 @@ class Component(Declared):
             adopted: Any = [self._owned(f"{name}[{k}]", part) for k, part in enumerate(value, 1)]
         else:
             adopted = self._owned(name, value)
-        self._inside.parts[name] = adopted
+        own.parts[name] = adopted
         self.__dict__[name] = adopted
-        self._inside.elements = None
+        own.elements = None
 
     def _owned(self, name: str, part: Component) -> Component:
         twin = part.copy()
-        twin._inside.owner, twin._inside.name = self, name
+        own = twin._inside
+        own.owner, own.name = self, name
         return twin
 
     def _adopt_connector(self, name: str, connector: Connector) -> None:
         twin = connector._detached_copy()
-        inside(twin).owner, inside(twin).name = self, name
+        own = inside(twin)
+        own.owner, own.name = self, name
         self._inside.connectors[name] = twin
         self.__dict__[name] = twin
 

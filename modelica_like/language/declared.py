@@ -60,9 +60,8 @@ class Declared:
     @property
     def fields(self) -> dict[str, Field]:
         """Declared parameters, variables, signals and discrete values, and those that this one alone has, by name."""
-        return (
-            {**self._declared.fields, **self._inside.own_fields} if self._inside.own_fields else self._declared.fields
-        )
+        declared, own = self._declared.fields, self._inside.own_fields
+        return {**declared, **own} if own else declared
 
     def declare_array(self, name: str, size: int, field: Field) -> None:
         """Declare variables or signals `name[1]` to `name[size]`, in `build`: structural fields say how many.
@@ -114,8 +113,9 @@ class Declared:
 
     def _detached_copy(self) -> Self:
         twin = object.__new__(type(self))
-        twin.__dict__.update(self.__getstate__())
-        twin._inside.owner = None
+        twin.__dict__.update(self.__dict__)
+        twin.__dict__["_inside"] = own = self._inside.detached()
+        own.owner = None
         return twin
 
 

@@ -7,7 +7,6 @@ records: `declarations` of a class, and what is `inside` of each of its instance
 from __future__ import annotations
 
 from collections.abc import Mapping
-from copy import copy
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
@@ -77,7 +76,8 @@ class Inside:
 
     def detached(self) -> Self:
         """Return a copy without what is valid in one process, and for one instance, only."""
-        twin = copy(self)
+        twin = object.__new__(type(self))  # `copy` takes three times as long
+        twin.__dict__.update(self.__dict__)
         twin.symbols = twin.markers = None
         return twin
 
