@@ -53,7 +53,7 @@ def test_library_lists_every_type_with_a_sentence() -> None:
 def test_every_type_can_be_described(name: str) -> None:
     result = called(["describe", name])
     assert result.exit_code == 0
-    for field in library_types()[name]._class_fields.values():
+    for field in declarations(library_types()[name]).fields.values():
         assert field.name in result.stdout
         assert field.unit_text in result.stdout
     assert "iter(" not in result.stdout

@@ -43,7 +43,8 @@ def _names(lines: Iterable[str]) -> dict[str, dict[str, list[str]]]:
             names[line] = {}
         else:
             name, _, about = line.strip().replace(" = ", ": ", 1).partition(": ")
-            names[[*names][-1]][name] = about.split() if name in library_types()[[*names][-1]]._class_modes else []
+            modes = declarations(library_types()[[*names][-1]]).modes
+            names[[*names][-1]][name] = about.split() if name in modes else []
     return names
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from rich.console import Console
@@ -51,9 +51,9 @@ def html(shown: Any) -> str:
 def _given(drive: Component) -> Iterator[tuple[str, str, str]]:
     """Yield path, value and description of each given parameter, and of the parameters of assemblies."""
     for part in drive.walk():
-        fields: Container[str] = getattr(part, "_own_fields", ())
+        own = inside(part)
         for name, field in part.fields.items():
-            value = part.value(name) if name in inside(part).values or name in fields else None
+            value = part.value(name) if name in own.values or name in own.own_fields else None
             if isinstance(field, Parameter) and value is not None:
                 yield f"{path_of(part)}.{name}".removeprefix("."), str(value.given), field.description
 
