@@ -76,6 +76,7 @@ benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/events.py
 	$(BIN)/python benchmarks/precision.py
 	$(BIN)/python benchmarks/chain.py 10 100 1000 5000
+	$(BIN)/python benchmarks/large.py 60 10
 	$(BIN)/python benchmarks/fmu_export.py 10 100 1000
 	$(BIN)/python benchmarks/gradient.py
 	$(BIN)/python benchmarks/linearize.py 100 1000
