@@ -91,6 +91,7 @@ typedef struct { /* a tape for the present modes, see tape.c */
     Run *runs;
     Operands *operands;
     int *outputs;
+    int *wanted; /* of a part: the outputs of the whole */
     int first_known, uses;
     uint64_t belongs_to;
 } Special;
@@ -191,8 +192,9 @@ typedef struct Instance {
     int doubts, doubtful; /* about the sign of a guard: of steps since the last event; of the present piece */
     Terms *terms, *strike_terms;
     Strike strike;
-    int stopped; /* something has been stopped at the present instant */
-    Special special[N_SPECIALS];
+    int stopped;                     /* something has been stopped at the present instant */
+    Special special[N_SPECIALS + 1]; /* the last one: a part, see `make_part` */
+    double *part_values;
     uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
 
     const char *name;
@@ -240,6 +242,8 @@ void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
 const Tape *run_special(Instance *c, const Tape *tape, double *outputs);
 const Tape *evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
+void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int period);
+void evaluate_part(Instance *c, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
 void load(Instance *c, double t, const double *point);
 void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs);

@@ -192,12 +192,14 @@ static void note_positive(Instance *c, double t) {
 
 /* Is a guard positive at a time inside the piece that is not at its ends, and is that more than rounding? */
 static int has_risen(Instance *c, double t) {
-    const double *guards = guards_inside(c, t), *rounding = NULL;
-    for (int g = 0; g < c->model->n_guards; g++) {
-        if (!(guards[g] > 0) || c->positive[g]) continue;
-        if (rounding == NULL) rounding = rounding_of_guards(c, c->piece, t);
-        if (guards[g] > rounding[g]) return 1;
-    }
+    int n = c->model->n_guards, any = 0;
+    const double *guards = guards_inside(c, t), *rounding;
+    for (int g = 0; g < n; g++) any |= c->kinds[g] = guards[g] > 0 && !c->positive[g];
+    if (!any) return 0;
+    make_part(c, &c->model->tapes.guards, c->kinds, n);
+    rounding = rounding_of_guards(c, c->piece, t);
+    for (int g = 0; g < n; g++)
+        if (c->kinds[g] && guards[g] > rounding[g]) return 1;
     return 0;
 }
 

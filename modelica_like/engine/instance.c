@@ -140,6 +140,12 @@ static uint64_t lay_out(Instance *c, double *memory) {
         s->first_known = (int)(slots + left); /* among the slots, behind all others */
         left += operations;
     }
+    Special *part = &c->special[N_SPECIALS]; /* of guards */
+    TAKE(part->runs, m->tapes.guards.n_operations);
+    TAKE(part->operands, m->tapes.guards.n_operations);
+    TAKE(part->outputs, 2 * guards);
+    TAKE(part->wanted, 2 * guards);
+    TAKE(c->part_values, 2 * guards);
     c->whole = take(memory, &used, piece_size(m), 1);
     TAKE(c->terms, holds);
     TAKE(c->strike_terms, holds);

@@ -14,16 +14,25 @@ typedef struct { /* guards and their rates at a time within a step; behind them 
     double t, *values, *rates;
 } Look;
 
+enum { QUIET, CROSSING, HUMP }; /* guards that are not quiet are candidates */
+
 static Look room_for_look(const Instance *c, int number) {
     double *values = c->looks + 3 * (size_t)c->model->n_guards * (size_t)number;
     return (Look){0, values, values + c->model->n_guards};
 }
 
-static int look_at(Instance *c, double t, double *point, Look *look) {
+static void take_guards(Instance *c, double t, const double *point, int candidates, double *values) {
+    if (candidates) evaluate_part(c, t, point, values);
+    else evaluate_special(c, &c->model->tapes.guards, t, point, values);
+}
+
+/* At all guards, or at candidates only. */
+static int look_at(Instance *c, double t, double *point, int candidates, Look *look) {
     if (!solve_implicit(c, t, point, 1)) return 0;
-    evaluate_special(c, &c->model->tapes.guards, t, point, look->values);
+    take_guards(c, t, point, candidates, look->values);
     look->t = t;
     for (int g = 0; g < c->model->n_guards; g++) {
+        if (candidates && c->kinds[g] == QUIET) continue;
         look->values[g] = number_or_false(look->values[g]);
         if (!isfinite(look->rates[g])) look->rates[g] = 0;
     }
@@ -31,13 +40,14 @@ static int look_at(Instance *c, double t, double *point, Look *look) {
 }
 
 /* By the dense output of the whole step. */
-static int look_inside(Instance *c, double t, Look *look) {
+static int look_inside(Instance *c, double t, int candidates, Look *look) {
     double *point = c->vector + c->model->n_z;
     piece_at(c->model, c->whole, t, point);
-    return look_at(c, t, point, look);
+    return look_at(c, t, point, candidates, look);
 }
 
-/* By a step again from the beginning of the whole one, which becomes the piece; that of another integrator is cut. */
+/* At candidates, by a step again from the beginning of the whole one, which becomes the piece; that of another
+ * integrator is cut. */
 static int step_to(Instance *c, double t, Look *look) {
     const Piece *whole = c->whole;
     if (t <= whole->begin) {
@@ -46,7 +56,7 @@ static int step_to(Instance *c, double t, Look *look) {
     } else if (takes_panels(c)) piece_between(c, whole, whole->begin, t, c->piece);
     else if (rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, c->piece) < 0) return 0;
     c->piece->end = t;
-    return look_at(c, t, last_of(c->model, c->piece), look);
+    return look_at(c, t, last_of(c->model, c->piece), 1, look);
 }
 
 static inline double cubic(double s, double g0, double r0, double g1, double r1) {
@@ -84,8 +94,6 @@ static double guess(const Look *before, const Look *after, int g) {
     return before->t + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g], after->rates[g] * h);
 }
 
-enum { QUIET, CROSSING, HUMP };
-
 static int find_candidates(Instance *c, const Look *before, const Look *after) {
     double h = after->t - before->t;
     for (int g = 0; g < c->model->n_guards; g++) {
@@ -117,7 +125,7 @@ static double positive_top(Instance *c, const Look *before, const Look *after, L
         double low = before->t, high = after->t, t = c->kinds[g] == HUMP ? guess(before, after, g) : low,
                top = INFINITY;
         for (int n = 0; n < MAX_TRIALS && c->kinds[g] == HUMP && isinf(top); n++) {
-            if (!look_inside(c, t, look)) return INFINITY;
+            if (!look_inside(c, t, 1, look)) return INFINITY;
             if (look->values[g] > 0) top = t;
             *(look->rates[g] > 0 ? &low : &high) = t;
             if (look->values[g] + fabs(look->rates[g]) * (high - low) < 0 || high - low < 1e-12) break;
@@ -142,7 +150,7 @@ static int locate(Instance *c, const Look *before, const Look *after, Look *look
     for (int rough = 1; rough >= 0; rough--) {
         double low = before->t, high = last;
         for (int n = 0; n < MAX_TRIALS; n++) {
-            if (!(rough ? look_inside(c, t, look) : step_to(c, t, look))) return 0;
+            if (!(rough ? look_inside(c, t, 1, look) : step_to(c, t, look))) return 0;
             *(newton(c, look, &step) ? &high : &low) = t;
             if (fabs(step) <= tolerance && !rough) return 1;
             if (fabs(step) <= tolerance || high - low <= tolerance) break;
@@ -165,19 +173,20 @@ static int mark_wanting(Instance *c, const Look *look, double tolerance) {
     return any;
 }
 
-/* What changes of the states make of the guards at a point of a piece: all together, and any two apart. */
+/* What changes of the states make of candidates at a point of a piece: all together, and any two apart. */
 static const double *guards_moved(Instance *c, const Piece *piece, double t, const double *changes) {
     const Model *m = c->model;
     double *here = room_for_look(c, DEPTH + 3).values, *shaken = room_for_look(c, DEPTH + 4).values,
            *moved = here + 2 * m->n_guards, *point = c->vector + m->n_z;
     memset(moved, 0, (size_t)m->n_guards * sizeof(double));
     piece_at(m, piece, t, point);
-    evaluate_special(c, &m->tapes.guards, t, point, here);
+    evaluate_part(c, t, point, here);
     for (int bit = 1; bit < 2 * m->n_x; bit *= 2) {
         piece_at(m, piece, t, point);
         for (int k = 0; k < m->n_x; k++) point[k] += k & (bit / 2) ? -changes[k] : changes[k];
-        evaluate_special(c, &m->tapes.guards, t, point, shaken);
-        for (int g = 0; g < m->n_guards; g++) moved[g] = fmax(moved[g], fabs(shaken[g] - here[g]));
+        evaluate_part(c, t, point, shaken);
+        for (int g = 0; g < m->n_guards; g++)
+            if (c->kinds[g] != QUIET) moved[g] = fmax(moved[g], fabs(shaken[g] - here[g]));
     }
     return moved;
 }
@@ -236,6 +245,7 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
     Look found = room_for_look(c, DEPTH + 2);
     double step;
     if (!find_candidates(c, before, after)) return NOTHING;
+    make_part(c, &c->model->tapes.guards, c->kinds, c->model->n_guards);
     int panels = takes_panels(c);
     if (panels ? is_within_tolerance(c, before, after) : is_within_error(c, after)) {
         if (panels) c->doubtful++;
@@ -266,7 +276,7 @@ static int behave(const Instance *c, const Look *before, const Look *middle, con
 
 static Found look_into(Instance *c, const Look *before, const Look *after, int depth) {
     Look middle = room_for_look(c, depth + 1);
-    if (!look_inside(c, before->t + MIDDLE * (after->t - before->t), &middle)) return TOO_LONG;
+    if (!look_inside(c, before->t + MIDDLE * (after->t - before->t), 0, &middle)) return TOO_LONG;
     int deeper = depth > 1 && !behave(c, before, &middle, after);
     Found found = deeper ? look_into(c, before, &middle, depth - 1) : check_between(c, before, &middle);
     if (found != NOTHING) return found;
@@ -277,12 +287,12 @@ static Found look_into(Instance *c, const Look *before, const Look *after, int d
 int search_events(Instance *c) {
     Look before = room_for_look(c, 0), after = room_for_look(c, 1);
     const Piece *whole = memcpy(c->whole, c->piece, piece_size(c->model));
-    if (!c->look_valid && !look_inside(c, whole->begin, &before)) return 0;
+    if (!c->look_valid && !look_inside(c, whole->begin, 0, &before)) return 0;
     c->look_valid = 1;
     before.t = whole->begin;
     /* What the last event left positive did not want to fire: it is on its way down. */
     for (int g = 0; g < c->model->n_guards; g++) before.values[g] = fmin(before.values[g], 0);
-    if (!look_inside(c, whole->end, &after)) return 0;
+    if (!look_inside(c, whole->end, 0, &after)) return 0;
     Found found = look_into(c, &before, &after, DEPTH);
     if (found == NOTHING) memcpy(before.values, after.values, 2 * (size_t)c->model->n_guards * sizeof(double));
     else if (found == ENDED) c->look_valid = 0;

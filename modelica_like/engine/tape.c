@@ -205,6 +205,51 @@ const Tape *run_special(Instance *c, const Tape *tape, double *outputs) {
     return tape;
 }
 
+/* What is left of a tape for the present modes where of every `period` outputs only the marked ones are wanted: of many
+ * guards few rise at a time, and these depend on few states. Made from what has run last at this point, and run by
+ * `evaluate_part`, until it is made anew. */
+void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int period) {
+    const Special *s = special_of(c, tape);
+    const Tape *whole = s->belongs_to == c->decided_by && s->uses > WORTH_IT ? &s->tape : tape;
+    Special *part = &c->special[N_SPECIALS];
+    unsigned char *needed = memset(c->needed_slots, 0, (size_t)(c->model->n_slots));
+    int *place = c->places_of_slots, first = whole->first_result, end = first + whole->n_operations, written = 0, k = 0;
+    part->tape = (Tape){0, 0, 0, first, part->runs, part->operands, part->outputs};
+    for (int n = 0; n < whole->n_outputs; n++)
+        if (wanted[n % period] && whole->outputs[n] < end) needed[whole->outputs[n]] = 1;
+    for (int n = whole->n_operations - 1; n >= 0; n--)
+        for (int side = 0; side < 2 && needed[first + n]; side++) {
+            int slot = side == 0 ? whole->operands[n].left : whole->operands[n].right;
+            if (slot < end) needed[slot] = 1;
+        }
+#define PLACE(slot) ((slot) >= first && (slot) < end ? place[slot] : (slot))
+    for (int r = 0; r < whole->n_runs; r++) {
+        int before = written;
+        for (int last = k + whole->runs[r].count; k < last; k++) {
+            if (!needed[first + k]) continue;
+            part->operands[written] = (Operands){PLACE(whole->operands[k].left), PLACE(whole->operands[k].right)};
+            place[first + k] = first + written++;
+        }
+        if (written > before) part->runs[part->tape.n_runs++] = (Run){whole->runs[r].operation, written - before};
+    }
+    for (int n = 0; n < whole->n_outputs; n++) {
+        if (!wanted[n % period]) continue;
+        part->wanted[part->tape.n_outputs] = n;
+        part->outputs[part->tape.n_outputs++] = PLACE(whole->outputs[n]);
+    }
+#undef PLACE
+    part->tape.n_operations = written;
+}
+
+/* Of outputs that are not wanted, values stay as they are. */
+void evaluate_part(Instance *c, double t, const double *point, double *outputs) {
+    const Special *part = &c->special[N_SPECIALS];
+    double *values = c->part_values;
+    load(c, t, point);
+    tape_run(&part->tape, c->slots, values);
+    for (int k = 0; k < part->tape.n_outputs; k++) outputs[part->wanted[k]] = values[k];
+}
+
 const Tape *evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
     load(c, t, point);
     return run_special(c, tape, outputs);
