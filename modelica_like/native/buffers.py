@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
+from modelica_like.errors import ValueOutOfRange
 from modelica_like.native.library import MORE, PAUSED, Run
 from modelica_like.native.model import Instance
+from modelica_like.options import memory
 from modelica_like.solve.dense import MOST_KEPT
 
 _COUNTED = {
@@ -78,6 +80,13 @@ class Buffers:
         return self._arrays[name][: getattr(self.run, f"n_{counted}")]
 
     def _make_room(self, counted: str, names: Iterable[str], room: int) -> None:
+        needed, there = 8.0 * room * sum(self._widths.get(name, 0) for name in names), memory()
+        if needed > there:
+            raise ValueOutOfRange(
+                f"By {self.run.last:.6g} s there are {self.run.n_points:,} results, two of them at every event; more "
+                f"of them need room of {needed / 1e9:.3g} GB, and this machine has {there / 1e9:.3g} GB.",
+                advice="Run a shorter time, or a part of the drive.",
+            )
         setattr(self.run, f"room_{counted}", room)
         for name in names:
             if name not in self._widths:

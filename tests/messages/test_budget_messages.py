@@ -7,8 +7,8 @@ import pytest
 
 from modelica_like import Options, options, simulate
 from modelica_like.errors import ExportError, ModelicaLikeError, NotEnoughMemory, StepFailed, ValueOutOfRange
-from modelica_like.language import Component, Equations, Variable, der, var, where
-from modelica_like.native import model
+from modelica_like.language import Component, Equations, Variable, der, sin, var, where
+from modelica_like.native import buffers, model
 
 Check = Callable[[type[ModelicaLikeError], Callable[[], object], str], None]
 
@@ -33,6 +33,16 @@ class Stopping(Component):
 
     def equations(self) -> Equations:
         yield der(self.x) == where(self.time < 1, 1.0, 0.0)
+
+
+class Ticking(Component):
+    """It starts and stops 300 times in a second."""
+
+    units_checked = False
+    x: Variable = var("1", "position", state="always", default=0.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == where(sin(1000 * self.time) > 0, 1.0, 0.0)
 
 
 def test_steps_of_a_native_run_are_limited(check_message: Check) -> None:
@@ -61,6 +71,17 @@ def test_results_that_do_not_fit_are_told_before_the_run(
         "Take fewer points; `readings` are read off every step, whatever is written."
     )
     check_message(ValueOutOfRange, lambda: simulate(Swing(), 1e-6, points=10_000_000, solver=solver), text)
+
+
+def test_results_at_events_that_do_not_fit(check_message: Check, monkeypatch: pytest.MonkeyPatch) -> None:
+    # How many there are is not known before the run.
+    monkeypatch.setattr(buffers, "memory", lambda: 1e4)
+    text = (
+        "By 0.0408407 s there are 27 results, two of them at every event; more of them need room of 1.64e-05 GB, and "
+        "this machine has 1e-05 GB.\n"
+        "Run a shorter time, or a part of the drive."
+    )
+    check_message(ValueOutOfRange, lambda: simulate(Ticking(), 1.0, points=10, solver="native"), text)
 
 
 def test_an_instance_without_memory(check_message: Check, monkeypatch: pytest.MonkeyPatch) -> None:
