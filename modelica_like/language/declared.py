@@ -60,8 +60,14 @@ class Declared:
     @property
     def fields(self) -> dict[str, Field]:
         """Declared parameters, variables, signals and discrete values, and those that this one alone has, by name."""
-        declared, own = self._declared.fields, self._inside.own_fields
-        return {**declared, **own} if own else declared
+        within = self._inside
+        own = within.own_fields
+        if not own:
+            return self._declared.fields
+        # Every change makes a new dictionary; a netlist of thousands of parameters asks for each of them.
+        if within.joined is None or within.joined[0] is not own:
+            within.joined = own, {**self._declared.fields, **own}
+        return within.joined[1]
 
     def declare_array(self, name: str, size: int, field: Field) -> None:
         """Declare variables or signals `name[1]` to `name[size]`, in `build`: structural fields say how many.

@@ -64,6 +64,7 @@ class Inside:
         owner: the component it belongs to.
         name: there.
         own_fields: fields that this one alone has, by name.
+        joined: these, and together with those of the class; made on first use.
         symbols: of its fields, by name and order of the derivative.
         markers: of expressions of these symbols.
     """
@@ -71,6 +72,7 @@ class Inside:
     owner: Declared | None = None
     name: str = ""
     own_fields: dict[str, Field] = field(default_factory=_empty)
+    joined: tuple[dict[str, Field], dict[str, Field]] | None = None
     symbols: dict[tuple[str, int], Symbol] | None = None
     markers: list[Marker] | None = None
 
