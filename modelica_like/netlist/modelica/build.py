@@ -82,7 +82,7 @@ class _Builder:
         self.component = component
         self.wires = groups(self.statements.connections, self.instance)
         for name, bound in self.statements.bound.items():
-            component._declare(name, signal_out(self._unit(bound.basic), f"value of {bound.end}"))
+            declare(component, name, signal_out(self.unit(bound.basic), f"value of {bound.end}"))
             self.wires.append(Wire([name, bound.end], bound.source))
         for name, member in self.instance.members.items():
             place = member.text.place(member.declaration.line)
