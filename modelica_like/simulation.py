@@ -92,7 +92,7 @@ def build(
     bound = [name for name in free if name in model.derived_position]
     if not bound:
         return model
-    values = model.derived(model.p).full().ravel()
+    values = model.equations.derived(model.p).full().ravel()
     drive = copy.deepcopy(drive)
     for name in bound:
         drive.set(name, float(values[model.derived_position[name]]))
@@ -181,7 +181,7 @@ def simulate(
             raise
         except KeyboardInterrupt as interrupt:
             raise Interrupted.after(_solution(loop, begin, kind) if loop.record.segments else None) from interrupt
-        for segment in loop.record.segments if model.ideal else ():
+        for segment in loop.record.segments if model.held.ideal else ():
             refuse_contradiction(model, segment.point(-1))
         run = _solution(loop, begin, kind)
         if not readings:

@@ -14,55 +14,22 @@ from modelica_like import upper
 from modelica_like.compile.buffers import Along, BufferedFunction
 from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.compile.edges import Edges, find_edges
+from modelica_like.compile.groups import CompiledTransition as CompiledTransition
+from modelica_like.compile.groups import CompiledUpdate as CompiledUpdate
+from modelica_like.compile.groups import Equations, EventTables, Held, Starts, functions_of
+from modelica_like.compile.groups import Reset as Reset
+from modelica_like.compile.groups import StartEntry as StartEntry
 from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.errors import LanguageError, ModelicaLikeError, Source, UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
-from modelica_like.flatten.template import TransitionForm
+from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
 from modelica_like.language.units import Unit, to_si
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.structure.holds import HeldMotion as HeldMotion
-from modelica_like.structure.ideal import IdealNetwork as IdealNetwork
 from modelica_like.structure.motion import Motion
 
 Made = TypeVar("Made")
 TERMINAL, HOMOTOPY = "terminal()", "homotopy()"
 """Discrete values of the model: 1 at the end of a run; the share of the actual expressions at a start."""
-
-
-@dataclass(frozen=True)
-class Reset:
-    """A value that changes at an event: entry of x (`state`), of d (`discrete`), or of the reset nodes (`value`)."""
-
-    kind: str
-    index: int
-    factor: float
-    value: int
-    target: int
-
-
-@dataclass(frozen=True)
-class CompiledUpdate:
-    """What gets the value of a row of `CompiledDae.updates`, and whether it also does so when start values are found.
-
-    `source` is the place of its equation or `when`.
-    """
-
-    reset: Reset
-    at_start: bool
-    source: Source
-
-
-CompiledTransition = TransitionForm[int, Reset]
-"""A transition as numbers."""
-
-
-@dataclass(frozen=True)
-class StartEntry:
-    """A start value: node, state (if it is one), strength, position in the start values."""
-
-    node: int
-    state: tuple[int, float] | None
-    strength: str
 
 
 @dataclass(frozen=True)
@@ -76,39 +43,20 @@ class CompiledTerminal:
 
 @dataclass(eq=False)
 class CompiledDae:
-    """Functions of the reduced system; all take (t, x, z, p, u, d).
+    """Functions of the reduced system, all of (t, x, z, p, u, d), in four groups, and what they are about.
 
     Attributes:
-        ode: derivatives of x.
-        alg: residuals for z.
-        variables: all flat variables, in the order of `names`.
-        guards: one per state event, positive where it can fire.
-        guard_rates: their time derivatives along the solution.
-        guards_soon: guards one time resolution later.
-        moments: times of the time events.
-        resets: new values at events.
-        updates: what discrete variables, and variables in a `when`, become in one iteration of an event; as many as
-            `update_rows`.
-        delays: value and time of each delay, one after the other.
-        delay_parts: places of the numbers of each delay in d: terms of its series, beginning, 2 over the length.
-        reset_nodes: variables with a reset that are neither states nor discrete.
-        start_conditions: one per choice of a start mode.
-        hold_terms: gain (zero where nothing is held), capacities forward and backward, and restitution of every held
-            motion, one row each, row by row.
-        start_values: as many as `starts`.
-        discrete_starts: start of d: modes and discrete values, then the entries of `holds`, `circuits` and `ideal`.
-        derived: parameters that follow from others, of p only.
-        determinants: relative determinants; zero where a block is singular.
+        equations: what holds at every moment.
+        events: what may happen at an instant.
+        held: what modes hold.
+        starts: what is known at the start.
+        inputs: positions of the open inputs among the variables.
         p: parameter values.
+        u: values of the inputs.
         components: paths of the components of the energy balance.
         places: source places of the parts of netlists, by path.
         renamed: what to write instead of paths of earlier versions.
         terminals: open ends with an adaptor.
-        singular: names and origins of the blocks of `determinants`.
-        implicit_blocks: names and origins of the blocks of `alg`.
-        holds: motions that modes hold.
-        circuits: held motions that depend on each other.
-        ideal: the ideal elements, if there are any.
         motion_sources: paths of the components that prescribe a motion, whatever torque or force it takes.
     """
 
@@ -120,37 +68,10 @@ class CompiledDae:
     flat_derived: tuple[FlatParameter, ...]
     flat_discretes: tuple[FlatDiscrete, ...]
     inputs: tuple[int, ...]
-    ode: ca.Function
-    alg: ca.Function
-    alg_jacobian: ca.Function
-    variables: ca.Function
-    guards: ca.Function
-    guard_rates: ca.Function
-    guards_soon: ca.Function
-    moments: ca.Function
-    resets: ca.Function
-    updates: ca.Function
-    update_rows: tuple[CompiledUpdate, ...]
-    delays: ca.Function
-    delay_parts: tuple[tuple[int, ...], ...]
-    reset_nodes: tuple[int, ...]
-    start_conditions: ca.Function
-    hold_terms: ca.Function
-    start_values: ca.Function
-    discrete_starts: ca.Function
-    derived: ca.Function
-    determinants: ca.Function
-    transitions: tuple[CompiledTransition, ...]
-    start_modes: tuple[tuple[int, int, Source], ...]
-    starts: tuple[StartEntry, ...]
-    holds: tuple[HeldMotion, ...]
-    circuits: tuple[Circuit, ...]
-    ideal: IdealNetwork | None
-    singular: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...]
-    differentiated: tuple[Origin, ...]
-    guesses: Vector
-    nominals: Vector
-    z_guesses: Vector
+    equations: Equations
+    events: EventTables
+    held: Held
+    starts: Starts
     p: Vector
     u: Vector
     components: tuple[str, ...]
@@ -158,7 +79,6 @@ class CompiledDae:
     renamed: dict[str, str]
     summary: str
     terminals: tuple[CompiledTerminal, ...] = ()
-    implicit_blocks: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...] = ()
     motion_sources: tuple[str, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     _make_energy: Callable[[], ca.Function] | None = None
@@ -171,10 +91,15 @@ class CompiledDae:
     def __repr__(self) -> str:
         return f"<{self}>"
 
+    @cached_property
+    def functions(self) -> dict[str, ca.Function]:
+        """Functions of the groups by their names, such as `start_values`."""
+        return functions_of(self.equations, self.events, self.held, self.starts)
+
     @property
     def discrete_size(self) -> int:
         """Length of d: modes and discrete values, approaches, switches and shares, rows of ideal elements."""
-        return self.ode.size1_in("d")
+        return self.equations.ode.size1_in("d")
 
     @cached_property
     def position(self) -> dict[str, int]:
@@ -211,7 +136,9 @@ class CompiledDae:
     @property
     def edges(self) -> Edges:
         """Where slopes change without an event, and what repeats in guards."""
-        return self.once("edges", lambda: find_edges(self.arguments, self.ode, self.alg, self.guards))
+        return self.once(
+            "edges", lambda: find_edges(self.arguments, self.equations.ode, self.equations.alg, self.events.guards)
+        )
 
     @cached_property
     def energy(self) -> ca.Function:
@@ -244,7 +171,10 @@ class CompiledDae:
         """Symbols for the arguments of the functions, the same for all twins: what is cached has them."""
         return self.once(
             "arguments",
-            lambda: {name: ca.SX.sym(name, self.ode.size1_in(k)) for k, name in enumerate(self.ode.name_in())},
+            lambda: {
+                name: ca.SX.sym(name, self.equations.ode.size1_in(k))
+                for k, name in enumerate(self.equations.ode.name_in())
+            },
         )
 
     @property
@@ -263,13 +193,13 @@ class CompiledDae:
     def motion(self) -> Motion:
         """How expressions of `arguments` change along the solution."""
         given = self.arguments
-        ode, alg = (function(*given.values()) for function in (self.ode, self.alg))
+        ode, alg = (function(*given.values()) for function in (self.equations.ode, self.equations.alg))
         return Motion(given["t"], given["x"], given["z"], ode, alg)
 
     def refuse_delays(self, error: type[ModelicaLikeError], what: str) -> None:
         """Raise an error where something is not possible with delays, because they need the past of a run."""
-        if self.delay_parts:
-            (first, *_), *_ = self.delay_parts
+        if self.events.delay_parts:
+            (first, *_), *_ = self.events.delay_parts
             owner, *_ = self.flat_discretes[first].path.rpartition(".")
             raise error(
                 f"{what}: {owner or 'it'} has a delay(…), which needs the past of a run.",
@@ -324,7 +254,7 @@ class CompiledDae:
             if not p[below] < p[above]:
                 names = [f"{self.flat_parameters[k].path} = {p[k]:g}" for k in (above, below)]
                 raise ValueOutOfRange(f"{' is not above '.join(names)}: this column of the table must rise.")
-        for one, number in zip(self.flat_derived, self.derived(p).full().ravel(), strict=True):
+        for one, number in zip(self.flat_derived, self.equations.derived(p).full().ravel(), strict=True):
             one.checked(float(number), f"{number:g}")
         return self.twin(p=p, u=u)
 

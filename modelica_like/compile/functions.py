@@ -10,15 +10,17 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.compiled import (
-    CompiledDae,
-    CompiledTerminal,
+from modelica_like.compile.compiled import CompiledDae, CompiledTerminal, Vector
+from modelica_like.compile.energy import energy_terms
+from modelica_like.compile.groups import (
     CompiledTransition,
+    Equations,
+    EventTables,
+    Held,
     Reset,
     StartEntry,
-    Vector,
+    Starts,
 )
-from modelica_like.compile.energy import energy_terms
 from modelica_like.compile.soon import guards_soon
 from modelica_like.compile.start_system import start_system
 from modelica_like.compile.updates import updates
@@ -43,7 +45,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
     """Build the functions of a reduced system."""
     flat = reduced.flat
     build = _Builder(reduced)
-    functions, tables = build.functions()
+    terms = ca.vec(hold_terms(flat, reduced.values).T)
     return CompiledDae(
         name=flat.name,
         states=reduced.states,
@@ -53,25 +55,16 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         flat_derived=tuple(flat.derived),
         flat_discretes=tuple(_plain(one) for one in flat.discretes),
         inputs=tuple(flat.inputs),
-        **functions,
-        derived=ca.Function("derived", [flat.p], [ca.densify(ca.SX(flat.formulas))], ["p"], ["derived"]),
-        **tables,
-        starts=tuple(StartEntry(s.node, reduced.node_states[s.node], s.strength) for s in flat.starts),
-        holds=reduced.holds,
-        circuits=reduced.circuits,
-        ideal=reduced.ideal,
-        singular=tuple((names, origins) for names, origins, _ in reduced.determinants),
-        differentiated=reduced.differentiated,
-        guesses=np.array(reduced.guesses, float),
-        nominals=np.array(reduced.nominals, float),
-        z_guesses=np.array(reduced.z_guesses, float),
+        equations=build.equations(),
+        events=build.events(),
+        held=Held(reduced.holds, build.function("hold_terms", terms), reduced.circuits, reduced.ideal),
+        starts=build.starts(),
         p=np.array([one.value for one in flat.parameters], float),
         u=_input_values(flat),
         components=tuple(flat.components),
         places=_places(flat),
         renamed={f"{path}.{name}": to for path, one in flat.components.items() for name, to in one.renamed.items()},
         terminals=_terminals(flat),
-        implicit_blocks=reduced.implicit_blocks,
         motion_sources=_motion_sources(flat),
         summary=str(reduced),
         settings=_settings(flat.components.get("")),
@@ -147,36 +140,55 @@ class _Builder:
         result = expression if name == "alg_jacobian" else ca.densify(ca.SX(expression))
         return ca.Function(name, self.arguments, [result], ["t", "x", "z", "p", "u", "d"], [name])
 
-    def functions(self) -> tuple[dict[str, ca.Function], dict[str, Any]]:
-        """Return the functions of (t, x, z, p, u, d) by name, and the tables of events."""
+    def equations(self) -> Equations:
+        """Return what holds at every moment."""
+        reduced, flat = self.reduced, self.reduced.flat
+        return Equations(
+            ode=self.function("ode", reduced.ode),
+            alg=self.function("alg", reduced.alg),
+            alg_jacobian=self.function("alg_jacobian", ca.jacobian(reduced.alg, reduced.z)),
+            variables=self.function("variables", reduced.values[: len(flat.variables)]),
+            derived=ca.Function("derived", [flat.p], [ca.densify(ca.SX(flat.formulas))], ["p"], ["derived"]),
+            determinants=self.function("determinants", ca.vertcat(*(one[2] for one in reduced.determinants))),
+            singular=tuple((names, origins) for names, origins, _ in reduced.determinants),
+            implicit_blocks=reduced.implicit_blocks,
+            differentiated=reduced.differentiated,
+            nominals=np.array(reduced.nominals, float),
+        )
+
+    def events(self) -> EventTables:
+        """Return what may happen at an instant."""
         reduced, flat = self.reduced, self.reduced.flat
         guards, moments, transitions, resets, targets = self.transitions()
         delays, delay_parts = self.delays()
-        reset = partial(self._reset, targets=targets)
-        news, update_rows = updates(reduced, reset, [one[0] for one in delay_parts])
-        conditions, start_modes = self.start_modes()
-        expressions = {
-            "ode": reduced.ode,
-            "alg": reduced.alg,
-            "alg_jacobian": ca.jacobian(reduced.alg, reduced.z),
-            "variables": reduced.values[: len(flat.variables)],
-            "guards": guards,
-            "guard_rates": reduced.total_derivative(guards),
-            "guards_soon": guards_soon(flat.time, reduced.total_derivative, guards),
-            "moments": moments,
-            "resets": resets,
-            "updates": news,
-            "delays": delays,
-            "start_conditions": conditions,
-            "hold_terms": ca.vec(hold_terms(flat, reduced.values).T),
-            "start_values": ca.vertcat(*(ca.SX(s.value) for s in flat.starts)),
-            "discrete_starts": _discrete_starts(flat),
-            "determinants": ca.vertcat(*(expression for _, _, expression in reduced.determinants)),
-        }
-        functions = {name: self.function(name, expression) for name, expression in expressions.items()}
-        tables = {"transitions": transitions, "update_rows": update_rows, "reset_nodes": tuple(targets)}
-        tables["delay_parts"] = delay_parts
-        return functions, tables | {"start_modes": start_modes}
+        news, update_rows = updates(reduced, partial(self._reset, targets=targets), [one[0] for one in delay_parts])
+        return EventTables(
+            guards=self.function("guards", guards),
+            guard_rates=self.function("guard_rates", reduced.total_derivative(guards)),
+            guards_soon=self.function("guards_soon", guards_soon(flat.time, reduced.total_derivative, guards)),
+            moments=self.function("moments", moments),
+            transitions=transitions,
+            resets=self.function("resets", resets),
+            reset_nodes=tuple(targets),
+            updates=self.function("updates", news),
+            update_rows=update_rows,
+            delays=self.function("delays", delays),
+            delay_parts=delay_parts,
+        )
+
+    def starts(self) -> Starts:
+        """Return what is known at the start."""
+        reduced, flat = self.reduced, self.reduced.flat
+        conditions, modes = self.start_modes()
+        return Starts(
+            conditions=self.function("start_conditions", conditions),
+            modes=modes,
+            entries=tuple(StartEntry(s.node, reduced.node_states[s.node], s.strength) for s in flat.starts),
+            values=self.function("start_values", ca.vertcat(*(ca.SX(s.value) for s in flat.starts))),
+            discretes=self.function("discrete_starts", _discrete_starts(flat)),
+            guesses=np.array(reduced.guesses, float),
+            z_guesses=np.array(reduced.z_guesses, float),
+        )
 
     def transitions(self) -> tuple[Any, Any, tuple[CompiledTransition, ...], Any, list[int]]:
         """Return guards, moments, transitions, reset values and reset nodes of all instances."""

@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
+from modelica_like.compile.groups import with_functions
 from modelica_like.compile.soon import ahead, guards_soon, joined
 from modelica_like.flatten.generic import spread
 from modelica_like.structure.motion import Motion
@@ -92,7 +93,7 @@ def _sliding(model: CompiledDae) -> CompiledDae:
 def _borders(model: CompiledDae) -> list[Border]:
     samples, found = _samples(model), list[tuple[Any, Border]]()
     for pair in _pairs(model, samples):
-        guard = samples[:, model.transitions[pair.there].index]
+        guard = samples[:, model.events.transitions[pair.there].index]
         turned = replace(pair, first=pair.second, second=pair.first, there=pair.back, back=pair.there)
         ways = (pair, guard), (turned, -guard)
         alike = [(border, one) for values, border in found for one, own in ways if _same(own, values)]
@@ -109,11 +110,13 @@ def _same(values: Any, others: Any) -> bool:
 
 
 def _pairs(model: CompiledDae, samples: Any) -> Iterator[Pair]:
-    held = {(one.mode, one.number) for one in model.holds}
+    held = {(one.mode, one.number) for one in model.held.motions}
     numbers = {k: len(one.names) for k, one in enumerate(model.flat_discretes)}
-    plain = [k for k, one in enumerate(model.transitions) if not (one.timed or one.resets or one.fails or one.notice)]
+    plain = [
+        k for k, one in enumerate(model.events.transitions) if not (one.timed or one.resets or one.fails or one.notice)
+    ]
     for there, back in combinations(plain, 2):
-        one, other = model.transitions[there], model.transitions[back]
+        one, other = model.events.transitions[there], model.events.transitions[back]
         mode, first, second = one.mode, other.target, one.target
         if mode != other.mode or first not in one.sources or second not in other.sources or first == second:
             continue
@@ -125,31 +128,31 @@ def _pairs(model: CompiledDae, samples: Any) -> Iterator[Pair]:
 
 def _samples(model: CompiledDae) -> Any:
     """Values of the guards at arbitrary points, shape (points, guards)."""
-    sizes = [model.guards.size1_in(k) for k in range(model.guards.n_in())]
+    sizes = [model.events.guards.size1_in(k) for k in range(model.events.guards.n_in())]
     t, x, z, p, u, d = np.split(spread(0.0, 1.0, (sum(sizes), _SAMPLES)), np.cumsum(sizes)[:-1])
-    return model.guards.map(_SAMPLES)(t, 4 * x - 2, 4 * z - 2, p, u, np.floor(2 * d)).full().T
+    return model.events.guards.map(_SAMPLES)(t, 4 * x - 2, 4 * z - 2, p, u, np.floor(2 * d)).full().T
 
 
 def _decides(model: CompiledDae, mode: int, guard: int) -> bool:
     """Whether a mode has an effect on the rate of a guard, but none on the guard itself, and resets nothing."""
     follow = _followers(model, mode)
-    if any(model.update_rows[row].reset.kind != "discrete" for row in follow):
+    if any(model.events.update_rows[row].reset.kind != "discrete" for row in follow):
         return False
-    modes = {mode, *(model.update_rows[row].reset.index for row in follow)}
-    implicitly = any(column in modes for _, column in _uses(model.alg, "d"))
-    if implicitly and _uses(model.alg_jacobian, "z"):
+    modes = {mode, *(model.events.update_rows[row].reset.index for row in follow)}
+    implicitly = any(column in modes for _, column in _uses(model.equations.alg, "d"))
+    if implicitly and _uses(model.equations.alg_jacobian, "z"):
         return False
     value, rate = (
         any(row == guard and column in modes for row, column in _uses(function, "d"))
         or (implicitly and any(row == guard for row, _ in _uses(function, "z")))
-        for function in (model.guards, model.guard_rates)
+        for function in (model.events.guards, model.events.guard_rates)
     )
     return rate and not value
 
 
 def _followers(model: CompiledDae, mode: int) -> list[int]:
     """Rows of the discrete equations on which a mode has an effect."""
-    return sorted({row for row, column in _uses(model.updates, "d") if column == mode})
+    return sorted({row for row, column in _uses(model.events.updates, "d") if column == mode})
 
 
 def _uses(function: ca.Function, argument: str) -> set[tuple[int, int]]:
@@ -186,16 +189,16 @@ class _Mix:
             self._with({one.mode: ca.if_else(self._slides(one), one.second, modes[one.mode]) for one in border})
             for border in borders
         ]
-        self.alg = model.alg(*self.first)
-        ode = model.ode(*self.first)
-        guards = ca.vertsplit(model.guards(*self.first))
-        self.borders = [guards[model.transitions[border[0].there].index] for border in borders]
+        self.alg = model.equations.alg(*self.first)
+        ode = model.equations.ode(*self.first)
+        guards = ca.vertsplit(model.events.guards(*self.first))
+        self.borders = [guards[model.events.transitions[border[0].there].index] for border in borders]
         self.rates = self._motion(ode).rate(ca.vertcat(*self.borders))
         self.shares = self._shares()
-        self.motion = self._motion(self._mixed(model.ode))
+        self.motion = self._motion(self._mixed(model.equations.ode))
         others = [self._with({one.mode: self._other(one) for one in border}) for border in borders]
         self.across = [
-            (self._motion(self.motion.ode + model.ode(*other) - ode)).rate(border)
+            (self._motion(self.motion.ode + model.equations.ode(*other) - ode)).rate(border)
             for other, border in zip(others, self.borders, strict=True)
         ]
 
@@ -211,7 +214,7 @@ class _Mix:
 
     def _following(self, arguments: list[Any], modes: Iterable[int]) -> list[tuple[int, Any]]:
         """Return positions in d and values of the discrete variables on which modes have an effect."""
-        values, rows = self.base.updates(*arguments), self.base.update_rows
+        values, rows = self.base.events.updates(*arguments), self.base.events.update_rows
         return [(rows[row].reset.index, values[row]) for mode in modes for row in _followers(self.base, mode)]
 
     def _with(self, modes: dict[int, Any]) -> list[Any]:
@@ -223,14 +226,18 @@ class _Mix:
         for mode, value in following:
             d[mode] = value
         changed = {*modes, *(mode for mode, _ in following)}
-        if any(column in changed for _, column in _uses(self.base.alg, "d")):
-            residual, jacobian = (function(t, x, z, p, u, d) for function in (self.base.alg, self.base.alg_jacobian))
+        if any(column in changed for _, column in _uses(self.base.equations.alg, "d")):
+            residual, jacobian = (
+                function(t, x, z, p, u, d) for function in (self.base.equations.alg, self.base.equations.alg_jacobian)
+            )
             z = z - ca.solve(ca.densify(jacobian), residual)
         return [t, x, z, p, u, d]
 
     def _shares(self) -> list[Any]:
         """Shares of the second modes for which the borders that slide stay where they are; zero for the others."""
-        columns = [self._motion(self.base.ode(*second)).rate(ca.vertcat(*self.borders)) for second in self.seconds]
+        columns = [
+            self._motion(self.base.equations.ode(*second)).rate(ca.vertcat(*self.borders)) for second in self.seconds
+        ]
         change = ca.horzcat(*columns) - ca.repmat(self.rates, 1, len(columns))
         rows = [ca.if_else(slides, change[k, :], ca.SX.eye(len(columns))[k, :]) for k, slides in enumerate(self.slides)]
         # The border is approached, so that errors of the integrator do not add up.
@@ -248,8 +255,8 @@ class _Mix:
     def _guards(self) -> tuple[Any, Any]:
         """Return all guards, and what they are one time resolution later."""
         # What depends on discrete values alone is true or false, and not in between.
-        moving = {row for name in ("t", "x", "z") for row, _ in _uses(self.base.guards, name)}
-        plain, mixed = self.base.guards(*self.first), self._joined()
+        moving = {row for name in ("t", "x", "z") for row, _ in _uses(self.base.events.guards, name)}
+        plain, mixed = self.base.events.guards(*self.first), self._joined()
         values = ca.vertcat(*((mixed if row in moving else plain)[row] for row in range(plain.numel())))
         now, soon = (ca.vertsplit(one) for one in (values, guards_soon(self.t, self.motion.rate, values)))
         return self._crossing(now, soon)
@@ -260,11 +267,11 @@ class _Mix:
             one + sum(share * (other - one) for share, other in zip(self.shares, those, strict=True))
             for one, *those in zip(first, *others, strict=True)
         )
-        return joined(self.base.guards(*self.first), lambda _: next(mixed))
+        return joined(self.base.events.guards(*self.first), lambda _: next(mixed))
 
     def _relations(self, arguments: list[Any]) -> list[Any]:
         found: list[Any] = []
-        joined(self.base.guards(*arguments), lambda relation: found.append(relation) or relation)
+        joined(self.base.events.guards(*arguments), lambda relation: found.append(relation) or relation)
         return found
 
     def _crossing(self, now: list[Any], soon: list[Any]) -> tuple[Any, Any]:
@@ -274,7 +281,7 @@ class _Mix:
             border, rate, across, share = self.borders[k], rates(self.borders[k]), self.across[k], self.shares[k]
             size = ca.fabs(across)
             near = _NEAR * later * (ca.fabs(rate) + ca.if_else(size < _LARGE, size, 0))
-            there, back = (self.base.transitions[number].index for number in (one.there, one.back))
+            there, back = (self.base.events.transitions[number].index for number in (one.there, one.back))
             for guards, follow in ((now, lambda e: e), (soon, lambda e: e + later * rates(e))):
                 s, v, w, a = (follow(e) for e in (border, rate, across, share))
                 if guards is soon:
@@ -286,8 +293,8 @@ class _Mix:
 
     def _updates(self) -> Any:
         """Booleans and counts that follow a sliding mode have the values of the first one; samples are mixed."""
-        plain, mixed, found = self.base.updates(*self.first), self._mixed(self.base.updates), list[Any]()
-        for row, update in enumerate(self.base.update_rows):
+        plain, mixed, found = self.base.events.updates(*self.first), self._mixed(self.base.events.updates), list[Any]()
+        for row, update in enumerate(self.base.events.update_rows):
             one = self.base.flat_discretes[update.reset.index] if update.reset.kind == "discrete" else None
             whole = one is not None and (one.hidden or one.kind != "number")
             found.append((plain if whole else mixed)[row])
@@ -304,12 +311,14 @@ class _Mix:
         places = {index: place for place, index in enumerate(order)}
         transitions = tuple(one if one.timed else replace(one, index=places[one.index]) for one in transitions)
         guards, soon = (one[order] for one in self._guards())
-        written = {name: self._mixed(getattr(base, name)) for name in _MIXED} | {"updates": self._updates()}
-        written |= {name: getattr(base, name)(*self.first) for name in _PLAIN}
+        written = {name: self._mixed(base.functions[name]) for name in _MIXED} | {"updates": self._updates()}
+        written |= {name: base.functions[name](*self.first) for name in _PLAIN}
         written |= {"guards": guards, "guard_rates": rate(guards), "guards_soon": soon}
         functions = {name: self._function(name, expression) for name, expression in written.items()}
         return replace(
-            base, **functions, transitions=transitions, flat_discretes=self._discretes(), _cache={},
+            base, equations=with_functions(base.equations, functions), held=with_functions(base.held, functions),
+            events=with_functions(base.events, functions, transitions=transitions),
+            starts=with_functions(base.starts, functions), flat_discretes=self._discretes(), _cache={},
             _make_energy=lambda: self._function("energy", self._mixed(base.energy)),
             _make_start=lambda rest: base.rest_system if rest else base.start_system,
         )  # fmt: skip
@@ -327,8 +336,8 @@ class _Mix:
 
     def _transitions(self) -> tuple[CompiledTransition, ...]:
         """First comes what has jumped across a border, then what begins to slide, then what passes the border."""
-        begin, end, count = list[CompiledTransition](), list[CompiledTransition](), self.base.guards.size1_out(0)
-        others = list(self.base.transitions)
+        begin, end, count = list[CompiledTransition](), list[CompiledTransition](), self.base.events.guards.size1_out(0)
+        others = list(self.base.events.transitions)
         for k, (one, _) in enumerate(self.pairs):
             there, back = others[one.there], others[one.back]
             both, at = {one.first, one.second}, count + _MORE * k

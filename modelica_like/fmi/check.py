@@ -118,7 +118,9 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
     step = communication_step(until, fixed_step, _RESULTS) if fixed_step else _PART * until / _POINTS
     points = int(until / step * (1 + _ROUNDING)) if fixed_step else _POINTS
     end = points * step
-    nominals = {n: abs(size) for n, size in zip(model.states, model.nominals, strict=True) if n in model.position}
+    nominals = {
+        n: abs(size) for n, size in zip(model.states, model.equations.nominals, strict=True) if n in model.position
+    }
     if not nominals or not points:
         return Check()
     fails, unknown = f"The FMU fails in the first {end:g} s of its run.", "The FMU runs, but nothing was compared"

@@ -36,13 +36,13 @@ class Following:
 
     def _row(self, name: str, position: int) -> set[Known]:
         if name not in self._reaches:
-            self._reaches[name] = Reach(getattr(self.model, name))
+            self._reaches[name] = Reach(self.model.functions[name])
         return set(self._reaches[name].elements(position))
 
     @cached_property
     def _implicit(self) -> Rows:
         """Dependencies of each implicit unknown, by its own block and those before."""
-        rows = sparsity_rows(self.model.alg)
+        rows = sparsity_rows(self.model.equations.alg)
         implicit = [{k for name, k in row if name == "z"} for row in rows]
         return solved_rows(implicit, [{quantity for quantity in row if quantity[0] != "z"} for row in rows], len(rows))
 
@@ -98,17 +98,17 @@ class Dependencies(Following):
     def _initial_modes(self) -> Rows:
         """Modes depend on their start conditions, discrete values on their start, shares on all that decides modes."""
         rows: Rows = [set() for _ in range(self.model.discrete_size)]
-        for circuit in self.model.circuits:
+        for circuit in self.model.held.circuits:
             count = len(circuit.members)
             rows[circuit.first : circuit.first + count * (1 + count)] = [self._everything] * (count * (1 + count))
-        if self.model.ideal:
-            entries = self.model.ideal.entries
+        if self.model.held.ideal:
+            entries = self.model.held.ideal.entries
             rows[entries] = [self._everything] * (entries.stop - entries.start)
-        starts = sparsity_rows(self.model.discrete_starts)
+        starts = sparsity_rows(self.model.starts.discretes)
         for k, discrete in enumerate(self.model.flat_discretes):
             rows[k] = {("discrete", k)} if not discrete.names else {d for d in starts[k] if d[0] in "tpu"}
-        conditions = sparsity_rows(self.model.start_conditions)
-        for row, (mode, _, _) in zip(conditions, self.model.start_modes, strict=True):
+        conditions = sparsity_rows(self.model.starts.conditions)
+        for row, (mode, _, _) in zip(conditions, self.model.starts.modes, strict=True):
             for name, k in self._through_implicit(row):
                 if name != "d":
                     rows[mode] = rows[mode] | (self._initial_states[k] if name == "x" else {(name, k)})
@@ -157,7 +157,7 @@ class Dependencies(Following):
     @cached_property
     def _everything(self) -> set[Known]:
         model = self.model
-        counts = {"t": 1, "p": len(model.p), "u": len(model.u), "start": len(model.starts)}
+        counts = {"t": 1, "p": len(model.p), "u": len(model.u), "start": len(model.starts.entries)}
         return {(name, k) for name, count in counts.items() for k in range(count)}
 
     # -- value references --------------------------------------------------------------------------------------------

@@ -147,9 +147,9 @@ class _Builder:
             chosen.update(matches)
         self.wanted = lambda variable: variable.kind == "output" or variable.path in chosen
         self.starts = _Starts(model)
-        self.reach = Reach(model.variables)
+        self.reach = Reach(model.equations.variables)
         # Variables change with time, at events only, or with parameters only.
-        moving = self.reach.mask(*(name for name in model.variables.name_in() if name not in ("p", "d")))
+        moving = self.reach.mask(*(name for name in model.equations.variables.name_in() if name not in ("p", "d")))
         switching = self.reach.mask("d")
         self.depends = [
             "continuous" if row & moving else "discrete" if row & switching else "tunable" for row in self.reach.rows
@@ -168,7 +168,7 @@ class _Builder:
     def parameters(self) -> None:
         """Independent parameters, and those that follow from others."""
         # Parameters on which times of delays depend do not change during a run.
-        pattern = self.model.delays.jac_sparsity(0, self.model.delays.name_in().index("p"))
+        pattern = self.model.events.delays.jac_sparsity(0, self.model.events.delays.name_in().index("p"))
         fixed = {number for row, number in zip(*pattern.get_triplet(), strict=True) if row % 2}
         for k, parameter in enumerate(self.model.flat_parameters):
             variability, start = "tunable" if parameter.tunable and k not in fixed else "fixed", float(self.model.p[k])
@@ -214,7 +214,7 @@ class _Builder:
             below = names.index(base)
             self.states[k] = self.derivatives[below] = self.add(
                 fmi_name(names[k]), ("state", k), unit=units[names[k]], derivative_of=self.states[below],
-                nominal=float(model.nominals[k]),
+                nominal=float(model.equations.nominals[k]),
             )  # fmt: skip
         for k, name in enumerate(names):
             if k not in self.derivatives:
@@ -224,7 +224,7 @@ class _Builder:
 
     def discretes(self, modes: ModesAs) -> None:
         """Modes, and other discrete values, which are local; equations determine some at the start, too."""
-        determined = {row.reset.index for row in self.model.update_rows if row.at_start}
+        determined = {row.reset.index for row in self.model.events.update_rows if row.at_start}
         for k, discrete in ((k, d) for k, d in enumerate(self.model.flat_discretes) if not d.hidden):
             values = ", ".join(f"{k}: {name}" for k, name in enumerate(discrete.names))
             description = " – ".join(text for text in (discrete.description, values) if text)
@@ -241,7 +241,7 @@ class _Builder:
 
     def guards(self) -> None:
         """One event indicator per state event, named by its mode."""
-        for transition in self.model.transitions:
+        for transition in self.model.events.transitions:
             if transition.timed or transition.index in self.indicators:
                 continue
             mode = self.model.flat_discretes[transition.mode]
@@ -293,22 +293,22 @@ class _Starts:
 
     def __init__(self, model: CompiledDae) -> None:
         self.model, tables = model, start_tables(model)
-        arguments = (0.0, model.guesses, model.z_guesses, model.p, model.u)
-        discrete = model.discrete_starts(*arguments, np.zeros(model.discrete_size)).full().ravel()
-        self._values = model.start_values(*arguments, discrete).full().ravel()
+        arguments = (0.0, model.starts.guesses, model.starts.z_guesses, model.p, model.u)
+        discrete = model.starts.discretes(*arguments, np.zeros(model.discrete_size)).full().ravel()
+        self._values = model.starts.values(*arguments, discrete).full().ravel()
         self.tables, self.discrete = tables, discrete.tolist()
         self._rows = {k for k, _, _ in tables.rows}
         used = self._rows | {k for _, k, _ in (*tables.direct, *tables.x_guesses, *tables.z_guesses)}
         if tables.steady is not None:
             used |= {k for _, k, _ in tables.defaults}
-        self._of_variable = {entry.node: k for k, entry in reversed([*enumerate(model.starts)]) if k in used}
+        self._of_variable = {entry.node: k for k, entry in reversed([*enumerate(model.starts.entries)]) if k in used}
 
     def of_variable(self, k: int) -> dict[str, Any]:
         """Start value of a flat variable, given for exactly this name."""
         number = self._of_variable.get(k)
         if number is None:
             return {"initial": "calculated"}
-        exact = number in self._rows or self.model.starts[number].strength != "guess"
+        exact = number in self._rows or self.model.starts.entries[number].strength != "guess"
         exact = exact and self.tables.steady is None
         start = float(self._values[number])
         return {"initial": "exact" if exact else "approx", "start": start, "start_entry": number}

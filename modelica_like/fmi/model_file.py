@@ -191,7 +191,7 @@ def _contents(
                 sizes["y"],
                 *flags,
                 model.discrete_position.get(TERMINAL, -1),
-                model.ideal.first if model.ideal else 0,
+                model.held.ideal.first if model.held.ideal else 0,
                 model.edges.count,
                 model.edges.slopes,
                 model.edges.kinks,
@@ -207,15 +207,16 @@ def _contents(
         "parameter_min": [-math.inf if parameter.min is None else parameter.min for parameter in model.flat_parameters],
         "parameter_max": [math.inf if parameter.max is None else parameter.max for parameter in model.flat_parameters],
         "inputs": model.u,
-        "guesses": [*model.guesses, *model.z_guesses],
-        "nominals": model.nominals,
+        "guesses": [*model.starts.guesses, *model.starts.z_guesses],
+        "nominals": model.equations.nominals,
         "state_names": [text(name) for name in model.states],
         "implicit_names": [text(name) for name in model.implicit],
-        "singular_names": [text(", ".join(names[:6])) for names, _ in model.singular],
+        "singular_names": [text(", ".join(names[:6])) for names, _ in model.equations.singular],
         "variables": [_variable(variable, text) for variable in sorted(variables, key=lambda v: v.reference)],
         "rising": [(*pair, *(text(model.flat_parameters[k].path) for k in pair)) for pair in model.rising],
         "delays": [
-            (text(model.flat_discretes[first].path.removesuffix("[0]")), first) for first, *_ in model.delay_parts
+            (text(model.flat_discretes[first].path.removesuffix("[0]")), first)
+            for first, *_ in model.events.delay_parts
         ],
         "jacobian_to_step": tables.to_step,
         "step_diagonal": tables.diagonal,
@@ -233,7 +234,7 @@ def _contents(
 def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
     transitions: list[tuple[int, ...]] = []
     resets: list[tuple[float, ...]] = []
-    for k, transition in enumerate(model.transitions):
+    for k, transition in enumerate(model.events.transitions):
         path = model.flat_discretes[transition.mode].path
         texts = (text(path), text(_notice(path, transition.notice)))
         sources = sum(1 << source for source in transition.sources)
@@ -242,16 +243,16 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
             (transition.mode, transition.target, int(transition.timed), ends, transition.index, *texts, sources)
         )
         resets += [(_place(model, r), r.value, k, -1, r.factor) for r in transition.resets]
-    guards = {t.index: k for k, t in enumerate(model.transitions) if not t.timed}
+    guards = {t.index: k for k, t in enumerate(model.events.transitions) if not t.timed}
     names = [text(name) for discrete in model.flat_discretes for name in discrete.names]
     return {
         "transitions": transitions,
         "guard_transition": [guards[k] for k in range(len(guards))],
         "resets": resets,
-        "reset_nodes": model.reset_nodes,
+        "reset_nodes": model.events.reset_nodes,
         "updates": [
             (_place(model, r), k, 0, r.index if e.at_start else -1, r.factor)
-            for k, (e, r) in enumerate((row, row.reset) for row in model.update_rows)
+            for k, (e, r) in enumerate((row, row.reset) for row in model.events.update_rows)
         ],
         "modes": [
             (*place, int(discrete.hidden))
@@ -260,7 +261,7 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
             )
         ],
         "mode_names": names,
-        "start_modes": [(mode, target) for mode, target, _ in model.start_modes],
+        "start_modes": [(mode, target) for mode, target, _ in model.starts.modes],
     }
 
 
@@ -283,18 +284,18 @@ def _counted(counts: Iterable[int]) -> list[tuple[int, int]]:
 def _holds(model: CompiledDae, text: _Text) -> dict[str, Any]:
     holds: list[tuple[float, ...]] = []
     moved = _moved_from_outside(model)
-    for hold in model.holds:
+    for hold in model.held.motions:
         state, factor = hold.state or (-1, 1.0)
         name = text(model.flat_discretes[hold.mode].path)
         about = (hold.reaction, hold.approach, int(hold.motion in moved), name, 0)
         nominal = abs(model.flat_variables[hold.motion].nominal)
         holds.append((hold.mode, hold.number, hold.loose, hold.motion, state, *about, factor, nominal))
-    first = _counted(len(circuit.members) for circuit in model.circuits)
+    first = _counted(len(circuit.members) for circuit in model.held.circuits)
     units = {str(variable.unit): k for k, variable in enumerate(model.flat_variables)}
     return {
         "holds": holds,
-        "circuits": [(*place, circuit.first) for place, circuit in zip(first, model.circuits, strict=True)],
-        "members": [k for circuit in model.circuits for k in circuit.members],
+        "circuits": [(*place, circuit.first) for place, circuit in zip(first, model.held.circuits, strict=True)],
+        "members": [k for circuit in model.held.circuits for k in circuit.members],
         "ideals": [
             (
                 element.row,
@@ -304,18 +305,18 @@ def _holds(model: CompiledDae, text: _Text) -> dict[str, Any]:
                 0,
                 abs(model.flat_variables[element.zeros[0]].nominal),
             )
-            for element in (model.ideal.elements if model.ideal else ())
+            for element in (model.held.ideal.elements if model.held.ideal else ())
         ],
-        "units": [units[str(variable.unit)] for variable in model.flat_variables] if holds or model.ideal else [],
+        "units": [units[str(variable.unit)] for variable in model.flat_variables] if holds or model.held.ideal else [],
     }
 
 
 def _moved_from_outside(model: CompiledDae) -> set[int]:
     """Variables that are not determined by states alone, such as those of a source of motion."""
-    if not model.circuits:
+    if not model.held.circuits:
         return set()
-    moving = (model.variables.name_in().index(name) for name in ("t", "u", "d"))
-    return {row for k in moving for row in model.variables.jac_sparsity(0, k).row()}
+    moving = (model.equations.variables.name_in().index(name) for name in ("t", "u", "d"))
+    return {row for k in moving for row in model.equations.variables.jac_sparsity(0, k).row()}
 
 
 def _notice(path: str, notice: str) -> str:

@@ -55,15 +55,17 @@ def start_tables(model: CompiledDae, plan: StartPlan | None = None) -> StartTabl
     row_of = {node: count + k for k, node in enumerate(plan.system.nodes)}
 
     def of_states(strength: str) -> tuple[tuple[int, int, float], ...]:
-        chosen = [(e.state, k) for k, e in enumerate(model.starts) if e.strength == strength and e.state is not None]
+        chosen = [
+            (e.state, k) for k, e in enumerate(model.starts.entries) if e.strength == strength and e.state is not None
+        ]
         return tuple((state[0], k, state[1]) for state, k in chosen)
 
     def as_rows(numbers: tuple[int, ...]) -> list[tuple[int, int, int]]:
-        return [(k, model.starts[k].node, row_of[model.starts[k].node]) for k in numbers]
+        return [(k, model.starts.entries[k].node, row_of[model.starts.entries[k].node]) for k in numbers]
 
     resting = ((AT_REST, node, row_of[node]) for node in plan.resting)
     names = {name: k for k, name in enumerate(model.implicit)}
-    near = [(names.get(start_name(model, e)), k) for k, e in enumerate(model.starts) if is_near(model, e)]
+    near = [(names.get(start_name(model, e)), k) for k, e in enumerate(model.starts.entries) if is_near(model, e)]
     return StartTables(
         direct=of_states("fixed"),
         defaults=of_states("default"),
@@ -77,13 +79,13 @@ def start_tables(model: CompiledDae, plan: StartPlan | None = None) -> StartTabl
 
 
 def _plan(model: CompiledDae) -> StartPlan:
-    point = Point(0.0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
-    point.d = call(model, model.discrete_starts, point)
-    for one in model.holds:  # what is shared says nothing of motions
+    point = Point(0.0, model.starts.guesses.copy(), model.starts.z_guesses.copy(), np.zeros(model.discrete_size))
+    point.d = call(model, model.starts.discretes, point)
+    for one in model.held.motions:  # what is shared says nothing of motions
         if point.d[one.mode] == one.number and one.loose >= 0:
             point.d[one.mode] = one.loose
-    values = call(model, model.start_values, point)
-    for k, entry in reversed([*enumerate(model.starts)]):  # of several for one state, the first counts
+    values = call(model, model.starts.values, point)
+    for k, entry in reversed([*enumerate(model.starts.entries)]):  # of several for one state, the first counts
         if entry.strength == "fixed" and entry.state is not None:
             point.x[entry.state[0]] = values[k] / entry.state[1]
     return start_plan(model, model.settings.get("start", "given"), point)

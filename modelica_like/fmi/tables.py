@@ -41,7 +41,12 @@ class Tables:
     @property
     def implicit_linear(self) -> bool:
         """Whether the implicit equations are linear in z."""
-        return self.model.alg_jacobian.jac_sparsity(0, self.model.alg_jacobian.name_in().index("z")).nnz() == 0
+        return (
+            self.model.equations.alg_jacobian.jac_sparsity(
+                0, self.model.equations.alg_jacobian.name_in().index("z")
+            ).nnz()
+            == 0
+        )
 
     @property
     def rates_depend_on_time(self) -> bool:
@@ -67,7 +72,9 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
     for k in range(states):
         diagonal.add_nz(k, k)
     step = jacobian + diagonal
-    sizes = {name: model.ode.size1_in(name) for name in ARGUMENTS[:-1]} | {"y": start.plan.system.function.size1_out(0)}
+    sizes = {name: model.equations.ode.size1_in(name) for name in ARGUMENTS[:-1]} | {
+        "y": start.plan.system.function.size1_out(0)
+    }
     slots, tapes = write_tapes(functions, sizes)
     return Tables(
         model, start, slots, {tape.name: tape for tape in tapes}, qr_pattern(step), _places(jacobian, step),
@@ -94,10 +101,10 @@ def _functions(model: CompiledDae, start: StartTables) -> tuple[dict[str, Any], 
     """Return all functions by the names of their tapes, and the patterns of the Jacobians of rates and start system."""
     arguments = model.arguments
     symbols = list(arguments.values())
-    rates = ca.vertcat(model.ode(*symbols), model.alg(*symbols))
+    rates = ca.vertcat(model.equations.ode(*symbols), model.equations.alg(*symbols))
     jacobian = ca.jacobian(rates, ca.vertcat(arguments["x"], arguments["z"]))
-    alg_jacobian = ca.densify(model.alg_jacobian(*symbols))
-    guards = ca.vertcat(model.guards(*symbols), model.guard_rates(*symbols))
+    alg_jacobian = ca.densify(model.equations.alg_jacobian(*symbols))
+    guards = ca.vertcat(model.events.guards(*symbols), model.events.guard_rates(*symbols))
     written = {"rates": rates, "jacobian": _nonzeros(jacobian), "alg_jacobian": ca.vec(alg_jacobian), "guards": guards}
     functions: dict[str, Any] = {
         name: ca.Function(name, symbols, [ca.densify(ca.SX(expression))], list(arguments), [name])
@@ -107,7 +114,7 @@ def _functions(model: CompiledDae, start: StartTables) -> tuple[dict[str, Any], 
         "alg", "variables", "guards_soon", "moments", "resets", "updates", "start_conditions", "start_values",
         "discrete_starts", "determinants", "hold_terms", "derived", "delays",
     )  # fmt: skip
-    functions |= {name: getattr(model, name) for name in plain} | {"edges": model.edges.function}
+    functions |= {name: model.functions[name] for name in plain} | {"edges": model.edges.function}
     plan, system = start.plan, start.plan.system.function
     y = ca.SX.sym("y", system.size1_out(0))
     order = [y if name == "y" else arguments[name] for name in system.name_in()]

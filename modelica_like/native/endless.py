@@ -59,8 +59,8 @@ def chattering(model: CompiledDae, events: Sequence[Event], why: str, asked: OnC
 
 def not_settled(model: CompiledDae, now: Point, rounds: int) -> Chattering | None:
     """Return the error of discrete variables that change in every round, or None where they only follow the modes."""
-    values = call(model, model.updates, now)
-    rows = [row for row, value in zip(model.update_rows, values, strict=False)
+    values = call(model, model.events.updates, now)
+    rows = [row for row, value in zip(model.events.update_rows, values, strict=False)
             if row.reset.kind == "discrete" and value != now.d[row.reset.index]]  # fmt: skip
     if not rows:
         return None

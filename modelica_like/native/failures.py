@@ -66,7 +66,7 @@ class Failure:
     @property
     def transition(self) -> CompiledTransition:
         """The one at `place`."""
-        return self.model.transitions[self.place]
+        return self.model.events.transitions[self.place]
 
     @property
     def what(self) -> str:
@@ -82,7 +82,7 @@ def error_of(failure: Failure) -> ModelicaLikeError:
 
 
 def _starts_contradict(one: Failure) -> ModelicaLikeError:
-    starts = one.model.starts
+    starts = one.model.starts.entries
     position, factor = starts[one.place].state or (0, 1.0)
     others = ((k, entry.state) for k, entry in enumerate(starts) if entry.strength == "fixed" and entry.state)
     earlier, of_earlier = next((k, state[1]) for k, state in others if state[0] == position)
@@ -91,7 +91,7 @@ def _starts_contradict(one: Failure) -> ModelicaLikeError:
 
 
 def _start_not_met(one: Failure) -> ModelicaLikeError:
-    return not_met(one.model, call(one.model, one.model.variables, one.point), one.place, one.numbers[0])
+    return not_met(one.model, call(one.model, one.model.equations.variables, one.point), one.place, one.numbers[0])
 
 
 def _start_not_found(one: Failure) -> ModelicaLikeError:
@@ -150,11 +150,11 @@ def limit_passed(model: CompiledDae, now: Point, transition: CompiledTransition)
 def _told(model: CompiledDae, now: Point, path: str) -> str:
     """Return a parameter, variable or discrete value as a number."""
     if path in model.position:
-        return f"{call(model, model.variables, now)[model.position[path]]:g}"
+        return f"{call(model, model.equations.variables, now)[model.position[path]]:g}"
     if path in model.discrete_position:
         return f"{now.d[model.discrete_position[path]]:g}"
     if path in model.derived_position:
-        return f"{float(model.derived(model.p)[model.derived_position[path]]):g}"
+        return f"{float(model.equations.derived(model.p)[model.derived_position[path]]):g}"
     return f"{model.p[model.parameter_position[path]]:g}"
 
 

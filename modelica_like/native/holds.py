@@ -31,7 +31,7 @@ class Struck:
 
 def share(model: CompiledDae, point: Point) -> None:
     """Let elements that hold the same motion at a point share its reaction; equations of ideal elements follow, too."""
-    if model.circuits or model.ideal:
+    if model.held.circuits or model.held.ideal:
         instance = _at(model, point)
         instance.at(instance.library.share, point)
         point.d = instance.present().d
@@ -44,7 +44,7 @@ def is_hard(model: CompiledDae, point: Point, entering: Collection[int]) -> bool
 
 def strike(model: CompiledDae, point: Point, entering: Collection[int]) -> Struck:
     """Stop motions that have begun to be held at a point, by an impulse that all other components transmit."""
-    knocked = np.zeros(len(model.holds), np.uint8)
+    knocked = np.zeros(len(model.held.motions), np.uint8)
     instance, _ = _strike(model, point, entering, knocked)
     return Struck(instance.present(), tuple(np.flatnonzero(knocked).tolist()))
 
@@ -53,7 +53,7 @@ def _strike(
     model: CompiledDae, point: Point, entering: Collection[int], knocked: np.ndarray | None
 ) -> tuple[Instance, bool]:
     instance, hard = _at(model, point), ctypes.c_int()
-    marks = np.isin(np.arange(len(model.holds)), list(entering)).astype(np.uint8)
+    marks = np.isin(np.arange(len(model.held.motions)), list(entering)).astype(np.uint8)
     out = None if knocked is None else knocked.ctypes.data
     code = instance.at(instance.library.strike, point, marks.ctypes.data, out, ctypes.addressof(hard))
     instance.check(code)

@@ -178,7 +178,7 @@ class EngineLoop:
             self._note(before[k])
             x, z = states[: len(model.states), first:last], states[len(model.states) :, first:last]
             record.segments.append(Segment(times[first:last], x, z, modes[k].copy()))
-            if model.circuits:
+            if model.held.circuits:
                 note_sharing(record, model, record.segments[-1].start)
         self._note(before[-1])
         record.impacts += _impacts_of(model, written["impacts"].tolist())
@@ -201,5 +201,5 @@ def _impacts_of(model: CompiledDae, rows: Sequence[Sequence[float]]) -> Iterator
     for time, held, energy, *numbers in rows:
         parts = np.split(np.array(numbers), 2) if time != last else ()
         points = [Point(time, part[:nx], part[nx : len(part) - nd], part[len(part) - nd :]) for part in parts]
-        yield Impact(time, model.holds[int(held)].component, energy, (points[0], points[1]) if points else None)
+        yield Impact(time, model.held.motions[int(held)].component, energy, (points[0], points[1]) if points else None)
         last = time

@@ -198,7 +198,7 @@ def _tolerated(run: Solution, piece: Segment, k: int) -> Vector:
         In J, of every component, shape (components,).
     """
     model, point, options = run.model, piece.point(k), run.options
-    weights = options.rtol * np.abs(point.x) + options.atol * model.nominals
+    weights = options.rtol * np.abs(point.x) + options.atol * model.equations.nominals
     try:
         changes = _changes(model, point, weights)
     except SingularAtStart:

@@ -251,7 +251,7 @@ def energy_balance(
     rows = tuple(map(EnergyRow, model.components, *(column.tolist() for column in columns)))
     exchanged = (inflow, source + work, lost + impact)
     throughput = max([powers.stored, powers.cancelled, *(float(np.sum(np.abs(part))) for part in exchanged)])
-    resets = {number for number, transition in enumerate(model.transitions) if transition.resets}
+    resets = {number for number, transition in enumerate(model.events.transitions) if transition.resets}
     reset = [event.time for event in events if event.transition in resets]
     unexplained = [(hit.time, hit.energy - float(np.sum(work))) for hit, work in zip(impacts, given, strict=True)]
     at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, unexplained)

@@ -60,10 +60,10 @@ def variables(model: CompiledDae, segments: Sequence[Segment], rows: Sequence[in
         rows: positions of the variables; all if None.
     """
     if rows is None:
-        function = model.along("variables", lambda: model.variables)
+        function = model.along("variables", lambda: model.equations.variables)
         parts = [function(t, x, z, model.p, model.u, d)[0] for t, x, z, d in blocks(segments)]
         return np.concatenate(parts, axis=1)
-    return _Expressions.of(model, "variables", model.variables, tuple(rows)).read(model, segments)
+    return _Expressions.of(model, "variables", model.equations.variables, tuple(rows)).read(model, segments)
 
 
 def energy_term(model: CompiledDae, segments: Sequence[Segment], component: int, column: int) -> Vector:

@@ -205,7 +205,7 @@ def _plain(model: CompiledDae, name: str) -> Output:
 
 def _holding_mode(model: CompiledDae, owner: str) -> tuple[str, str] | None:
     """The mode of a component in which it holds a motion, and the name of that."""
-    for hold in model.holds:
+    for hold in model.held.motions:
         if hold.component == owner:
             mode = model.flat_discretes[hold.mode]
             return mode.path, mode.names[hold.number]
@@ -248,7 +248,7 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
     arguments = model.arguments.values()
     if path in model.position:
         k = model.position[path]
-        return lambda: model.variables(*arguments)[k], model.units[path]
+        return lambda: model.equations.variables(*arguments)[k], model.units[path]
     fixed = {"p": model.parameter_position, "d": model.discrete_position, "t": {"time": 0}}
     for symbol, positions in fixed.items():
         if path in positions:

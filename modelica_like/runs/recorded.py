@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -45,6 +46,7 @@ class RecordedModel:
     flat_variables: tuple[RecordedVariable, ...]
     flat_discretes: tuple[RecordedVariable, ...]
     parameters: Mapping[str, float]
+    held: ClassVar[Any] = SimpleNamespace(motions=())
 
     @cached_property
     def position(self) -> dict[str, int]:

@@ -100,12 +100,13 @@ class _Columns:
         recorded, attributes = self.recorded, vars(self)
         constants = {name: value for name, value in recorded.parameters.items() if np.isscalar(value)}
         attributes.update(
-            name=recorded.name, position=recorded.position, discrete_position=recorded.discrete_position, holds=(),
+            name=recorded.name, position=recorded.position, discrete_position=recorded.discrete_position,
             components=recorded.components, flat_variables=recorded.flat_variables, u=np.zeros(0),
             parameter_position={name: k for k, name in enumerate(constants)}, p=np.array([*constants.values()], float),
             units={v.path: _unit(v.unit) for v in (*recorded.flat_variables, *recorded.flat_discretes)},
             flat_discretes=[SimpleNamespace(path=d.path, names=_names(d.names)) for d in recorded.flat_discretes],
         )  # fmt: skip
+        attributes |= {"held": recorded.held, "equations": SimpleNamespace(variables=lambda *given: given[1])}
         sizes = {
             "t": 1,
             "x": len(recorded.position),
@@ -115,9 +116,6 @@ class _Columns:
             "d": len(attributes["flat_discretes"]),
         }
         attributes["arguments"] = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
-
-    def variables(self, *arguments: Any) -> Any:
-        return arguments[1]
 
     def energy(self, *arguments: Any) -> Any:
         rows = [[f"{component}.{term}" for term in ENERGY_TERMS] for component in self.recorded.components]

@@ -60,11 +60,11 @@ class Solution(Trajectories):
     @property
     def ended(self) -> Ended | None:
         """Where and why a component has ended the run, or None."""
-        ends = (e for e in self.events if e.transition >= 0 and self.model.transitions[e.transition].ends)
+        ends = (e for e in self.events if e.transition >= 0 and self.model.events.transitions[e.transition].ends)
         if (event := next(ends, None)) is None:
             return None
         component, dot, _ = event.mode.rpartition(".")
-        text = self.model.transitions[event.transition].notice
+        text = self.model.events.transitions[event.transition].notice
         reason = NAME_IN_NOTICE.sub(lambda name: f"{self.final[component + dot + name[1]]:g}", text)
         return Ended(event.time, component or self.model.name, reason)
 
@@ -91,7 +91,7 @@ class Solution(Trajectories):
         if path in model.parameter_position:
             return np.full(len(self.time), model.p[model.parameter_position[path]])
         if path in model.derived_position:
-            return np.full(len(self.time), float(model.derived(model.p)[model.derived_position[path]]))
+            return np.full(len(self.time), float(model.equations.derived(model.p)[model.derived_position[path]]))
         if name := differentiated(path):
             return np.concatenate([rate_along(model, name, *block) for block in blocks(self.segments)])
         owner, _, term = path.rpartition(".")
@@ -235,7 +235,7 @@ def rate_along(model: CompiledDae, name: str, times: Any, x: Vector, z: Vector, 
     row, arguments = model.position[name], list(model.arguments.values())
 
     def make() -> ca.Function:
-        parts = model.motion.parts(model.variables(*arguments)[row])
+        parts = model.motion.parts(model.equations.variables(*arguments)[row])
         return ca.Function("rate", arguments, [ca.densify(part) for part in parts])
 
     parts = model.once(("rate", name), make)(np.reshape(times, (1, -1)), x, z, model.p, model.u, d)

@@ -41,9 +41,8 @@ def bands_of(run: Trajectories, wanted: Sequence[str] = ()) -> tuple[list[Bands]
         run: the run.
         wanted: paths of modes; by default all that change, or of many only those that hold a motion.
     """
-    holds = getattr(run.model, "holds", ())
     held: dict[str, set[str]] = {}
-    for hold in holds:
+    for hold in run.model.held.motions:
         mode = run.model.flat_discretes[hold.mode]
         held.setdefault(mode.path, set()).add(mode.names[hold.number])
     paths = list(wanted) or list(dict.fromkeys(event.mode for event in _declared(run)))

@@ -99,7 +99,7 @@ def _scaled_problem(model: CompiledDae, gentle: bool, scaled: bool) -> tuple[dic
     x, z, p, u, d = (model.arguments[name] for name in ("x", "z", "p", "u", "d"))
     passed, speed = (s * s * span, 2 * s * span) if gentle else (s * span, span) if scaled else (s, 1.0)
     inner = [t0 + passed, x, z, p, u, d]
-    ode, alg = ca.cse([speed * model.ode(*inner), model.alg(*inner)])
+    ode, alg = ca.cse([speed * model.equations.ode(*inner), model.equations.alg(*inner)])
     parameters = ca.vertcat(t0, span, p, u, d)
     (ode, alg), symbols, fixed = ca.extract_parametric([ode, alg], parameters)
     known = ca.Function("known", [parameters], [ca.densify(ca.vertcat(parameters, *fixed))])
@@ -120,7 +120,7 @@ def linear_solver(pattern: ca.Sparsity) -> str:
 
 def _pattern(model: CompiledDae) -> ca.Sparsity:
     """Return the pattern of the Jacobian of a step by states and implicit unknowns."""
-    blocks = [[one.jac_sparsity(0, k) for k in (1, 2)] for one in (model.ode, model.alg)]
+    blocks = [[one.jac_sparsity(0, k) for k in (1, 2)] for one in (model.equations.ode, model.equations.alg)]
     pattern = ca.vertcat(*(ca.horzcat(*row) for row in blocks))
     return pattern + ca.Sparsity.diag(pattern.size1())
 
@@ -184,7 +184,7 @@ class Integrator:
 
     def _relax(self, factor: float) -> None:
         self._relaxed = factor
-        self.tolerances = self.options.rtol * factor, self.options.atol * factor * self.model.nominals
+        self.tolerances = self.options.rtol * factor, self.options.atol * factor * self.model.equations.nominals
 
     def _instance(self, grid: Grid, steps: int, gentle: bool, first: float, longest: float) -> BufferedFunction:
         key = "idas", grid, self.rtol, self.options.atol, steps, gentle, first, self._seconds, longest
@@ -202,7 +202,7 @@ class Integrator:
 
         With `gentle`, a step s moves them by s² times rates times the span.
         """
-        rates = np.abs(call(self.model, self.model.ode, start)) * span
+        rates = np.abs(call(self.model, self.model.equations.ode, start)) * span
         fastest = float(np.max(rates / self.weights(start.x)))
         step = _FIRST_STEP
         while np.isfinite(fastest) and (step * _SHORTENED) ** 2 * fastest > 1.0:
@@ -218,7 +218,7 @@ class Integrator:
         )
 
     def _settings(self, steps: int, gentle: bool, first: float, longest: float) -> dict[str, Any]:
-        nominal = self.model.nominals
+        nominal = self.model.equations.nominals
         return {
             "reltol": max(_STRICTER * self.rtol, min(self.rtol, _NOISY)),
             "abstol": _STRICTER * self.options.atol * self._relaxed * (float(np.min(nominal)) if nominal.size else 1.0),
@@ -337,7 +337,7 @@ class Integrator:
 
     def failure(self, what: str, point: Point) -> StepFailed:
         """Return an error that names the state which changes fastest at a point."""
-        speed = np.abs(call(self.model, self.model.ode, point)) / self.weights(point.x)
+        speed = np.abs(call(self.model, self.model.equations.ode, point)) / self.weights(point.x)
         return StepFailed(
             what,
             why=f"{self.model.states[int(np.argmax(np.nan_to_num(speed)))]} changes fastest relative to its tolerance.",

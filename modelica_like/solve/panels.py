@@ -92,8 +92,8 @@ class Panels:
 
     def __init__(self, model: CompiledDae, options: Options, begin: float, end: float) -> None:
         self.model, self.options = model, options
-        self._guarded = any(not transition.timed for transition in model.transitions)
-        whole = not (model.transitions or model.delay_parts or model.edges.count)
+        self._guarded = any(not transition.timed for transition in model.events.transitions)
+        whole = not (model.events.transitions or model.events.delay_parts or model.edges.count)
         self.integrator = Integrator(model, options, whole=whole, first=_FIRST_STEPS[whole])
         self.notices: list[str] = []
         most = max(_LARGEST // (_LOOKS * (len(model.states) + len(model.implicit))), 1)
@@ -101,7 +101,7 @@ class Panels:
         self._length, self._span = ((end - begin) / count for count in _FIRST)
         if not self._guarded:
             self._span = np.inf
-        self._switched = sorted({one.mode for one in model.transitions if self.felt[one.mode]})
+        self._switched = sorted({one.mode for one in model.events.transitions if self.felt[one.mode]})
         self._known: dict[bytes, _Segment] = {}
         self._modes, self._segment = b"", _Segment(begin, self._length)
         self._graded = self._cut = self._begins = False
@@ -293,11 +293,11 @@ def _felt(model: CompiledDae) -> Any:
     time, as tables have, also what time events read: those at the corners change nothing else.
     """
     felt = np.zeros(model.discrete_size, np.uint8)
-    looked_at = (model.guards,) if model.edges.count > model.edges.slopes else ()
-    for function in (model.ode, model.alg, model.delays, model.edges.function, *looked_at):
+    looked_at = (model.events.guards,) if model.edges.count > model.edges.slopes else ()
+    for function in (model.equations.ode, model.equations.alg, model.events.delays, model.edges.function, *looked_at):
         felt[function.jac_sparsity(0, function.index_in("d")).get_triplet()[1]] = 1
     if model.edges.in_time:
-        felt[model.moments.jac_sparsity(0, model.moments.index_in("d")).get_triplet()[1]] = 1
+        felt[model.events.moments.jac_sparsity(0, model.events.moments.index_in("d")).get_triplet()[1]] = 1
     if looked_at:
-        felt[[one.mode for one in model.transitions if not one.timed]] = 1
+        felt[[one.mode for one in model.events.transitions if not one.timed]] = 1
     return felt

@@ -110,7 +110,7 @@ class Recorder:
         # Break-away in an impact has no transition; the first one of the mode gives its place.
         known = transition
         if known < 0:
-            known = next(k for k, one in enumerate(model.transitions) if one.mode == number)
-        self.ended |= transition >= 0 and model.transitions[transition].ends
-        source, segment = model.transitions[known].source, len(self.segments)
+            known = next(k for k, one in enumerate(model.events.transitions) if one.mode == number)
+        self.ended |= transition >= 0 and model.events.transitions[transition].ends
+        source, segment = model.events.transitions[known].source, len(self.segments)
         self.events.append(Event(time, mode.path, before, after, source, transition, segment, round))

@@ -174,7 +174,7 @@ def test_slopes_agree_with_differences():
     model, point = linear.model, linear.point
 
     def rates(x, p):
-        return np.asarray(model.ode(point.t, x, point.z, p, model.u, point.d)).ravel()
+        return np.asarray(model.equations.ode(point.t, x, point.z, p, model.u, point.d)).ravel()
 
     for k in range(len(model.states)):
         step = np.zeros(len(model.states))

@@ -205,7 +205,7 @@ def agrees(model: CompiledDae, name: str, side: float, outputs: list[str], row: 
 def test_parameters_at_a_bound_against_one_sided_differences(path: Path) -> None:
     model = build(path)
     outputs, names = outputs_of(model), at_a_bound(model)[:6]
-    if model.delay_parts:
+    if model.events.delay_parts:
         with pytest.raises(NoGradient, match="delay"):
             sensitivities(model, [*outputs, model.flat_variables[0].path][:1])
         return

@@ -126,7 +126,7 @@ def test_branches_of_a_when_count_in_their_order():
         for second in (0, 1):
             d = [0.0] * model.discrete_size
             d[at["relation[1]"]], d[at["relation[2]"]], d[at["n"]] = first, second, 3.0
-            found = model.updates(0.0, [0.0], [], model.p, [], d).full().ravel()
+            found = model.events.updates(0.0, [0.0], [], model.p, [], d).full().ravel()
             n = found[kinds.index(("discrete", at["n"]))]
             assert n == (10 if first else 20 if second else 3)
             assert found[rows["state"]] == (5 if second and not first else float("inf"))

@@ -64,7 +64,10 @@ def test_inputs_with_values_are_parameters():
     one = next(one for one in flat.parameters if one.path == "part.u")
     assert (one.value, one.tunable, one.above) == (5.0, True, 0)
     model = build(drive(u=5.0))
-    assert model.variables(0, [], [], model.p, [], []).full().ravel()[model.position["part.y"]] == 5.0 * 2.0 / 2.5
+    assert (
+        model.equations.variables(0, [], [], model.p, [], []).full().ravel()[model.position["part.y"]]
+        == 5.0 * 2.0 / 2.5
+    )
 
 
 def test_units_that_were_written_are_kept_where_none_is_declared():

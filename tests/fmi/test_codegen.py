@@ -112,7 +112,7 @@ def test_tapes_give_the_bits_of_casadi(inside, drive):
     for seed in range(5):
         values = code.random(seed)
         for name in FUNCTIONS:
-            function = getattr(code.model, name)
+            function = code.model.functions[name]
             expected = function(*(values[argument] for argument in function.name_in())).full().ravel()
             found = np.zeros(max(len(expected), 1))
             code.library.tape_run(code.tape(name), pointer(code.slots(values)), pointer(found))
@@ -122,7 +122,7 @@ def test_tapes_give_the_bits_of_casadi(inside, drive):
 def rates_function(code: Inside) -> tuple[ca.Function, list[Any]]:
     a = code.model.arguments
     everything = list(a.values())
-    rates = ca.vertcat(code.model.ode(*everything), code.model.alg(*everything))
+    rates = ca.vertcat(code.model.equations.ode(*everything), code.model.equations.alg(*everything))
     return ca.Function("rates", everything, [rates], list(a), ["rates"]), everything
 
 

@@ -89,7 +89,7 @@ def test_agrees_with_idas(exported: Callable[..., Any], netlist: str) -> None:
     until = float(truth.time[-1])
     outputs = [one for one in case.face.variables if one.reference in case.face.outputs and not one.modes]
     names = [*outputs, *(one for one in case.face.variables if one.slot[0] == "state" and one.name in model.position)]
-    importer = Importer(case.started("me", until=until), len(model.states), model.guards.numel_out(0))
+    importer = Importer(case.started("me", until=until), len(model.states), model.events.guards.numel_out(0))
     events = [one.time for one in truth.events]
     instants = [t for t in np.linspace(0, until, POINTS + 1)[1:] if all(abs(t - e) > BESIDE for e in events)]
     found = []
@@ -109,7 +109,7 @@ def test_agrees_with_idas(exported: Callable[..., Any], netlist: str) -> None:
 def test_a_gap_without_width_is_crossed_at_once(exported: Callable[..., Any]) -> None:
     case = exported("elements/gears_and_losses.toml")
     model = case.model
-    importer = Importer(case.started("me", until=0.02), len(model.states), model.guards.numel_out(0))
+    importer = Importer(case.started("me", until=0.02), len(model.states), model.events.guards.numel_out(0))
     x, press = (
         next(one.reference for one in case.face.variables if one.name == f"mesh.{name}") for name in ("x", "press")
     )

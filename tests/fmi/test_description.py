@@ -192,7 +192,7 @@ def test_what_changes_at_the_start_is_listed(netlist: str) -> None:
 
 def _start(model: CompiledDae) -> Any:
     point = initialize(model, 0.0, model.settings.get("start", "given"))
-    return np.concatenate([point.x, call(model, model.ode, point)])
+    return np.concatenate([point.x, call(model, model.equations.ode, point)])
 
 
 def test_a_chain_depends_on_its_neighbours_only() -> None:

@@ -336,7 +336,7 @@ def answer(drive: Assembly, name: str, inputs: list[float]) -> float:
 
     model = compile(reduce(flatten(drive, open_inputs=True)))
     assert not model.states
-    return float(model.variables(0.0, [], [], model.p, inputs, []).full().ravel()[model.position[name]])
+    return float(model.equations.variables(0.0, [], [], model.p, inputs, []).full().ravel()[model.position[name]])
 
 
 def test_opening_leaves_the_drive_alone() -> None:

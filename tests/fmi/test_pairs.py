@@ -196,9 +196,9 @@ def test_every_example_starts_as_in_python(exported, netlist):
     """States, modes and, by the reactions, what elements share."""
     case = exported(netlist)
     model = case.model
-    assert model.holds
+    assert model.held.motions
     point = initialize(model, start=model.settings.get("start", "given"))
-    values = call(model, model.variables, point)
+    values = call(model, model.equations.variables, point)
     fmu = case.started("me")
     modes = [one for one in case.face.variables if one.modes]
     assert fmu.getInteger([one.reference for one in modes]) == [int(point.d[one.slot[1]]) for one in modes]

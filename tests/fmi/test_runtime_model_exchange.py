@@ -45,7 +45,7 @@ def test_the_start_is_that_of_a_simulation(exported, netlist):
     found = vector(fmu.fmi2GetContinuousStates, fmu, len(point.x))
     assert found == pytest.approx(point.x, rel=1e-12, abs=1e-13)
     model = case.model
-    rates = model.ode(point.t, point.x, point.z, model.p, model.u, point.d).full().ravel()
+    rates = model.equations.ode(point.t, point.x, point.z, model.p, model.u, point.d).full().ravel()
     assert vector(fmu.fmi2GetDerivatives, fmu, len(point.x)) == pytest.approx(rates, rel=1e-9, abs=1e-9)
     modes = [one.path for one in model.flat_discretes if one.names]
     numbers = [int(point.d[k]) for k, one in enumerate(model.flat_discretes) if one.names]
@@ -84,7 +84,7 @@ def test_euler_converges_to_idas(exported):
 def test_indicators_are_below_zero_after_every_event(exported):
     case = exported("msl/rotational/CoupledClutches.toml")
     fmu = continuous(case)
-    indicators = vector(fmu.fmi2GetEventIndicators, fmu, case.model.guards.numel_out(0))
+    indicators = vector(fmu.fmi2GetEventIndicators, fmu, case.model.events.guards.numel_out(0))
     assert np.all(indicators < 0)
     assert not fmu.completedIntegratorStep()[0]
 
@@ -106,7 +106,7 @@ def test_an_indicator_above_zero_is_an_event(exported):
     x = vector(fmu.fmi2GetContinuousStates, fmu, len(case.model.states))
     x[case.model.states.index("clutch2.w_rel")] = -5.0
     fmu.fmi2SetContinuousStates(fmu.component, (ctypes.c_double * len(x))(*x), len(x))
-    indicators = vector(fmu.fmi2GetEventIndicators, fmu, case.model.guards.numel_out(0))
+    indicators = vector(fmu.fmi2GetEventIndicators, fmu, case.model.events.guards.numel_out(0))
     assert bool(np.any(indicators > 0)) == bool(fmu.completedIntegratorStep()[0])
 
 
@@ -145,9 +145,9 @@ def exact_jacobian(case, fmu, known, unknown):
     known_slots = [case.face.variables[k].slot for k in known]
     by = ca.vertcat(*(a[slots[kind]][index] for kind, index in known_slots))
     unknown_slots = [case.face.variables[k].slot for k in unknown]
-    rates, variables = model.ode(*everything), model.variables(*everything)
+    rates, variables = model.equations.ode(*everything), model.equations.variables(*everything)
     rows = ca.vertcat(*(rates[k] if kind == "der" else variables[k] for kind, k in unknown_slots))
-    alg = model.alg(*everything)
+    alg = model.equations.alg(*everything)
     parts = ca.Function(
         "parts",
         everything,
@@ -168,7 +168,7 @@ def values_at(case, fmu):
     for k in references:
         one = case.face.variables[k]
         d[one.slot[1]] = (fmu.getInteger if one.modes else fmu.getReal)([k])[0]
-    point = Point(0.0, x, model.z_guesses.copy(), d)
+    point = Point(0.0, x, model.starts.z_guesses.copy(), d)
     share(model, point)
     solve_implicit(model, point)
     return [0.0, point.x, point.z, model.p, model.u, point.d]

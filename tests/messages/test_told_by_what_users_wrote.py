@@ -290,7 +290,7 @@ class Counter(Component):
 
 
 def test_a_condition_without_words_is_put_into_words() -> None:
-    transitions = build(Counter(x=0.0)).transitions
+    transitions = build(Counter(x=0.0)).events.transitions
     assert [one.because for one in transitions] == [
         "rising x rose above {limit}",
         "rising x rose above 2*limit",

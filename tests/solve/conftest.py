@@ -24,7 +24,9 @@ def start() -> Callable[..., dict[str, float]]:
             model.set(key.replace("__", "."), value)
         compiled = build(model)
         point: Point = initialize(compiled, 0.0, how)  # type: ignore[arg-type]
-        found = np.array(compiled.variables(point.t, point.x, point.z, compiled.p, compiled.u, point.d)).ravel()
+        found = np.array(
+            compiled.equations.variables(point.t, point.x, point.z, compiled.p, compiled.u, point.d)
+        ).ravel()
         names = {variable.path: float(value) for variable, value in zip(compiled.flat_variables, found, strict=True)}
         # Behind modes and discrete values stand approaches and shares.
         modes = {

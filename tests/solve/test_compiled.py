@@ -93,10 +93,10 @@ def test_delays_of_parts_have_their_own_numbers():
         one, other = Late(u=2.0), Late(u=5.0)
 
     model = build(Two())
-    names = [model.flat_discretes[k].path for part in model.delay_parts for k in part]
+    names = [model.flat_discretes[k].path for part in model.events.delay_parts for k in part]
     assert {name.partition(".")[0] for name in names} == {"one", "other"}
     assert len({*names}) == len(names)
-    values = model.delays(0.0, [], [], model.p, model.u, np.zeros(model.discrete_size)).full().ravel()
+    values = model.events.delays(0.0, [], [], model.p, model.u, np.zeros(model.discrete_size)).full().ravel()
     assert values.tolist() == [2.0, 1.0, 5.0, 1.0]
 
 
@@ -108,8 +108,10 @@ def test_what_slides_through_implicit_equations_comes_back(t, x):
     assert len(made.implicit) > 0
     z: Any = np.zeros(len(made.implicit))
     given = [made.p, made.u, [float(pair.number)]]
-    z = z - np.linalg.solve(made.alg_jacobian(t, x, z, *given).full(), made.alg(t, x, z, *given).full().ravel())
-    assert float(made.ode(t, x, z, *given)) == pytest.approx(-x / 0.1, rel=1e-9)
-    variables = dict(zip(made.position, made.variables(t, x, z, *given).full().ravel(), strict=True))
+    z = z - np.linalg.solve(
+        made.equations.alg_jacobian(t, x, z, *given).full(), made.equations.alg(t, x, z, *given).full().ravel()
+    )
+    assert float(made.equations.ode(t, x, z, *given)) == pytest.approx(-x / 0.1, rel=1e-9)
+    variables = dict(zip(made.position, made.equations.variables(t, x, z, *given).full().ravel(), strict=True))
     assert variables["a"] == pytest.approx(-x / 0.1, rel=1e-9)
     assert [variables[name] for name in "bcdef"] == pytest.approx(5 * [x / 0.1 / 8], rel=1e-9)  # 3 y + 5 y = -a

@@ -156,7 +156,7 @@ def test_a_forming_force_stops_a_slow_mass(solver: Solver, points: int) -> None:
 
 def test_edges_change_their_sign_where_the_relation_changes() -> None:
     model = build(case(0).flight)
-    edges = find_edges(model.arguments, model.ode, model.alg, model.guards)
+    edges = find_edges(model.arguments, model.equations.ode, model.equations.alg, model.events.guards)
     assert (edges.count > 0, edges.phases) == (True, 0)
 
 

@@ -78,7 +78,7 @@ def test_it_starts_where_each_coordinate_alone_would_be_singular():
 def test_each_choice_is_told_with_its_reason():
     run = simulate(pendulum(), 1.0)
     assert {event.mode for event in run.events} == {"state[1].choice"}
-    because = run.model.transitions[run.events[0].transition].because
+    because = run.model.events.transitions[run.events[0].transition].because
     assert because == "the states of x and y would become singular"
     assert f"{len(run.events)} mode changes ({len(run.events)} of them choices of states)" in statistics_line(run)
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fakes import fake_model
 
 from components import Clutch, ConstantTorque, Fixed, Inertia
 from modelica_like import Assembly
@@ -19,7 +20,7 @@ class Fake:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, **values: Any) -> None:
         self.calls: list[str] = []
-        self.model: Any = SimpleNamespace(**{name: name for name in values})
+        self.model: Any = fake_model(**{name: name for name in values})
 
         def call(model: Any, function: str, point: Any) -> Any:
             assert model is self.model
@@ -40,8 +41,8 @@ def held(k: int) -> Any:
 
 def test_held_is_what_its_mode_holds_with_a_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [[1, 5, 6, 0.1], [0, 7, 8, 0.2], [-0.5, 9, 10, 0.3]]
-    fake = Fake(monkeypatch, hold_terms=lambda _: np.ravel(rows))
-    fake.model.holds = [held(0), held(1), held(2)]
+    fake = Fake(monkeypatch, terms=lambda _: np.ravel(rows))
+    fake.model.held.motions = [held(0), held(1), held(2)]
     assert terms(fake.model, at()).tolist() == rows
     assert capacities(fake.model, at()).tolist() == [one[1:3] for one in rows]
     assert holding(fake.model, at(1, 1, 1)) == [0, 2]
@@ -52,8 +53,8 @@ def test_held_is_what_its_mode_holds_with_a_gain(monkeypatch: pytest.MonkeyPatch
 
 
 def test_who_shares_is_told() -> None:
-    model: Any = SimpleNamespace(holds=[held(k) for k in range(4)], circuits=(Circuit((3, 1, 2), 1), Circuit((0,), 13)))
-    model.holds[2].component = "c3"
+    model: Any = fake_model(motions=[held(k) for k in range(4)], circuits=(Circuit((3, 1, 2), 1), Circuit((0,), 13)))
+    model.held.motions[2].component = "c3"
     d = np.zeros(15)
     d[4:13] = np.ravel([[0, 0, 0], [-0.5, 1.0, 0.0], [1.0, 0.0, -1.0]])
     assert sharing(model, at(*d)) == [("c3", "c1"), ("c3",)]

@@ -25,7 +25,7 @@ from modelica_like.structure.ideal import HEAD
 def test_dependent_equations_are_replaced_by_as_many_others(seed: int) -> None:
     """In random modes and states of a random network."""
     r, model = np.random.default_rng(seed), build(network(seed))
-    ideal, start = model.ideal, initialize(model)
+    ideal, start = model.held.ideal, initialize(model)
     assert ideal is not None
     for turn in range(20):
         point = start.copy()
@@ -41,7 +41,7 @@ def test_dependent_equations_are_replaced_by_as_many_others(seed: int) -> None:
 
         def matrix(chosen: Any, rows: np.ndarray = rows, point: Point = point) -> np.ndarray:
             point.d[ideal.entries] = np.where(chosen[:, None], rows * (np.arange(ideal.width) != 1), 0.0).ravel()
-            return model.alg_jacobian(point.t, point.x, point.z, model.p, model.u, point.d).full()
+            return model.equations.alg_jacobian(point.t, point.x, point.z, model.p, model.u, point.d).full()
 
         def rank(full: np.ndarray) -> int:
             for axis in (1, 0):
@@ -51,7 +51,7 @@ def test_dependent_equations_are_replaced_by_as_many_others(seed: int) -> None:
 
         own = matrix(np.zeros(len(rows), bool))
         assert replaced.sum() == len(own) - rank(own)
-        left = call(model, model.alg, Point(point.t, point.x, np.zeros(len(point.z)), point.d))
+        left = call(model, model.equations.alg, Point(point.t, point.x, np.zeros(len(point.z)), point.d))
         assert (replaced & ~derivative).sum() == len(own) - rank(matrix(derivative))
         assert rank(matrix(replaced)) == len(own)
         for k in np.flatnonzero(replaced):
@@ -60,7 +60,7 @@ def test_dependent_equations_are_replaced_by_as_many_others(seed: int) -> None:
             if derivative[k]:
                 assert weights[one.row] == pytest.approx(1.0)
         solve_implicit(model, point)
-        values = np.abs(call(model, model.variables, point))
+        values = np.abs(call(model, model.equations.variables, point))
         largest = {unit: max(values[k] for k, one in enumerate(model.flat_variables) if one.unit == unit)
                    for unit in {one.unit for one in model.flat_variables}}  # fmt: skip
         for k, one in enumerate(ideal.elements):
@@ -80,7 +80,7 @@ def test_a_current_that_is_rounding_of_another_one_gets_no_impulse(i: float, kep
     parts = {"S": IdealSwitch(), "D": IdealDiode(), "L": Inductor(L=1e-3, i=i), "R": Resistor(R=5.0)}
     more = {"U": ConstantVoltage(V=24.0), "M": Resistor(R=24e-6), "gate": Pulse(period=1.0, start_time=0.5)}
     model = build(circuit(connect, **parts, **more))
-    point, ideal = initialize(model), model.ideal
+    point, ideal = initialize(model), model.held.ideal
     assert ideal is not None
     point.d[[one.mode for one in ideal.elements]] = 0.0
     share(model, point)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fakes import fake_model
 from numpy.linalg import matrix_rank
 from scipy.linalg import null_space
 
@@ -20,7 +21,7 @@ SCALES = [1.0, 1e-14, 1e14]
 @pytest.fixture
 def find(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Find what is kept where the held motions, all but the first one, have given slopes and values."""
-    model: Any = SimpleNamespace(holds=[SimpleNamespace(motion=one) for one in MOTIONS], variables=SimpleNamespace())
+    model: Any = fake_model(motions=[SimpleNamespace(motion=one) for one in MOTIONS], variables=SimpleNamespace())
 
     def found(slopes: np.ndarray, values: np.ndarray, states: list[int], jacobian: np.ndarray) -> Kept:
         def holding(*given: Any) -> list[int]:
@@ -32,7 +33,7 @@ def find(monkeypatch: pytest.MonkeyPatch) -> Any:
             return slopes[nodes]
 
         def call(*given: Any) -> np.ndarray:
-            assert given == (model, model.variables, POINT)
+            assert given == (model, model.equations.variables, POINT)
             return values
 
         for one in (holding, variable_slopes, call):

@@ -74,7 +74,7 @@ def test_a_relay_tracks_a_ramp(solver):
     after = run.time > 0.6 + 1e-9
     np.testing.assert_allclose(run["x"][after], run["r"][after], rtol=1e-14)
     np.testing.assert_allclose(run["u"][after], 0.5, rtol=1e-12)
-    assert "so it slides" in run.model.transitions[run.events[0].transition].because
+    assert "so it slides" in run.model.events.transitions[run.events[0].transition].because
 
 
 def test_a_start_on_the_border_slides_at_once():

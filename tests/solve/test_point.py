@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from fakes import fake_model
 
 from modelica_like.compile.buffers import BufferedFunction
 from modelica_like.errors import InitializationError, SingularAtStart
@@ -115,7 +116,7 @@ def equations(residual: Any, symbols: list[Any], **more: Any) -> Any:
     numbers = {"p": np.array([3.0]), "u": np.array([5.0]), "implicit": tuple("abcdefgh"[: z.numel()])}
     fast = lambda _, make: BufferedFunction(make())  # noqa: E731
     cache = {"fast": fast, "once": lambda _, make: make(), "arguments": dict(zip(NAMES, symbols, strict=True))}
-    return SimpleNamespace(**functions, **numbers, **cache, **more)
+    return fake_model(**functions, **numbers, **cache, **more)
 
 
 def symbols(size: int) -> list[Any]:
@@ -210,7 +211,7 @@ def test_a_block_is_singular_if_its_determinant_vanishes(
     determinants = ca.Function("determinants", given, [given[2] + given[0]])
     rates = ca.Function("ode", given, [given[3] + 0 * given[1]])
     fast = lambda _, make: BufferedFunction(make())  # noqa: E731
-    model: Any = SimpleNamespace(determinants=determinants, ode=rates, fast=fast, u=np.zeros(5), states=(*"vwxyz",))
+    model: Any = fake_model(determinants=determinants, ode=rates, fast=fast, u=np.zeros(5), states=(*"vwxyz",))
     model.arguments = dict(zip(NAMES, given, strict=True))
     values, model.p = np.array(FINE), np.array([0.0, -5.0, 1e-300, 1e300, -1e300])
     point = Point(0.0, np.ones(1), values, np.zeros(5))

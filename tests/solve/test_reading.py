@@ -57,7 +57,7 @@ def test_whatever_is_read_and_in_whatever_blocks_it_is_what_each_result_gives(mo
     run = simulate(Assembly("launch", parts=parts, series={"shaft": ["left", "clutch", "right"]}), 2.0, points=20)
     model, segments = run.model, run.segments
     points = [one.point(k) for one in segments for k in range(len(one.times))]
-    every = np.array([call(model, model.variables, point) for point in points]).T
+    every = np.array([call(model, model.equations.variables, point) for point in points]).T
     energies = np.array([call(model, model.energy, point).reshape(-1, len(model.components)) for point in points])
     monkeypatch.setattr(reading, "_BLOCK", 8)
     assert len(list(blocks(segments))) > 2

@@ -6,6 +6,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from fakes import fake_model
 
 from modelica_like import build
 from modelica_like.errors import SingularAtStart, Source
@@ -24,12 +25,12 @@ HOLDS = [SimpleNamespace(component=one, mode=k, number=1) for k, one in enumerat
 
 def model(**given: Any) -> Any:
     """All that messages read of a model; parameters are a.k = 0, a.m = 2, b.k = 0 and c.k = 0."""
-    empty = {"holds": [], "implicit": (), "following": {}, "motion_sources": ()}
+    empty = {"motions": [], "implicit": (), "following": {}, "motion_sources": ()}
     paths = [SimpleNamespace(path=path) for path in ("a.k", "a.m", "b.k", "c.k")]
     units = [SimpleNamespace(unit="N.m"), SimpleNamespace(unit="N")]
     fixed = {"flat_parameters": paths, "p": np.array([0.0, 2.0, 0.0, 0.0]), "u": np.zeros(0)}
     position = {"a.tau": 0, "a.f": 1, "b.tau": 0, "a.w": 0}
-    return SimpleNamespace(**{**empty, **fixed, "flat_variables": units, "position": position, **given})
+    return fake_model(**{**empty, **fixed, "flat_variables": units, "position": position, **given})
 
 
 def told(names: Any, origins: Any = (A, B), helps: Any = (), **given: Any) -> SingularAtStart:
@@ -44,10 +45,10 @@ def told(names: Any, origins: Any = (A, B), helps: Any = (), **given: Any) -> Si
         ("uvwxyz", {}, "u, v, w, x, y, z"),
         ("tuvwxyz", {}, "t, u, v, w, x, y, …"),
         ("uvw", {"implicit": ("v", "w")}, "v, w"),
-        (["a.tau", "x"], {"holds": HOLDS[:1]}, "a.tau, x"),  # only where several hold do others matter less
-        (["a.tau", "b.tau", "x"], {"holds": HOLDS}, "a.tau, b.tau"),
-        (["x", "y"], {"holds": HOLDS}, "x, y"),
-        (["c.tau", "a.tau"], {"holds": [*HOLDS[2:], HOLDS[0]]}, "c.tau, a.tau"),  # the mode of c holds nothing
+        (["a.tau", "x"], {"motions": HOLDS[:1]}, "a.tau, x"),  # only where several hold do others matter less
+        (["a.tau", "b.tau", "x"], {"motions": HOLDS}, "a.tau, b.tau"),
+        (["x", "y"], {"motions": HOLDS}, "x, y"),
+        (["c.tau", "a.tau"], {"motions": [*HOLDS[2:], HOLDS[0]]}, "c.tau, a.tau"),  # the mode of c holds nothing
     ],
 )
 def test_unknowns_of_a_singular_block(names: Any, given: Any, shown: str) -> None:
@@ -60,8 +61,8 @@ def test_unknowns_of_a_singular_block(names: Any, given: Any, shown: str) -> Non
         ((0,), {}, "a.k is zero, so these", "Give it another"),
         ((0, 1, 2, 3), {}, "a.k and b.k are zero, so these", "Give one of them"),  # a.m is not zero, c not in the block
         ((1, 3), {}, "Its equations do not", "Start elsewhere"),
-        ((0,), {"holds": HOLDS[:1]}, "a.k is zero", "Give it another"),
-        ((0,), {"holds": HOLDS[:2]}, "a and b stick: where they hold the same motion, their torque", "Give one of"),
+        ((0,), {"motions": HOLDS[:1]}, "a.k is zero", "Give it another"),
+        ((0,), {"motions": HOLDS[:2]}, "a and b stick: where they hold the same motion, their torque", "Give one of"),
         ((), {"following": {"s": ("x", "y"), "r": ("q",)}}, "Its equations", "At the start, give guesses of x near"),
     ],
 )

@@ -126,7 +126,7 @@ def test_values_with_opposite_guards_make_a_pair(more):
     model = build(Plain(x=1.0, more=more))
     assert names(model, _borders(model)) == [[("out", "down", "up")]]
     ((pair,),) = _borders(model)
-    there, back = (model.transitions[k] for k in (pair.there, pair.back))
+    there, back = (model.events.transitions[k] for k in (pair.there, pair.back))
     assert (there.target, back.target, there.timed, back.timed) == (0, 1, False, False)
     assert (pair.first in there.sources, pair.second in back.sources, pair.number) == (True, True, 3)
     assert not np.isclose(there.index, back.index)
@@ -192,7 +192,7 @@ class Reference:
         chance = np.random.default_rng(seed)
         self.base, self.borders, self.asked = base, _borders(base), asked
         self.t, self.x = float(chance.uniform(0.5, 3.0)), chance.normal(size=2)
-        self.d = base.discrete_starts(self.t, self.x, [], base.p, base.u, np.zeros(base.discrete_size)).full().ravel()
+        self.d = base.starts.discretes(self.t, self.x, [], base.p, base.u, np.zeros(base.discrete_size)).full().ravel()
         for border in self.borders:
             for pair in border:
                 self.d[pair.mode] = pair.first
@@ -212,7 +212,7 @@ class Reference:
         return self._followed(d)
 
     def at(self, name: str, d: Any) -> Any:
-        return getattr(self.base, name)(self.t, self.x, [], self.base.p, self.base.u, d).full().ravel()
+        return self.base.functions[name](self.t, self.x, [], self.base.p, self.base.u, d).full().ravel()
 
     def turned(self) -> list[list[Pair]]:
         """The first border from its other side."""
@@ -272,7 +272,7 @@ def test_borders_that_slide_are_approached(base, made, asked):
     for seed in range(3):
         one = Reference(base, asked, seed)
         values, slopes, drift = one.gradients()
-        ode = made.ode(one.t, one.x, [], base.p, base.u, one.sliding()).full().ravel()
+        ode = made.equations.ode(one.t, one.x, [], base.p, base.u, one.sliding()).full().ravel()
         rates = slopes @ ode + drift
         for slides, value, rate in zip(asked, values, rates, strict=True):
             assert not slides or rate == pytest.approx(-value / RETURN, rel=1e-9)
@@ -282,8 +282,8 @@ def test_borders_that_slide_are_approached(base, made, asked):
 def test_what_follows_a_sliding_mode_has_its_first_value_and_samples_are_mixed(base, made, asked):
     for seed in range(3):
         one = Reference(base, asked, seed)
-        found = made.updates(one.t, one.x, [], base.p, base.u, one.sliding()).full().ravel()
-        rows = [row.reset for row in base.update_rows]
+        found = made.events.updates(one.t, one.x, [], base.p, base.u, one.sliding()).full().ravel()
+        rows = [row.reset for row in base.events.update_rows]
         targets = [base.flat_discretes[one.index].path if one.kind == "discrete" else one.kind for one in rows]
         values = dict(zip(targets, found, strict=True))
         assert values["state"] == np.inf
@@ -297,9 +297,9 @@ def entered(model: CompiledDae, at: Reference, offset: float) -> dict[str, str]:
     x[0] += offset - (x[0] - x[1] ** 2)
     d, found = at.sliding(), dict[str, str]()
     now, soon = (
-        getattr(model, name)(at.t, x, [], model.p, model.u, d).full().ravel() for name in ("guards", "guards_soon")
+        model.functions[name](at.t, x, [], model.p, model.u, d).full().ravel() for name in ("guards", "guards_soon")
     )
-    plain = [one for one in model.transitions if not one.timed]
+    plain = [one for one in model.events.transitions if not one.timed]
     assert sorted(one.index for one in plain) == [*range(len(now))]
     for one in plain:
         if d[one.mode] in one.sources and now[one.index] > 0 and soon[one.index] > 0:

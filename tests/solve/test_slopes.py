@@ -1,11 +1,11 @@
 """Slopes with the implicit unknowns following, against the implicit function theorem by hand."""
 
-from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
+from fakes import fake_model
 
 from modelica_like import build
 from modelica_like.compile.compiled import CompiledDae
@@ -103,11 +103,11 @@ def test_functions_of_the_caller_and_their_constants(curved: Any) -> None:
     """Expressions (SX) of the model's symbols, or calls (MX) with constants, by which nothing is differentiated."""
     model, point, wanted = curved
     nodes = nodes_of(model, ["f", "g"])
-    symbols = [ca.MX.sym(name, model.ode.size1_in(k)) for k, name in enumerate(NAMES)]
+    symbols = [ca.MX.sym(name, model.equations.ode.size1_in(k)) for k, name in enumerate(NAMES)]
     weights = ca.MX.sym("weights", 2)
     arguments = [*model.arguments.values()]
-    plain = ca.Function("plain", arguments, [3 * model.variables(*arguments)[nodes]])
-    called = ca.Function("called", [*symbols, weights], [weights * model.variables(*symbols)[nodes]])
+    plain = ca.Function("plain", arguments, [3 * model.equations.variables(*arguments)[nodes]])
+    called = ca.Function("called", [*symbols, weights], [weights * model.equations.variables(*symbols)[nodes]])
     for name, function, constants in (
         ("plain", plain, ()),
         ("called", called, (np.array([2.0, -1.0]),)),
@@ -126,7 +126,7 @@ def test_where_a_split_is_undetermined_the_least_one_follows() -> None:
     t, x, z, p, u, d = given = [ca.SX.sym(name, 3 if name == "z" else 1) for name in NAMES]
     both = z[0] + z[1] - 2 * x - 3 * p
     alg = ca.Function("alg", given, [ca.vertcat(both, z[2] - t * x, both)])
-    model: Any = SimpleNamespace(alg=alg, arguments=dict(zip(NAMES, given, strict=True)), implicit=(*"abc",))
+    model: Any = fake_model(alg=alg, arguments=dict(zip(NAMES, given, strict=True)), implicit=(*"abc",))
     model.once, model.p, model.u = lambda _, make: make(), [5.0], [0.0]
     by_x, by_t, by_theta = implicit_slopes(model, Point(7.0, np.array([4.0]), np.zeros(3), np.zeros(1)))
     np.testing.assert_allclose(by_x, [[1.0], [1.0], [7.0]], atol=1e-12)

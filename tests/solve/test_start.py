@@ -114,7 +114,7 @@ def test_a_start_value_that_others_determine_is_told_with_them(equation: bool) -
     t, x, z, p, u, d = symbols = [ca.SX.sym(name, 3 if name == "x" else 1) for name in "txzpud"]
     rows = [x[0], x[0] + x[1], x[2], 0, 0, x[1], x[1], 0, 0, x[2]]
     model = table()
-    model.variables = ca.Function("variables", symbols, [ca.vertcat(*rows)], [*"txzpud"], ["v"])
+    model.equations.variables = ca.Function("variables", symbols, [ca.vertcat(*rows)], [*"txzpud"], ["v"])
     model.flat_variables[5].description = f"{INITIAL_EQUATION} x = y" if equation else "speed"
     present = np.array([1.0, 8.5, 3.0, 4.0, 5.0, 3.5, 7.0, 8.0, 9.0, 10.0])
     told = f"{INITIAL_EQUATION} x = y" if equation else "z5 = 3"
@@ -122,8 +122,8 @@ def test_a_start_value_that_others_determine_is_told_with_them(equation: bool) -
     assert not_met(model, present, 5, 3.0).what == f"b = 8.5 and {told} contradict each other: {would} would be 3.5."
     coupled = [k for k in range(10) if _coupled(model, ENTRIES[5], StartEntry(k, None, "fixed"))]
     assert coupled == [1, 5, 6]
-    model.starts = (*ENTRIES[:6], StartEntry(6, None, "fixed"), StartEntry(5, None, "fixed"))
+    model.starts.entries = (*ENTRIES[:6], StartEntry(6, None, "fixed"), StartEntry(5, None, "fixed"))
     assert not_met(model, present, 5, 3.0).what.startswith("b = 8.5 and z6 = 7 and ")  # two of three are enough
-    model.starts = ENTRIES[3:7]
+    model.starts.entries = ENTRIES[3:7]
     would = "left minus right" if equation else "z5"
     assert not_met(model, present, 2, 3.0).what == f"{told} cannot be met: {would} would be 3.5."

@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from fakes import fake_model
 from scipy.linalg import null_space
 
 from modelica_like.compile.compiled import StartEntry
@@ -68,8 +69,8 @@ class Drawn:
         self.starts = [starts[k] for k in r.permutation(len(starts))]
         names = r.permutation(30)
         variables = [SimpleNamespace(path=f"v{names[k]:02}") for k in range(30)]
-        self.model: Any = SimpleNamespace(
-            starts=self.starts, states=[f"s{k}" for k in range(self.nx)], implicit=["z"] * self.nz, places={},
+        self.model: Any = fake_model(
+            entries=self.starts, states=[f"s{k}" for k in range(self.nx)], implicit=["z"] * self.nz, places={},
             flat_variables=variables, following={}, rest_system=self.system, start_system=None,
         )  # fmt: skip
 
@@ -121,7 +122,9 @@ def test_start_values_count_as_long_as_they_raise_the_rank(structural: bool, fir
         drawn = Drawn(seed)
         model = drawn.model
         # A default of a state counts where a start system has its row.
-        drawn.starts = model.starts = [one for one in drawn.starts if one.state is None or one.strength != "default"]
+        drawn.starts = model.starts.entries = [
+            one for one in drawn.starts if one.state is None or one.strength != "default"
+        ]
         rows, columns, wanted = drawn.choose("rest", structural)
         if not [k for k in columns if k < drawn.nx] and not (wanted["rows"] or wanted["dependent"]):
             wanted = {**{key: [] for key in wanted}, "direct": wanted["direct"]}

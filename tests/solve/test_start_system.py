@@ -78,7 +78,7 @@ def test_values_are_those_of_the_variables(rest):
     system = model.rest_system if rest else model.start_system
     one = Numbers(model, system)
     y, _, values = one.at(one.x, one.y)
-    variables = model.variables(0.0, one.x, [], model.p, model.u, one.d).full().ravel()
+    variables = model.equations.variables(0.0, one.x, [], model.p, model.u, one.d).full().ravel()
     np.testing.assert_allclose(y, one.y)
     np.testing.assert_allclose(values[: len(y)], 0.0, atol=1e-13)
     paths = list(model.position)
@@ -104,7 +104,7 @@ def test_rates_are_the_speeds():
     system = model.rest_system
     one = Numbers(model, system)
     variables = dict(
-        zip(model.position, model.variables(0.0, one.x, [], model.p, [], one.d).full().ravel(), strict=True)
+        zip(model.position, model.equations.variables(0.0, one.x, [], model.p, [], one.d).full().ravel(), strict=True)
     )
     found = sorted(np.concatenate([one.x, one.y])[[*system.rates]])
     speeds = {variables[path] for path in ("left.w", "right.w", "last.w", "spring.w_rel")}

@@ -84,8 +84,8 @@ def test_new_values_follow_from_new_ones_and_old_ones(new, old, order, whens):
     for number in range(1, 1 + sum(whens)):
         for kind in ("relation", "was"):
             d[at[f"{kind}[{number}]"]] %= 2
-    results = model.updates(0.0, [0.0], [], model.p, model.u, d).full().ravel()
-    found = {row.reset.index: value for row, value in zip(model.update_rows, results, strict=True)}
+    results = model.events.updates(0.0, [0.0], [], model.p, model.u, d).full().ravel()
+    found = {row.reset.index: value for row, value in zip(model.events.update_rows, results, strict=True)}
     before, expected = [d[at[name]] for name in "abcde"], dict[int, float]()
     for k in order:
         own = k + 1 + sum(w * expected[j] for j, w in enumerate(new[k]) if w)

@@ -164,7 +164,7 @@ def test_the_pendulum_accelerates_as_casadi_says(x, vx):
     expected = casadi_pendulum(x, vx, 1.5, 9.81, 2.0)
     assert first["T"] == pytest.approx(expected[2], rel=1e-12)
     position = {name: k for k, name in enumerate(model.states)}
-    ode = np.array(model.ode(0, [{"x": x, "vx": vx}[n] for n in model.states], [y], model.p, [], [])).ravel()
+    ode = np.array(model.equations.ode(0, [{"x": x, "vx": vx}[n] for n in model.states], [y], model.p, [], [])).ravel()
     assert ode[position["vx"]] == pytest.approx(expected[0], rel=1e-12, abs=1e-12)
 
 

@@ -24,7 +24,9 @@ def test_a_state_is_what_its_name_says() -> None:
     wires = {"a": ("step.y", "lag.u"), "b": ("lag.y", "torque.tau")}
     model = build(Assembly("drive", parts=parts, series={"s": ("torque", "J")}, connect=wires))
     at = {name: k for k, name in enumerate(model.states)}
-    values = model.variables(0.0, range(1, len(model.states) + 1), [], model.p, model.u, [0.0] * model.discrete_size)
+    values = model.equations.variables(
+        0.0, range(1, len(model.states) + 1), [], model.p, model.u, [0.0] * model.discrete_size
+    )
     for name, k in at.items():
         assert float(values[model.position[name]]) == k + 1.0
     assert "lag.y" in at

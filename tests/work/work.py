@@ -57,7 +57,7 @@ def work(name: str) -> dict[str, Any]:
 
 def operations(model: CompiledDae) -> dict[str, int]:
     """Return the number of operations of each function that has some."""
-    functions: dict[str, ca.Function] = {name: getattr(model, name) for name in _FUNCTIONS}
+    functions: dict[str, ca.Function] = {name: model.functions[name] for name in _FUNCTIONS}
     return {name: one.n_instructions() for name, one in functions.items() if one.numel_out(0)}
 
 

@@ -144,7 +144,7 @@ def campbell(
     if len(linear) < 2:
         raise ValueOutOfRange(f"A Campbell diagram needs at least two values of {path}.")
     row = model.position[speed]
-    speeds = np.array([call(m.model, m.model.variables, m.point)[row] for m in linear])
+    speeds = np.array([call(m.model, m.model.equations.variables, m.point)[row] for m in linear])
     order = np.argsort(speeds, kind="stable")
     ahead = [(values := linear[k].eigenvalues())[values.imag > 0] for k in order]
     # Each mode continues as the nearest one.

@@ -72,7 +72,7 @@ def free_motions(model: CompiledDae, point: Point) -> Motions:
 
 def _held_speeds(model: CompiledDae, point: Point) -> Iterator[Vector]:
     """Slopes (by the states) of the motions that the present modes hold."""
-    held = [model.holds[k] for k in holding(model, point)]
+    held = [model.held.motions[k] for k in holding(model, point)]
     if not held:
         return
     free = point.copy()
@@ -94,7 +94,7 @@ def _held_angles(model: CompiledDae, point: Point, motions: Motions) -> Matrix:
     rows = [n for n, k in enumerate(motions.keep) if np.any(full[k, gone])]
     full = full[[motions.keep[n] for n in rows]]
     scale = np.abs(full).max(axis=1, keepdims=True, initial=1e-300)
-    by_states = (full[:, :count] / model.nominals) @ motions.shape * model.nominals[motions.keep]
+    by_states = (full[:, :count] / model.equations.nominals) @ motions.shape * model.equations.nominals[motions.keep]
     left = np.hstack([by_states, full[:, count:]]) / scale
     still = _null(left.T)
     # Of all motions at rest, those that rest only because the speeds are held.
@@ -118,5 +118,7 @@ def _null(matrix: Matrix) -> Matrix:
 def _rate_slopes(model: CompiledDae, point: Point) -> Matrix:
     """Slopes of the rates by [x, p, u, t], times the sizes of those, shape (states, …)."""
     rates, fixed = slopes(model, point, "ode"), np.concatenate([model.p, model.u])
-    sizes = np.concatenate([model.nominals, np.where(fixed == 0.0, 1.0, np.abs(fixed)), [max(1.0, abs(point.t))]])
+    sizes = np.concatenate(
+        [model.equations.nominals, np.where(fixed == 0.0, 1.0, np.abs(fixed)), [max(1.0, abs(point.t))]]
+    )
     return np.hstack([rates.x, rates.theta[:, : len(fixed)], rates.t[:, None]]) * sizes

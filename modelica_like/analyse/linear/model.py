@@ -268,7 +268,7 @@ class Modes(Shown, Sequence[Mode]):
 def _mode(linear: LinearModel, value: complex, right: Vector, left: Vector, energies: _Energies) -> Mode:
     model = linear.model
     shape = linear.shape @ right
-    relative = shape / model.nominals
+    relative = shape / model.equations.nominals
     shape = shape / relative[np.argmax(np.abs(relative))]
     shares = np.abs(right) * np.abs(left)
     participation = dict(zip(linear.states, map(float, shares / max(shares.sum(), 1e-300)), strict=True))

@@ -75,7 +75,7 @@ class OperatingPoint(Shown, Mapping[str, float]):
     @property
     def stuck(self) -> tuple[str, ...]:
         """Components that hold a motion: friction that is not overcome, or a gear that locks itself."""
-        held = (self.model.holds[k].component for k in holding(self.model, self.point))
+        held = (self.model.held.motions[k].component for k in holding(self.model, self.point))
         return tuple(dict.fromkeys(held))
 
     def __str__(self) -> str:
@@ -122,10 +122,10 @@ def steady(
     point = _settle(model, begin)
     if free:
         model, point = target.reach(model, point)
-    values = dict(zip(model.position, map(float, call(model, model.variables, point)), strict=True))
+    values = dict(zip(model.position, map(float, call(model, model.equations.variables, point)), strict=True))
     values.update(zip(model.discrete_position, map(float, point.d), strict=False))
     values.update(zip(model.parameter_position, map(float, model.p), strict=True))
-    values.update(zip(model.derived_position, map(float, model.derived(model.p).full().ravel()), strict=True))
+    values.update(zip(model.derived_position, map(float, model.equations.derived(model.p).full().ravel()), strict=True))
     return OperatingPoint(model, point, values)
 
 
@@ -183,7 +183,7 @@ class _Target:
 
     def _miss(self, model: CompiledDae, point: Point) -> Vector:
         """Distances of variables from their values, over their sizes."""
-        return (call(model, model.variables, point)[self.rows] - self.wanted) / self.sizes
+        return (call(model, model.equations.variables, point)[self.rows] - self.wanted) / self.sizes
 
     def _closer(
         self, model: CompiledDae, point: Point, step: Any, before: float

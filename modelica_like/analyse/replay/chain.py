@@ -254,7 +254,7 @@ def replay(
 def _check_end(solution: Solution, end: Point) -> None:
     """Refuse derivatives of another run: both integrate the same equations, so one of them has gone over something."""
     model, x = solution.model, np.hstack([segment.x for segment in solution.segments])
-    allowed = _ALIKE * (np.abs(x).max(axis=1) + ABSOLUTE * model.nominals)
+    allowed = _ALIKE * (np.abs(x).max(axis=1) + ABSOLUTE * model.equations.nominals)
     apart = np.abs(end.x - x[:, -1]) / allowed
     if not apart.max() <= 1.0:
         k = int(np.argmax(apart))
@@ -283,7 +283,7 @@ class _Maker:
         """The first node and its derivatives by the parameters."""
         size = Sizes.of(self.model)
         t0 = float(self.solution.segments[0].times[0])
-        changes = self.events[0] or self.model.update_rows
+        changes = self.events[0] or self.model.events.update_rows
         point = initialize(self.model, t0, kind) if changes else self.solution.segments[0].start
         begin_x, begin_d = start_slopes(self.model, point, kind)
         whole = np.concatenate([begin_x, np.eye(size.fixed), begin_d])

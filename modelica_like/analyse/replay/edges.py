@@ -98,7 +98,7 @@ def _ties(later: _Later) -> list[Edge]:
         still = np.all(still_at[first : last + 1], axis=0)
         if isinstance(move := chain.moves[last] if last < len(chain.moves) else None, Jump):
             # A guard that fires at the end of the segment was approaching zero.
-            fired = [model.transitions[e.transition] for e in move.events if e.transition >= 0 and not e.round]
+            fired = [model.events.transitions[e.transition] for e in move.events if e.transition >= 0 and not e.round]
             still[[guards.positions[id(transition)] for transition in fired if not transition.timed]] = False
         if chain.nodes[last].t > chain.nodes[first].t:
             segments.append((first, last, still))
@@ -117,11 +117,11 @@ def _tie(later: _Later, transition: CompiledTransition, first: int, last: int) -
     chain, model, point = later.chain, later.chain.model, later.chain.nodes[last]
     mode = model.flat_discretes[transition.mode]
     part = slopes(model, point, "guards", [transition.index])
-    x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.nominals
+    x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.equations.nominals
     terms = np.abs(part.by[0]) @ np.abs(np.concatenate([x, model.p, model.u, point.d]))
     # The slope of an acceleration that the others hold at zero is nothing but rounding, and so are its terms.
     begins = [chain.nodes[0], *(jump.after for _, jump in chain.jumps)]
-    largest = max(abs(float(call(model, model.guards, node)[transition.index])) for node in begins)
+    largest = max(abs(float(call(model, model.events.guards, node)[transition.index])) for node in begins)
     error = NoGradient(
         f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays "
         f"{mode.names[int(point.d[transition.mode])]} exactly at the limit where it becomes "
@@ -144,11 +144,11 @@ def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
     """
     chain, readings, model = later.chain, later.readings, later.chain.model
     size, end = Sizes.of(model), len(chain.moves)
-    held = [k for k, h in enumerate(model.holds) if h.mode == mode]
+    held = [k for k, h in enumerate(model.held.motions) if h.mode == mode]
     until = min(last + 1, end)
     for hold, begin in product(held, dict.fromkeys((last, first))):
         change = _sliding(model, chain.nodes[begin], hold)
-        nominals = model.nominals * np.max(np.abs(change) / model.nominals)
+        nominals = model.equations.nominals * np.max(np.abs(change) / model.equations.nominals)
         sizes = [sum(float(np.abs(row[: size.x]) @ nominals) for _, row in reading.parts) for reading in readings]
         read, whole = chain.carried(readings, np.pad(change, (0, size.theta))[:, None], begin, until)
         if until > last and hold in holding(model, chain.nodes[until]):
@@ -162,8 +162,8 @@ def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
 
 def _sliding(model: CompiledDae, point: Point, hold: int) -> Vector:
     """Accelerations of all states for an acceleration of 1 of a motion that can be held; zeros where others hold it."""
-    one, others = model.holds[hold], [k for k in holding(model, point) if k != hold]
-    motions = variable_slopes(model, point, [one.motion, *(model.holds[k].motion for k in others)])
+    one, others = model.held.motions[hold], [k for k in holding(model, point) if k != hold]
+    motions = variable_slopes(model, point, [one.motion, *(model.held.motions[k].motion for k in others)])
     left = (
         motions[0] - motions[1:].T @ np.linalg.lstsq(motions[1:].T, motions[0], rcond=None)[0] if others else motions[0]
     )

@@ -21,7 +21,7 @@ class Guards:
 
     def __init__(self, model: CompiledDae) -> None:
         self.model = model
-        self.state_events = [t for t in model.transitions if not t.timed]
+        self.state_events = [t for t in model.events.transitions if not t.timed]
         self.count = len(self.state_events)
         self.positions = {id(e): k for k, e in enumerate(self.state_events)}
         self._at = model.fast("guards at", lambda: _clean(model, self.state_events))
@@ -40,12 +40,12 @@ class Guards:
 def _clean(model: CompiledDae, events: list[CompiledTransition]) -> ca.Function:
     """Guards, rates and guards a moment later, with inactive ones set by the modes."""
     arguments, d = list(model.arguments.values()), model.arguments["d"]
-    rates = model.guard_rates(*arguments)
+    rates = model.events.guard_rates(*arguments)
     rates = ca.densify(ca.if_else(ca.fabs(rates) <= _LARGE, rates, 0))
     may = ca.vertcat(*(functools.reduce(ca.logic_or, [d[e.mode] == k for k in e.sources]) for e in events))
     guards, soon = (
         ca.if_else(may, _numbers(function(*arguments)), -1) if events else ca.SX(0, 1)
-        for function in (model.guards, model.guards_soon)
+        for function in (model.events.guards, model.events.guards_soon)
     )
     return ca.Function("guards_at", arguments, [ca.densify(c) for c in ca.cse([guards, rates, soon])])
 

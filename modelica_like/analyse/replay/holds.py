@@ -31,12 +31,15 @@ def impact(model: CompiledDae, struck: Sequence[int]) -> ca.Function:
     """
     given = model.arguments
     arguments = list(given.values())
-    holds = [model.holds[k] for k in struck]
-    motions = model.variables(*arguments)[[hold.motion for hold in holds]]
-    restitution = ca.reshape(model.hold_terms(*arguments), TERMS, -1)[_RESTITUTION, list(struck)].T
+    holds = [model.held.motions[k] for k in struck]
+    motions = model.equations.variables(*arguments)[[hold.motion for hold in holds]]
+    restitution = ca.reshape(model.held.terms(*arguments), TERMS, -1)[_RESTITUTION, list(struck)].T
     approaches = given["d"][[hold.approach for hold in holds]]
-    by = [ca.jtimes(f(*arguments), approaches, -(1 + restitution) * motions) for f in (model.ode, model.alg)]
-    by += [ca.jacobian(f(*arguments), given["z"]) for f in (model.ode, model.alg)]
+    by = [
+        ca.jtimes(f(*arguments), approaches, -(1 + restitution) * motions)
+        for f in (model.equations.ode, model.equations.alg)
+    ]
+    by += [ca.jacobian(f(*arguments), given["z"]) for f in (model.equations.ode, model.equations.alg)]
     parts = ca.Function("response", arguments, [ca.densify(slope) for slope in by])
     symbols = parts.mx_in()
     change, residual, ode_z, alg_z = parts(*symbols)
@@ -57,7 +60,7 @@ def _following(model: CompiledDae, nodes: list[int]) -> tuple[Any, list[Any]]:
     """Slopes of variables by the states, z following, shape (nodes, states), and the symbols that they are made of."""
     given = model.arguments
     arguments = list(given.values())
-    values = model.variables(*arguments)[nodes], model.alg(*arguments)
+    values = model.equations.variables(*arguments)[nodes], model.equations.alg(*arguments)
     by = [ca.densify(ca.jacobian(value, given[name])) for value in values for name in "xz"]
     parts = ca.Function("parts", arguments, by)
     symbols = parts.mx_in()
@@ -100,7 +103,7 @@ def _relative(model: CompiledDae, point: Point, members: list[int], total: Total
 
 def _turned(model: CompiledDae, point: Point, members: list[int], row: int, free: list[int], total: Total) -> Vector:
     """Derivatives of a dependence of motions over its parts; one part is 1, and all but the `free` ones are 0."""
-    nodes = [model.holds[k].motion for k in members]
+    nodes = [model.held.motions[k].motion for k in members]
     motions, parts = variable_slopes(model, point, nodes), np.zeros(len(nodes))
     parts[row] = 1.0
     parts[free] = -np.linalg.lstsq(motions[free].T, motions[row], rcond=None)[0]

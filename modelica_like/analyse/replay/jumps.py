@@ -123,8 +123,8 @@ def make_jump(
     # The time of the event matters only if states, rates or integrands jump.
     states, rates = np.abs(before.x - work.point.x), np.abs(rate_before - rate_after)
     matters = np.any(np.abs(gain) > _SMOOTH)
-    matters |= np.any(rates > _SMOOTH * (model.nominals + np.abs(rate_before) + np.abs(rate_after)))
-    matters |= np.any(states > _SMOOTH * (model.nominals + np.abs(before.x)))
+    matters |= np.any(rates > _SMOOTH * (model.equations.nominals + np.abs(rate_before) + np.abs(rate_after)))
+    matters |= np.any(states > _SMOOTH * (model.equations.nominals + np.abs(before.x)))
     if when.reason is not None and matters:
         raise when.reason
     if when.apart and not gain.size and either_first(model, before, events, work.point):
@@ -175,7 +175,7 @@ class Work:
     def fire(self, events: list[Event]) -> None:
         """Carry out the transitions of a round together, and the impact that follows; see events.c."""
         model, before = self.model, self.point.d
-        transitions = [model.transitions[event.transition] for event in events if event.transition >= 0]
+        transitions = [model.events.transitions[event.transition] for event in events if event.transition >= 0]
         x, d, dx, dd = self.point.x.copy(), self.point.d.copy(), self.x.copy(), self.d.copy()
         projected: list[tuple[int, int]] = []
         for transition in transitions:
@@ -204,11 +204,11 @@ class Work:
         if knocked:
             self.share()
             modes = {model.discrete_position[event.mode] for event in knocked}
-            self.resting.update(k for k in holding(model, self.point) if model.holds[k].mode in modes)
+            self.resting.update(k for k in holding(model, self.point) if model.held.motions[k].mode in modes)
 
     def update(self) -> bool:
         """Evaluate the discrete equations once; return whether something changes. See events.c."""
-        model, rows = self.model, self.model.update_rows
+        model, rows = self.model, self.model.events.update_rows
         if not rows:
             return False
         values, total = self._total("updates")
@@ -238,7 +238,7 @@ class Work:
 
     def differentiate_shares(self) -> None:
         """Derivatives of the shares at the present point."""
-        for circuit in self.model.circuits:
+        for circuit in self.model.held.circuits:
             entries = circuit.entries
             self.d[entries] = 0.0
             self.d[entries] = share_slopes(self.model, self.point, circuit, self.x.shape[1], self._total)
@@ -250,7 +250,7 @@ class Work:
         """
         model, point = self.model, self.point
         held = holding(model, point)
-        entering = [k for k in held if before[model.holds[k].mode] != model.holds[k].number]
+        entering = [k for k in held if before[model.held.motions[k].mode] != model.held.motions[k].number]
         if not entering:
             return
         hard = is_hard(model, point, entering)
@@ -261,7 +261,7 @@ class Work:
         struck = strike(model, point, entering)
         trial = point.copy()
         for k in struck.knocked:
-            trial.d[model.holds[k].mode] = model.holds[k].loose
+            trial.d[model.held.motions[k].mode] = model.held.motions[k].loose
         share(model, trial)
         solve_implicit(model, trial)
         stopped = [k for k in entering if k not in struck.knocked]
@@ -280,7 +280,7 @@ class Work:
         )
 
     def _at_rest(self, hold: int) -> Coincidence:
-        by = self._total("variables", [self.model.holds[hold].motion])[1][0]
+        by = self._total("variables", [self.model.held.motions[hold].motion])[1][0]
         return at_rest(self.model, self.point, hold, by)
 
     def _begin_again(self, entering: list[int]) -> list[int]:
@@ -291,7 +291,7 @@ class Work:
         x, self.x = self.struck
         d = self.point.d.copy()
         for k in self.entered:
-            d[self.model.holds[k].mode] = self.model.holds[k].number
+            d[self.model.held.motions[k].mode] = self.model.held.motions[k].number
         self.point = replace(self.point, x=x.copy(), d=d)
         self.share()
         return sorted(self.entered)
@@ -303,7 +303,7 @@ class Work:
     def _project(self, targets: list[int], values: list[tuple[float, Vector]]) -> None:
         """Change the states as little as possible until variables have their new values; see events.c."""
         model = self.model
-        nodes = [model.reset_nodes[k] for k in targets]
+        nodes = [model.events.reset_nodes[k] for k in targets]
         solve_implicit(model, self.point)
         present, slope = self._total("variables", nodes)
         back = np.linalg.pinv(slopes(model, self.point, "variables", nodes).x)

@@ -89,18 +89,18 @@ class Kinks:
             integrands: gives those of the quadratures at a point.
         """
         model = self.model
-        rates, sides = call(model, model.ode, at), list[Vector]()
+        rates, sides = call(model, model.equations.ode, at), list[Vector]()
         for side in (-1.0, 1.0):
             for away in _AWAY * max(1.0, abs(at.t)):
                 point = Point(at.t + side * away, at.x + side * away * rates, at.z.copy(), at.d)
                 solve_implicit(model, point)
                 if self.at(point)[number] * begin[number] * side < 0.0:
-                    sides.append(np.concatenate([call(model, model.ode, point), integrands(point)]))
+                    sides.append(np.concatenate([call(model, model.equations.ode, point), integrands(point)]))
                     break
         if len(sides) < 2:
             return None  # it only touches the kink
         sizes = np.ones(len(sides[0]))
-        sizes[: len(rates)] = model.nominals
+        sizes[: len(rates)] = model.equations.nominals
         jumps = np.flatnonzero(np.abs(sides[1] - sides[0]) > _JUMP * (sizes + np.abs(sides[0]) + np.abs(sides[1])))
         if not jumps.size:
             return None

@@ -43,11 +43,11 @@ def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vec
     states = np.zeros((size.x, len(moved)))
     if kind == "steady":
         # States that equilibrium does not determine keep their start values or defaults.
-        for number, entry in enumerate(model.starts):
+        for number, entry in enumerate(model.starts.entries):
             if entry.strength == "default" and entry.state is not None:
                 states[entry.state[0]] = values[number] / entry.state[1]
     for state, number in plan.direct:
-        states[state] = values[number] / (model.starts[number].state or (state, 1.0))[1]
+        states[state] = values[number] / (model.starts.entries[number].state or (state, 1.0))[1]
     if kind == "steady":
         theta = np.concatenate([np.eye(size.fixed), starts])
         states = steady_change(model, point, theta, states)
@@ -60,11 +60,11 @@ def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vec
 
 def _determined(model: CompiledDae, point: Point, x: Vector, d: Vector) -> Vector:
     """Derivatives of discrete values, those with an equation by it; see initialize.started."""
-    places = [(k, row.reset.index) for k, row in enumerate(model.update_rows) if row.at_start]
+    places = [(k, row.reset.index) for k, row in enumerate(model.events.update_rows) if row.at_start]
     if not places:
         return d
     (rows, variables), before = map(list, zip(*places, strict=True)), point.copy()
-    before.d[variables] = call(model, model.discrete_starts, point)[variables]
+    before.d[variables] = call(model, model.starts.discretes, point)[variables]
     part, fixed = slopes(model, before, "updates"), x.shape[1]
     total = part.x @ x + part.theta[:, :fixed] + part.theta[:, fixed:] @ d
     d[variables] = total[rows]
@@ -75,7 +75,7 @@ def _by_parameters(model: CompiledDae, name: str) -> ca.Function:
     """Derivatives of a function by (p, u), sparse."""
     given = model.arguments
     fixed = ca.vertcat(given["p"], given["u"])
-    return ca.Function("slopes", [*given.values()], [ca.jacobian(getattr(model, name)(*given.values()), fixed)])
+    return ca.Function("slopes", [*given.values()], [ca.jacobian(model.functions[name](*given.values()), fixed)])
 
 
 def _follow(

@@ -85,7 +85,7 @@ def try_step(functions: StepFunctions, point: Point, h: float, last: Step | None
             return None, np.inf
         error, quadratures = functions.finish(point.t, h, point.x, W, *theta, point.z)
     after = Point(point.t + h, W[-nx - nz : W.size - nz].copy(), W[W.size - nz :].copy(), point.d)
-    scale = np.maximum(np.abs(point.x), np.abs(after.x)) + ABSOLUTE * model.nominals
+    scale = np.maximum(np.abs(point.x), np.abs(after.x)) + ABSOLUTE * model.equations.nominals
     norm = functions.tolerances.norm(error / scale)
     return (Step(functions, point, after, h, W, quadratures), norm) if norm < np.inf else (None, np.inf)
 
@@ -93,7 +93,7 @@ def try_step(functions: StepFunctions, point: Point, h: float, last: Step | None
 def _solved(functions: StepFunctions, point: Point, h: float, W: Vector) -> Vector | None:
     """The stages by Newton's method, or None if it does not converge."""
     model = functions.model
-    scale = np.concatenate([np.abs(point.x) + ABSOLUTE * model.nominals, 1.0 + np.abs(point.z)])
+    scale = np.concatenate([np.abs(point.x) + ABSOLUTE * model.equations.nominals, 1.0 + np.abs(point.z)])
     weights = np.concatenate([functions.tolerances.rtol * scale] * len(functions.tableau.nodes))
     size = np.inf
     for _ in range(_ITERATIONS):

@@ -163,7 +163,7 @@ class StepFunctions:
     @cached_property
     def _values(self) -> Any:
         given = self.model.arguments.values()
-        return ca.vertcat(self.model.ode(*given), self.model.alg(*given))
+        return ca.vertcat(self.model.equations.ode(*given), self.model.equations.alg(*given))
 
     @cached_property
     def _unknowns(self) -> tuple[Any, Any]:

@@ -56,7 +56,7 @@ class Tangents:
         """Return the estimated error in a step over what is allowed, relative to the largest derivatives so far."""
         end, error = step.tangent(self._carried[-1])
         self._tried = step, end
-        nominals, largest = self._model.nominals, np.fmax(self._largest, np.abs(end[: len(self._largest)]))
+        nominals, largest = self._model.equations.nominals, np.fmax(self._largest, np.abs(end[: len(self._largest)]))
         scale = np.maximum(largest, _UNFELT * np.max(largest / nominals) * nominals)
         return self._tolerances.norm(error / scale) if np.all(scale > 0.0) else 0.0
 

@@ -72,7 +72,7 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
     for event in events:
         if event.round or event.transition < 0:
             continue
-        transition = model.transitions[event.transition]
+        transition = model.events.transitions[event.transition]
         trigger = (
             _moment(model, before, transition) if transition.timed else _crossing(model, before, transition, begin)
         )
@@ -88,7 +88,7 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
     triggers = _give_way_together(model, before, triggers)
     first, trigger = triggers[0]
     theta = np.concatenate([model.p, model.u, before.d])
-    weights = np.concatenate([np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)])
+    weights = np.concatenate([np.maximum(np.abs(before.x), model.equations.nominals), np.maximum(np.abs(theta), 1.0)])
     nx = len(before.x)
     spans = [float(np.max(np.abs(t.by[:nx]) * weights[:nx])) for _, t in triggers]
     size = SAME * max(before.t - begin.t, abs(before.t), *spans)
@@ -107,9 +107,13 @@ def _give_way_together(
 
     Each limit moves with the split, and what they bear together does not.
     """
-    for circuit in model.circuits:
-        modes = {model.holds[k].mode for k in circuit.members if before.d[model.holds[k].mode] == model.holds[k].number}
-        fired = [model.transitions[event.transition] for event, _ in triggers]
+    for circuit in model.held.circuits:
+        modes = {
+            model.held.motions[k].mode
+            for k in circuit.members
+            if before.d[model.held.motions[k].mode] == model.held.motions[k].number
+        }
+        fired = [model.events.transitions[event.transition] for event, _ in triggers]
         those = [k for k, transition in enumerate(fired) if not transition.timed and transition.mode in modes]
         shared = circuit.shares(before.d).any(axis=1)
         if len(those) < 2 or not shared.any():
@@ -129,7 +133,7 @@ def _give_way_together(
 
 def _difference(model: CompiledDae, before: Point, by: Vector) -> Vector:
     """The difference of two triggers, without motions that modes hold, which cannot move."""
-    nodes = [model.holds[k].motion for k in holding(model, before)]
+    nodes = [model.held.motions[k].motion for k in holding(model, before)]
     if not nodes or not np.any(by[: len(before.x)]):
         return by
     held = slopes(model, before, "variables", nodes)
@@ -142,8 +146,8 @@ def either_first(model: CompiledDae, before: Point, events: tuple[Event, ...], a
     What the later one does in between is undone by what it then holds. The one that comes first must hold alone, and
     the other one must still come.
     """
-    pair = [model.transitions[event.transition] for event in events if not event.round and event.transition >= 0]
-    held = {(model.holds[k].mode, model.holds[k].number) for k in holding(model, after)}
+    pair = [model.events.transitions[event.transition] for event in events if not event.round and event.transition >= 0]
+    held = {(model.held.motions[k].mode, model.held.motions[k].number) for k in holding(model, after)}
     if len(pair) != 2 or any(t.timed or (t.mode, t.target) not in held for t in pair):
         return False
     for first, second in (pair, pair[::-1]):
@@ -167,8 +171,8 @@ def _crossing(model: CompiledDae, before: Point, transition: CompiledTransition,
     """Event time of a guard: it moves by minus its change over its rate; None if it only grazes zero."""
     part = slopes(model, before, "guards", [transition.index])
     rate = float(part.rate[0])
-    change = abs(float(call(model, model.guards, begin)[transition.index]))
-    terms = float(np.abs(part.x[0]) @ (np.abs(before.x) + model.nominals))
+    change = abs(float(call(model, model.events.guards, begin)[transition.index]))
+    terms = float(np.abs(part.x[0]) @ (np.abs(before.x) + model.equations.nominals))
     if not rate * (before.t - begin.t) > _GRAZING * change + _ROUNDING * terms:
         return None
     return Trigger(-float(part.value[0]) / rate, -part.by[0] / rate)
@@ -193,11 +197,11 @@ def at_rest(model: CompiledDae, point: Point, hold: int, by: Vector) -> Coincide
         hold: position of the held motion.
         by: derivative of the motion by (x, theta) before the event.
     """
-    one = model.holds[hold]
+    one = model.held.motions[hold]
     mode, motion = model.flat_discretes[one.mode], model.flat_variables[one.motion].path
     held = f"{mode.path} becomes {mode.names[one.number]}"
     speed = slopes(model, point, "variables", [one.motion])
-    size = SAME * float(np.abs(speed.x[0]) @ (np.abs(point.x) + model.nominals))
+    size = SAME * float(np.abs(speed.x[0]) @ (np.abs(point.x) + model.equations.nominals))
     error = NoGradient(
         f"No gradient at t = {point.t:.9g} s: {held}, because {motion} is zero.",
         why="A small change of a parameter decides which way it moves first, so the derivatives on both sides differ.",

@@ -60,7 +60,7 @@ class _Change:
         """Compare the points before and after."""
         rates = [slopes(chain.model, point, "ode").value for point in (before, after)]
         integrands = [chain.functions.integrands(point).copy() for point in (before, after)]
-        x = np.abs(before.x) + chain.model.nominals
+        x = np.abs(before.x) + chain.model.equations.nominals
         sizes = x, np.sum(np.abs(rates), axis=0), np.sum(np.abs(integrands), axis=0)
         return cls(after.x - before.x, rates[1] - rates[0], integrands[1] - integrands[0], sizes)
 
@@ -123,8 +123,8 @@ def _modes_before(chain: Replay, passed: CompiledTransition, moment: Slopes) -> 
 def _passed_over(chain: Replay) -> Iterator[tuple[CompiledTransition, Slopes]]:
     """Timed transitions at the start that lead to its modes, also by others there, and their moments."""
     model, start = chain.model, chain.nodes[0]
-    moments = call(model, model.moments, start)
-    there = [one for one in model.transitions if one.timed and _same(chain, float(moments[one.index]), start.t)]
+    moments = call(model, model.events.moments, start)
+    there = [one for one in model.events.transitions if one.timed and _same(chain, float(moments[one.index]), start.t)]
     reached = {(one.mode, start.d[one.mode]) for one in there}
     while ready := [one for one in there if (one.mode, one.target) in reached]:
         there = [one for one in there if one not in ready]

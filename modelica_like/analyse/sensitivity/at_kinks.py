@@ -51,7 +51,7 @@ def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
     given = [*model.arguments.values()]
 
     def make() -> ca.Function:
-        values = [_equations(model, texts), model.guards(*given)]
+        values = [_equations(model, texts), model.events.guards(*given)]
         arguments = {str(kink): kink for kink in arguments_of_kinks(ca.Function("equations", given, values), given)}
         # A guard at zero decides about the modes on one side, which edges judge by accelerations only.
         return ca.Function("arguments", given, [ca.densify(ca.SX(ca.vertcat(*arguments.values(), values[1])))])
@@ -95,7 +95,7 @@ def natural_size(chain: Replay, outputs: Sequence[Output], position: int) -> flo
     given = [*model.arguments.values()]
     fast = model.fast(f"equations and {texts}", lambda: ca.Function("sizes", given, [_equations(model, texts)]))
     span = chain.nodes[-1].t - chain.nodes[0].t
-    x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.nominals
+    x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.equations.nominals
     z = np.max([np.abs(node.z) for node in chain.nodes], axis=0)
     values, least, seen = np.concatenate([model.p, model.u]), np.inf, False
 
@@ -126,7 +126,7 @@ def _in_other_modes(chain: Replay, position: int) -> Iterator[Point]:
     for node in (chain.nodes[0], chain.nodes[-1]):
         yield node
         by = slopes(model, node, "guards").theta[:, position]
-        for mode in {t.mode for t in model.transitions if not t.timed and by[t.index]}:
+        for mode in {t.mode for t in model.events.transitions if not t.timed and by[t.index]}:
             for number in range(len(model.flat_discretes[mode].names)):
                 other = node.copy()
                 other.d[mode] = number
@@ -141,7 +141,7 @@ def _equations(model: CompiledDae, texts: Sequence[str]) -> Any:
     """Derivatives of the states, residuals and what is asked for, as a column."""
     given = [*model.arguments.values()]
     read = (expression_of(model, text)[0]() for text in texts)
-    return ca.densify(ca.SX(ca.vertcat(model.ode(*given), model.alg(*given), *read)))
+    return ca.densify(ca.SX(ca.vertcat(model.equations.ode(*given), model.equations.alg(*given), *read)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +238,7 @@ class Sides:
     def _noise(self, here: Vector) -> Vector:
         """Errors of what is read."""
         looser = self._here(_LOOSER)
-        tolerances = _SAFE * self._options(1.0).atol * self.solution.model.nominals
+        tolerances = _SAFE * self._options(1.0).atol * self.solution.model.equations.nominals
         rest = [sum(float(np.abs(row[: len(tolerances)]) @ tolerances) for _, row in r.parts) for r in self.readings]
         return np.array(rest) + (np.abs(here) if looser is None else np.abs(looser - here))
 

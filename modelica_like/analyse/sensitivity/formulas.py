@@ -61,7 +61,9 @@ def free_formulas(drive: Model, names: Sequence[str], values: Mapping[str, Any] 
     p = model.with_parameters(given).p
     rows = [model.derived_position[name] for name in bound]
     symbols = model.arguments["p"]
-    formulas = ca.Function("formulas", [symbols], [(f := model.derived(symbols)[rows]), ca.jacobian(f, symbols)])
+    formulas = ca.Function(
+        "formulas", [symbols], [(f := model.equations.derived(symbols)[rows]), ca.jacobian(f, symbols)]
+    )
     results, slopes = (np.asarray(formula.full()) for formula in formulas(p))
     return Freed(
         build(drive, free=bound),
@@ -90,5 +92,5 @@ def bound_by_formula(model: CompiledDae, name: str) -> LanguageError:
 def _formula(model: CompiledDae, name: str) -> tuple[Any, list[int]]:
     """The formula of a derived parameter, and positions of the independent ones in it."""
     p = model.arguments["p"]
-    formula = model.derived(p)[model.derived_position[name]]
+    formula = model.equations.derived(p)[model.derived_position[name]]
     return formula, [k for k in range(len(model.p)) if ca.depends_on(formula, p[k])]

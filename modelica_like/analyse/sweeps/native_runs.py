@@ -83,7 +83,7 @@ class NativeRuns:
                 parameter = model.flat_parameters[place]
                 fine &= _within(points[:, column], parameter.min, parameter.max) & parameter.tunable
         if any(f.min is not None or f.max is not None for f in model.flat_derived):
-            for parameter, values in zip(model.flat_derived, model.derived(p.T).full(), strict=True):
+            for parameter, values in zip(model.flat_derived, model.equations.derived(p.T).full(), strict=True):
                 fine &= np.isfinite(values) & _within(values, parameter.min, parameter.max)
         refusals: dict[int, str] = {}
         for k in np.flatnonzero(~fine).tolist():
@@ -109,13 +109,16 @@ def _with_expressions(model: CompiledDae, parts: Sequence[Part]) -> CompiledDae:
 
 
 def _with(model: CompiledDae, more: Mapping[str, Part]) -> CompiledDae:
-    column = ca.vertcat(model.variables(*model.arguments.values()), *(part.expression(model) for part in more.values()))
-    names = model.variables.name_in()
+    column = ca.vertcat(
+        model.equations.variables(*model.arguments.values()), *(part.expression(model) for part in more.values())
+    )
+    names = model.equations.variables.name_in()
     variables = ca.Function("variables", [*model.arguments.values()], [ca.densify(column)], names, ["variables"])
+    equations = replace(model.equations, variables=variables)
     like = model.flat_variables[0]
     further = [replace(like, path=path, unit=ONE, kind="local") for path in more]
-    twin = model.twin(variables=variables, flat_variables=(*model.flat_variables, *further), _cache={})
-    for name in ("position", "units"):
+    twin = model.twin(equations=equations, flat_variables=(*model.flat_variables, *further), _cache={})
+    for name in ("position", "units", "functions"):
         twin.__dict__.pop(name, None)
     return twin
 
@@ -125,6 +128,6 @@ def _readings(model: CompiledDae, extended: CompiledDae, part: Part) -> list[Rea
     if part.kind == "change":
         return [Reading("change", model.discrete_position[part.text], part.change)]
     if part.kind == "impact":
-        places = [k for k, hold in enumerate(model.holds) if part.text in ("", hold.component)]
+        places = [k for k, hold in enumerate(model.held.motions) if part.text in ("", hold.component)]
         return [Reading("impact", k) for k in places]
     return [Reading(part.kind, extended.position[_key(part)], moment=part.moment)]

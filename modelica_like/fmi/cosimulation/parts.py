@@ -106,7 +106,7 @@ class Maker:
         part = self.bare(group, ends)
         model = compile(reduce(flatten(part, open_inputs=True)))
         given, kept = set[int](), dict[str, float]()
-        for entry in model.starts:
+        for entry in model.starts.entries:
             if entry.strength != "fixed":
                 continue
             path = model.flat_variables[entry.node].path

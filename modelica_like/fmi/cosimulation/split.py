@@ -171,7 +171,7 @@ def _start_values(assembly: Assembly) -> dict[str, float]:
     """Return all variables of the whole drive at its start, in SI units."""
     whole = build(assembly)
     point = upper.initialize(whole, 0.0, whole.settings.get("start", "given"))
-    column = whole.variables(point.t, point.x, point.z, whole.p, whole.u, point.d).full().ravel()
+    column = whole.equations.variables(point.t, point.x, point.z, whole.p, whole.u, point.d).full().ravel()
     return {variable.path: float(value) for variable, value in zip(whole.flat_variables, column, strict=True)}
 
 

@@ -181,9 +181,7 @@ def _looks(part: Component, run: Trajectories) -> Iterator[tuple[float, str, str
     path, mode = path_of(part), part.modes[name]
     values = run[f"{path}.{name}"].astype(int)
     # A hold knows its reaction only by the node of the flat system, and some have none.
-    held = next(
-        (hold for hold in getattr(run.model, "holds", ()) if hold.component == path and hold.reaction >= 0), None
-    )
+    held = next((hold for hold in run.model.held.motions if hold.component == path and hold.reaction >= 0), None)
     carried = np.abs(run[run.model.flat_variables[held.reaction].path]) if held else np.ones(len(values))
     changes = [0, *(np.flatnonzero(np.diff(values)) + 1), len(values)]
     for k, end in pairwise(changes):

@@ -65,7 +65,7 @@ def reasons(run: Trajectories) -> list[str]:
         key, (component, dot, _) = (event.mode, event.transition), event.mode.rpartition(".")
         if key not in texts:
             by_itself = "an impact" if event.source.file else ""  # FMUs do not tell why
-            because = by_itself if event.transition < 0 else run.model.transitions[event.transition].because
+            because = by_itself if event.transition < 0 else run.model.events.transitions[event.transition].because
             texts[key] = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: valued(owner + name[1]), because)
     return [texts[event.mode, event.transition] for event in run.events]
 
@@ -75,7 +75,7 @@ def _plain(event: Event, why: str) -> Change:
 
 
 def _timed(run: Trajectories, event: Event) -> bool:
-    return event.transition >= 0 and run.model.transitions[event.transition].timed
+    return event.transition >= 0 and run.model.events.transitions[event.transition].timed
 
 
 def _visible(run: Trajectories, behind: Sequence[Change], *, timed: bool) -> list[Change]:

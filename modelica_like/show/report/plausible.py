@@ -55,9 +55,9 @@ def run_notes(drive: Component, run: Solution, *, energy: bool = True) -> list[s
         run: its run.
         energy: also what energies tell, which takes time.
     """
-    idle = [*dict.fromkeys(hold.component for hold in run.model.holds if _idle(drive, run, hold))]
+    idle = [*dict.fromkeys(hold.component for hold in run.model.held.motions if _idle(drive, run, hold))]
     names = " and ".join(filter(None, [", ".join(idle[:-1]), *idle[-1:]]))
-    held = dict.fromkeys(note for hold in run.model.holds for note in _unopened(drive, run, hold))
+    held = dict.fromkeys(note for hold in run.model.held.motions for note in _unopened(drive, run, hold))
     verb = "engages: its input is" if len(idle) == 1 else "engage: their inputs are"
     return [
         *([f"{names} never {verb} 0 during the whole run."] if idle else []),

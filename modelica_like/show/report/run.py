@@ -115,8 +115,11 @@ def notices(solution: Trajectories) -> list[str]:
     """
     notes: dict[tuple[str, str], str] = {}
     for event in (e for e in solution.events if e.transition >= 0):
-        notice, (component, dot, _) = solution.model.transitions[event.transition].notice, event.mode.rpartition(".")
-        ends = solution.model.transitions[event.transition].ends
+        notice, (component, dot, _) = (
+            solution.model.events.transitions[event.transition].notice,
+            event.mode.rpartition("."),
+        )
+        ends = solution.model.events.transitions[event.transition].ends
         if notice and not ends and (component, notice) not in notes:
             path = component + dot
             values = NAME_IN_NOTICE.sub(lambda name, path=path: _largest(solution, path + name[1]), notice)

@@ -63,9 +63,9 @@ def start_values(drive: Component, model: CompiledDae, kind: StartKind = "given"
     """Return given, assumed and computed start values of the states, in this order, for a kind of start."""
     point = initialize(model, start=kind)
     plan = start_plan(model, kind, point)
-    variables = call(model, model.variables, point)
+    variables = call(model, model.equations.variables, point)
     origins: dict[str, str] = {}
-    for k, entry in enumerate(model.starts):
+    for k, entry in enumerate(model.starts.entries):
         path = start_name(model, entry)
         if entry.strength == "fixed":
             origins[path] = _given(drive, path)
@@ -114,9 +114,9 @@ def _follows(model: CompiledDae, plan: StartPlan, point: Point, states: list[int
     y = np.zeros(plan.system.function.size1_out(0))
     whole, _ = matrix_and_values(model, plan.system, point, y)
     wanted, columns = list(plan.wanted), list(plan.columns)
-    given = [start_name(model, model.starts[k]) for k in plan.rows]
+    given = [start_name(model, model.starts.entries[k]) for k in plan.rows]
     given += [model.flat_variables[k].path if k < len(model.flat_variables) else "" for k in plan.resting]
-    given += [start_name(model, model.starts[k]) for _, k in plan.direct]
+    given += [start_name(model, model.starts.entries[k]) for _, k in plan.direct]
     matrix = whole[wanted, columns].T
     direct = whole[wanted, [state for state, _ in plan.direct]]
     for begin in range(0, len(states), _AT_ONCE):

@@ -17,7 +17,7 @@ def _valued(model: CompiledDae, entry: StartEntry, value: float) -> str:
 
 def same_motion(model: CompiledDae, first: tuple[int, float], second: tuple[int, float]) -> ContradictingStart:
     """Return the error of two start values (number in `starts`, and value) of one state."""
-    told = [_valued(model, model.starts[number], value) for number, value in (first, second)]
+    told = [_valued(model, model.starts.entries[number], value) for number, value in (first, second)]
     return ContradictingStart(
         f"{told[0]} and {told[1]} contradict each other: they are the same motion.",
         advice="Remove one of the two start values.",
@@ -37,7 +37,7 @@ def not_found(model: CompiledDae, kind: StartKind, point: Point) -> Initializati
 
 def not_together(model: CompiledDae, plan: StartPlan) -> InitializationError:
     """Return the error of start values that no start has together."""
-    given = [start_name(model, model.starts[k]) for k in plan.rows]
+    given = [start_name(model, model.starts.entries[k]) for k in plan.rows]
     resting = [model.flat_variables[k].path for k in plan.resting if k < len(model.flat_variables)]
     have = f"{', '.join(given[:6])} {'have' if len(given) > 1 else 'has'} the requested value" if given else ""
     rest = f"{', '.join(resting[:6])} {'are' if len(resting) > 1 else 'is'} at rest" if resting else ""
@@ -53,10 +53,10 @@ def not_met(model: CompiledDae, present: Vector, number: int, value: float) -> C
     Args:
         model: the compiled model.
         present: all variables at the start with the others.
-        number: of the start value in `CompiledDae.starts`.
+        number: of the start value in `Starts.entries`.
         value: what it should be.
     """
-    starts = model.starts
+    starts = model.starts.entries
     entry = starts[number]
     fixed = [e for e in starts if e.strength == "fixed" and e is not entry and _coupled(model, entry, e)]
     partners, told = [_valued(model, e, present[e.node]) for e in fixed[:2]], _valued(model, entry, value)
@@ -65,14 +65,14 @@ def not_met(model: CompiledDae, present: Vector, number: int, value: float) -> C
     name = sides if told.startswith(INITIAL_EQUATION) else start_name(model, entry)
     return ContradictingStart(
         f"{' and '.join([*partners, told])} {wrong}: {name} would be {present[entry.node]:g}.",
-        where=[o.source for o in model.differentiated if o.source.file][:3],
+        where=[o.source for o in model.equations.differentiated if o.source.file][:3],
         advice="Remove one of the start values, or make one a guess.",
     )
 
 
 def _coupled(model: CompiledDae, first: StartEntry, second: StartEntry) -> bool:
     """Return whether two variables depend on a common state."""
-    by_variable = model.variables.jac_sparsity(0, 1).T
+    by_variable = model.equations.variables.jac_sparsity(0, 1).T
     starts, states = by_variable.colind(), by_variable.row()
     columns = [set(states[starts[e.node] : starts[e.node + 1]]) for e in (first, second)]
     return bool(columns[0] & columns[1])

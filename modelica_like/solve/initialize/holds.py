@@ -35,7 +35,7 @@ class Impact:
 
 def terms(model: CompiledDae, point: Point) -> Any:
     """Gain, capacities and restitution of every held motion; shape (holds, TERMS)."""
-    return call(model, model.hold_terms, point).reshape(len(model.holds), TERMS)
+    return call(model, model.held.terms, point).reshape(len(model.held.motions), TERMS)
 
 
 def capacities(model: CompiledDae, point: Point) -> Any:
@@ -45,7 +45,7 @@ def capacities(model: CompiledDae, point: Point) -> Any:
 
 def holding(model: CompiledDae, point: Point) -> list[int]:
     """Positions of the held motions at a point."""
-    asked = [k for k, one in enumerate(model.holds) if point.d[one.mode] == one.number]
+    asked = [k for k, one in enumerate(model.held.motions) if point.d[one.mode] == one.number]
     if not asked:
         return []
     gains = terms(model, point)[:, 0]
@@ -55,9 +55,9 @@ def holding(model: CompiledDae, point: Point) -> list[int]:
 def sharing(model: CompiledDae, point: Point) -> list[tuple[str, ...]]:
     """Components that share a held motion at a point, circuit by circuit."""
     found: list[tuple[str, ...]] = []
-    for circuit in model.circuits:
+    for circuit in model.held.circuits:
         shares = circuit.shares(point.d)
         for row in shares[np.any(shares != 0.0, axis=1)]:
-            parts = (model.holds[k].component for k, part in zip(circuit.members, row, strict=True) if part)
+            parts = (model.held.motions[k].component for k, part in zip(circuit.members, row, strict=True) if part)
             found.append(tuple(dict.fromkeys(parts)))
     return found

@@ -32,13 +32,13 @@ def refuse_contradiction(model: CompiledDae, point: Point) -> None:
     Raises:
         NoValidModes: an element's voltage or current that its mode makes zero is not zero.
     """
-    network = model.ideal
+    network = model.held.ideal
     if network is None:
         return
     rows = point.d[network.entries].reshape(len(network.elements), network.width)
     if not rows[:, HEAD - 1].any():
         return
-    values = call(model, model.variables, point)
+    values = call(model, model.equations.variables, point)
     for k in rows[:, HEAD - 1].nonzero()[0]:
         element = network.elements[k]
         node = _zero(element, point.d)
@@ -62,16 +62,16 @@ def contradiction(model: CompiledDae, point: Point, number: int) -> NoValidModes
 
 def _wrong(model: CompiledDae, point: Point, number: int) -> tuple[IdealElement, int, float]:
     """An element, and the node and value of what its mode makes zero."""
-    assert model.ideal is not None
-    element = model.ideal.elements[number]
+    assert model.held.ideal is not None
+    element = model.held.ideal.elements[number]
     node = _zero(element, point.d)
-    return element, node, float(call(model, model.variables, point)[node])
+    return element, node, float(call(model, model.equations.variables, point)[node])
 
 
 def no_valid_modes(model: CompiledDae, point: Point, number: int) -> NoValidModes:
     """Return the error of an ideal element, given by its number, whose impulse no mode ends."""
-    assert model.ideal is not None
-    network, (_, node, value) = model.ideal, _wrong(model, point, number)
+    assert model.held.ideal is not None
+    network, (_, node, value) = model.held.ideal, _wrong(model, point, number)
     row = point.d[network.entries].reshape(len(network.elements), network.width)[number]
     parts = [one for one in network.elements if row[HEAD + one.row]]
     modes = [f"{one.component} {model.flat_discretes[one.mode].names[int(point.d[one.mode])]}" for one in parts]

@@ -49,13 +49,13 @@ def find_kept(model: CompiledDae, point: Point, states: list[int], jacobian: Mat
     held: list[int] = []
     rows = np.zeros((0, len(states)))
     for k in holding(model, point) if len(conserved) else ():
-        row = variable_slopes(model, point, [model.holds[k].motion])[0][states]
+        row = variable_slopes(model, point, [model.held.motions[k].motion])[0][states]
         if _lies_in(conserved, row) and not _lies_in(_orthonormal(rows), row):
-            held.append(model.holds[k].motion)
+            held.append(model.held.motions[k].motion)
             rows = np.vstack([rows, row])
     known = _orthonormal(rows)
     others = _orthonormal(conserved - conserved @ known.T @ known)
-    missing = -call(model, model.variables, point)[held] if held else np.zeros(0)
+    missing = -call(model, model.equations.variables, point)[held] if held else np.zeros(0)
     return Kept(tuple(held), missing, np.vstack([rows, others]))
 
 

@@ -177,7 +177,7 @@ def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> An
 def direct_starts(model: CompiledDae) -> dict[int, int]:
     """Return the number of the first fixed start value of every state that has one, by state."""
     found: dict[int, int] = {}
-    for number, entry in enumerate(model.starts):
+    for number, entry in enumerate(model.starts.entries):
         if entry.strength == "fixed" and entry.state is not None:
             found.setdefault(entry.state[0], number)
     return found
@@ -201,23 +201,25 @@ class _Choice:
     def plan(self, matrix: Any) -> StartPlan:
         """Choose by structure, or by the numbers of a Jacobian."""
         direct = tuple(self.direct.items())
-        general = [k for k, e in enumerate(self.model.starts) if e.strength == "fixed" and e.state is None]
+        general = [k for k, e in enumerate(self.model.starts.entries) if e.strength == "fixed" and e.state is None]
         if self.kind == "steady" or not (self.free or general):
             return StartPlan(self.kind, self.system, direct)
         # Where modes do not determine reactions, redundant implicit equations and as many reactions are left out.
         own = self._begin(matrix)
         kept = self._keep(len(own) < self.own)
-        rows = [k for k in general if self._accept(self.model.starts[k].node)]
+        rows = [k for k in general if self._accept(self.model.starts.entries[k].node)]
         taken = set(rows)
         dependent = [k for k in general if k not in taken]
         # What nothing else determines starts at its guess rather than at rest.
-        rows += [k for k in (*self.system.guesses, *self._defaults()) if self._accept(self.model.starts[k].node)]
+        rows += [
+            k for k in (*self.system.guesses, *self._defaults()) if self._accept(self.model.starts.entries[k].node)
+        ]
         resting, zero = self._rest()
         if self.choice.size < len(self.columns):
             raise self._missing()
         known = {*zero, *kept}
         columns = [column for column in self.columns if column not in known]
-        nodes = [*(self.model.starts[k].node for k in rows), *resting]
+        nodes = [*(self.model.starts.entries[k].node for k in rows), *resting]
         wanted = [*own, *(self.row_of[node] for node in nodes)]
         lists = (rows, dependent, resting, zero, columns, wanted)
         return StartPlan(self.kind, self.system, direct, *map(tuple, lists))
@@ -246,8 +248,8 @@ class _Choice:
 
     def _defaults(self) -> list[int]:
         """Defaults in an order that does not depend on the order of lines."""
-        chosen = [k for k, e in enumerate(self.model.starts) if e.strength == "default"]
-        return sorted(chosen, key=lambda k: start_name(self.model, self.model.starts[k]))
+        chosen = [k for k, e in enumerate(self.model.starts.entries) if e.strength == "default"]
+        return sorted(chosen, key=lambda k: start_name(self.model, self.model.starts.entries[k]))
 
     def _rest(self) -> tuple[list[int], list[int]]:
         """Variables and states at rest."""

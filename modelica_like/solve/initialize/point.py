@@ -99,7 +99,7 @@ def not_solved(model: CompiledDae, point: Point) -> InitializationError:
 def implicit_at(model: CompiledDae) -> ca.Function:
     """Return residuals of the implicit equations and their dense Jacobian, columns one after the other."""
     arguments = list(model.arguments.values())
-    both = ca.cse([model.alg(*arguments), ca.densify(model.alg_jacobian(*arguments))])
+    both = ca.cse([model.equations.alg(*arguments), ca.densify(model.equations.alg_jacobian(*arguments))])
     return ca.Function("residual", arguments, both)
 
 
@@ -148,7 +148,7 @@ def polished(model: CompiledDae, times: Vector, x: Vector, z: Vector, d: Vector)
 
 def is_linear(model: CompiledDae) -> bool:
     """Whether the implicit equations are linear in z: then one step of Newton's method solves them."""
-    slopes = model.alg_jacobian
+    slopes = model.equations.alg_jacobian
     return model.once("linear", lambda: not slopes.jac_sparsity(0, slopes.index_in("z")).nnz())
 
 
@@ -174,11 +174,11 @@ def check_singular(model: CompiledDae, point: Point) -> None:
     fast = model.fast("regular", lambda: _regular(model))
     if not fast(point.t, point.x, point.z, model.p, model.u, point.d)[0][0]:
         return
-    determinants = call(model, model.determinants, point)
+    determinants = call(model, model.equations.determinants, point)
     regular = np.isfinite(determinants) & (np.abs(determinants) >= VANISHES)
     if not regular.all():
         raise singular_block(model, point, int(np.argmin(regular)))
-    finite = np.isfinite(call(model, model.ode, point))
+    finite = np.isfinite(call(model, model.equations.ode, point))
     raise rate_not_finite(model, point, int(np.argmin(finite)))
 
 
@@ -193,6 +193,6 @@ def rate_not_finite(model: CompiledDae, point: Point, state: int) -> SingularAtS
 def _regular(model: CompiledDae) -> ca.Function:
     """Return the numbers of zero determinants and of derivatives that are not finite."""
     arguments = list(model.arguments.values())
-    sizes, rates = ca.fabs(model.determinants(*arguments)), ca.fabs(model.ode(*arguments))
+    sizes, rates = ca.fabs(model.equations.determinants(*arguments)), ca.fabs(model.equations.ode(*arguments))
     wrong = ca.vertcat(0, ca.logic_not(ca.logic_and(sizes >= VANISHES, sizes < np.inf)), ca.logic_not(rates < np.inf))
     return ca.Function("regular", arguments, [ca.cse(ca.densify(ca.sum1(wrong)))])

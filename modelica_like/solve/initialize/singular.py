@@ -35,20 +35,20 @@ def singular_block(model: CompiledDae, point: Place, number: int) -> SingularAtS
     """
 
     def regular(p: Vector) -> bool:
-        value = model.determinants(point.t, point.x, point.z, p, model.u, point.d).full()[number, 0]
+        value = model.equations.determinants(point.t, point.x, point.z, p, model.u, point.d).full()[number, 0]
         return bool(abs(value) >= VANISHES)
 
-    return _singular(model, point, number, model.singular[number], regular)
+    return _singular(model, point, number, model.equations.singular[number], regular)
 
 
 def implicit_singular(model: CompiledDae, point: Place) -> SingularAtStart:
     """Return the error for the first of the implicit blocks that is singular."""
 
     def jacobian(p: Vector) -> Any:
-        return model.alg_jacobian(point.t, point.x, point.z, p, model.u, point.d).full()
+        return model.equations.alg_jacobian(point.t, point.x, point.z, p, model.u, point.d).full()
 
     begin, whole = 0, jacobian(model.p)
-    for number, block in enumerate(model.implicit_blocks):
+    for number, block in enumerate(model.equations.implicit_blocks):
         own = slice(begin, begin + sum(name in block[0] for name in model.implicit))
         if not is_regular(whole[own, own]):
             return _singular(model, point, number, block, lambda p, own=own: is_regular(jacobian(p)[own, own]))
@@ -111,7 +111,7 @@ def is_regular(matrix: Any) -> bool:
 
 
 def _holds(model: CompiledDae, d: Vector, path: str) -> bool:
-    return any(one.component == path and d[one.mode] == one.number for one in model.holds)
+    return any(one.component == path and d[one.mode] == one.number for one in model.held.motions)
 
 
 def _reason(model: CompiledDae, holding: list[str], held: list[str], *, alone: bool) -> tuple[str, str]:

@@ -111,7 +111,7 @@ def slopes(
     """
 
     def make() -> tuple[list[Any], Any]:
-        made: ca.Function = getattr(model, name) if function is None else function()
+        made: ca.Function = model.functions[name] if function is None else function()
         # Linear equations are solved in numbers.
         symbols = [*model.arguments.values()] if made.is_a("SXFunction") else made.mx_in()
         value = made(*symbols)
@@ -139,7 +139,7 @@ def variable_slopes(model: CompiledDae, point: Point, nodes: Sequence[int]) -> V
 
     def make() -> tuple[list[Any], Any]:
         symbols = [*model.arguments.values()]
-        return symbols, model.variables(*symbols)[list(nodes)]
+        return symbols, model.equations.variables(*symbols)[list(nodes)]
 
     _, x = _total(model, point, ("variables", tuple(nodes)), make, ("x",))
     _check_finite(model, point, [x], (model.flat_variables[node].path for node in nodes))
@@ -153,7 +153,7 @@ def implicit_slopes(model: CompiledDae, point: Point, by: _Names = _ALL) -> list
         SingularAtStart: a slope is not finite.
     """
     symbols = [*model.arguments.values()]
-    make = lambda: _Partials(symbols, model.alg(*symbols), by)  # noqa: E731
+    make = lambda: _Partials(symbols, model.equations.alg(*symbols), by)  # noqa: E731
     _, z, *parts = model.once(("slopes of z", by, get_ident()), make)(model, point)
     _check_finite(model, point, [z, *parts], model.implicit)
     right = -np.hstack(parts)

@@ -22,7 +22,7 @@ _NEAR = (
 def not_steady(model: CompiledDae, point: Point) -> InitializationError:
     """Return the error of a point that is not steady: it names what changes most."""
     moving = moving_states(model)
-    rates = np.concatenate([call(model, model.ode, point)[moving], call(model, model.alg, point)])
+    rates = np.concatenate([call(model, model.equations.ode, point)[moving], call(model, model.equations.alg, point)])
     worst = int(np.argmax(np.abs(rates)))
     name = model.states[moving[worst]] if worst < len(moving) else model.implicit[worst - len(moving)]
     return InitializationError(
@@ -42,7 +42,7 @@ def unsettled(model: CompiledDae, old: Vector, modes: Vector) -> InitializationE
 
 def _equations(model: CompiledDae) -> Any:
     arguments = model.arguments.values()
-    return ca.vertcat(model.ode(*arguments), model.alg(*arguments))
+    return ca.vertcat(model.equations.ode(*arguments), model.equations.alg(*arguments))
 
 
 def moving_states(model: CompiledDae) -> list[int]:

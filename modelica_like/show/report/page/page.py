@@ -153,7 +153,7 @@ def _slid(run: Trajectories, change: Change) -> str:
     """Return the friction work of surfaces that begin to hold, since they held last."""
     if not isinstance(run, Solution):
         return ""
-    modes = [(run.model.flat_discretes[hold.mode], hold.number) for hold in run.model.holds]
+    modes = [(run.model.flat_discretes[hold.mode], hold.number) for hold in run.model.held.motions]
     held = {(mode.path, mode.names[number]) for mode, number in modes}
     if (change.path, change.after) not in held:
         return ""
