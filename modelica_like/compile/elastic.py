@@ -84,7 +84,7 @@ def _force_rows(system: System) -> set[int]:
 
 
 def _places(system: System) -> set[int]:
-    kinds, nodes = system.model.equations.variables, zip(system.model.nodes, system.node_level, strict=True)
+    kinds, nodes = system.model.variables, zip(system.model.nodes, system.node_level, strict=True)
     return {placed[0] for (k, _), placed in nodes if placed is not None and kinds[k].kind == "potential"}
 
 
