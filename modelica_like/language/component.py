@@ -10,20 +10,12 @@ from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like import upper
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
-from modelica_like.language.declared import (
-    Connector,
-    Declared,
-    Terminal,
-    annotated,
-    of_kind,
-    refuse_collection,
-    unknown,
-)
+from modelica_like.language.declared import Connector, Declared, Terminal, annotated, refuse_collection, unknown
 from modelica_like.language.equation import Equations
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
 from modelica_like.language.icon import Icon
-from modelica_like.language.inside import Declarations, Inside, InsideComponent, declarations, inside
+from modelica_like.language.inside import Declarations, Inside, InsideComponent, declarations, inside, of_kind
 from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
@@ -200,12 +192,10 @@ class Component(Declared):
     def _set_structural(self, name: str, value: Any) -> None:
         if value is REQUIRED:
             raise LanguageError(f"{type(self).__name__} needs a value for {name}.", where=caller())
-        if name not in self._declared.tables:
+        frozen, table = frozen_rows(value), self._declared.tables.get(name)
+        if table is None:
             self.check_structural(name, value)
-        frozen = frozen_rows(value)
-        self.__dict__[name] = (
-            self._declared.tables[name].store(self, name, frozen) if name in self._declared.tables else frozen
-        )
+        self.__dict__[name] = frozen if table is None else table.store(self, name, frozen)
 
     def value(self, name: str) -> Value | None:
         """Return the value of a parameter or input: given, default, or None."""

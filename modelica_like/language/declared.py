@@ -5,26 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Self, TypeVar, cast
+from typing import Any, ClassVar, Literal, Self, cast
 
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Field, Variable
 from modelica_like.language.icon import Stroke
-from modelica_like.language.inside import Declarations, Inside, InsideConnector
-
-_Kind = TypeVar("_Kind")
+from modelica_like.language.inside import Declarations, Inside, InsideConnector, of_kind
 
 
 def annotated(cls: type) -> Mapping[str, Any]:
     """Return the annotations in the body of a class."""
     return vars(cls).get("__annotations__", {})
-
-
-def of_kind(cls: type, kind: type[_Kind]) -> dict[str, _Kind]:
-    """Return the declarations of one kind in the bodies of a class and its bases."""
-    lineage = reversed(cls.__mro__)
-    return {name: value for base in lineage for name, value in vars(base).items() if isinstance(value, kind)}
 
 
 class Declared:

@@ -12,7 +12,7 @@ import casadi as ca
 from modelica_like.errors import LanguageError, Source
 from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Variable
-from modelica_like.language.inside import Inside, inside
+from modelica_like.language.inside import inside
 from modelica_like.language.places import NOWHERE, caller
 
 MarkerKind = Literal["relation", "floor", "was", "once", "clock", "delay", "sample", "previous", "ending"]
@@ -70,18 +70,12 @@ def marker(kind: MarkerKind, of: Expr, offset: Scalar = 0.0) -> Marker:
     """Return the marker for an expression, the same one for equal expressions."""
     wanted: Any = ca.vertcat(of, offset)
     owner = _owner_in(of)
-    markers = _timed if owner is None else _markers_of(owner)
+    markers: list[Marker] = _timed if owner is None else inside(owner).markers
     same = (m for m in markers if m.kind == kind and ca.is_equal(ca.vertcat(m.of, m.offset), wanted, 99))
     match = next(same, None)
     if match is None:
         markers.append(match := Marker(kind, of, offset))
     return match
-
-
-def _markers_of(owner: Any) -> list[Marker]:
-    kept: Inside = inside(owner)
-    kept.markers = [] if kept.markers is None else kept.markers
-    return kept.markers
 
 
 def _owner_in(expression: Expr) -> Any:

@@ -8,7 +8,7 @@ from weakref import WeakValueDictionary
 
 import casadi as ca
 
-from modelica_like.language.inside import Inside, inside
+from modelica_like.language.inside import inside
 
 if TYPE_CHECKING:
 
@@ -88,12 +88,10 @@ def symbol_of(owner: Any, name: str, order: int = 0) -> Symbol:
         name: of the field.
         order: order of the time derivative.
     """
-    kept: Inside = inside(owner)
-    if kept.symbols is None:
-        kept.symbols = {}
-    if (name, order) not in kept.symbols:
-        kept.symbols[name, order] = Symbol(owner, name, order)
-    return kept.symbols[name, order]
+    cache: dict[tuple[str, int], Symbol] = inside(owner).symbols
+    if (name, order) not in cache:
+        cache[name, order] = Symbol(owner, name, order)
+    return cache[name, order]
 
 
 def symbols_in(expression: Expr) -> list[Symbol]:

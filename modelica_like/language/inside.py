@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
 from modelica_like.errors import Source
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from modelica_like.language.tables import Rows
 
 _Inside = TypeVar("_Inside", covariant=True)
+_Kind = TypeVar("_Kind")
 
 
 def _empty() -> dict[Any, Any]:
@@ -65,22 +67,29 @@ class Inside:
         name: there.
         own_fields: fields that this one alone has, by name.
         joined: these, and together with those of the class; made on first use.
-        symbols: of its fields, by name and order of the derivative.
-        markers: of expressions of these symbols.
     """
 
     owner: Declared | None = None
     name: str = ""
     own_fields: dict[str, Field] = field(default_factory=_empty)
     joined: tuple[dict[str, Field], dict[str, Field]] | None = None
-    symbols: dict[tuple[str, int], Symbol] | None = None
-    markers: list[Marker] | None = None
+
+    @cached_property
+    def symbols(self) -> dict[tuple[str, int], Symbol]:
+        """Of its fields, by name and order of the derivative."""
+        return {}
+
+    @cached_property
+    def markers(self) -> list[Marker]:
+        """Of expressions of these symbols."""
+        return []
 
     def detached(self) -> Self:
         """Return a copy without what is valid in one process, and for one instance, only."""
         twin = object.__new__(type(self))  # `copy` takes three times as long
         twin.__dict__.update(self.__dict__)
-        twin.symbols = twin.markers = None
+        twin.__dict__.pop("symbols", None)
+        twin.__dict__.pop("markers", None)
         return twin
 
 
@@ -155,6 +164,12 @@ class InsideAssembly(InsideComponent):
     sizing: str = ""
     places: dict[str, Source] = field(default_factory=_empty)
     made: Source = NOWHERE
+
+
+def of_kind(cls: type, kind: type[_Kind]) -> dict[str, _Kind]:
+    """Return the declarations of one kind in the bodies of a class and its bases."""
+    lineage = reversed(cls.__mro__)
+    return {name: value for base in lineage for name, value in vars(base).items() if isinstance(value, kind)}
 
 
 class _Instance(Protocol[_Inside]):

@@ -120,8 +120,8 @@ def test_branches_of_a_when_count_in_their_order():
     """n is 10 or 20 by the first condition that becomes true; x is set by the second one only."""
     part = made(events=[lambda c: when(c.x > 1, {c.n: 10}).elsewhen(c.x > -1, {c.n: 20, c.x: 5})])
     model = build(part)
-    at, rows = model.discrete_position, {row.reset.kind: k for k, row in enumerate(model.update_rows)}
-    kinds = [("discrete", model.update_rows[k].reset.index) for k in range(len(model.update_rows))]
+    at, rows = model.discrete_position, {row.reset.kind: k for k, row in enumerate(model.events.update_rows)}
+    kinds = [("discrete", model.events.update_rows[k].reset.index) for k in range(len(model.events.update_rows))]
     for first in (0, 1):
         for second in (0, 1):
             d = [0.0] * model.discrete_size

@@ -86,7 +86,7 @@ def test_what_is_held_among_other_equations_may_be_undetermined_for_another_reas
     ],
 )
 def test_who_prescribes_what_is_held(sources: str, name: str, why: str) -> None:
-    error = told([name], (A,), holds=HOLDS[:1], motion_sources=tuple(sources))
+    error = told([name], (A,), motions=HOLDS[:1], motion_sources=tuple(sources))
     assert error.why == f"a holds a motion that is {why} stop it."
 
 

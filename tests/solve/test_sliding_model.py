@@ -262,7 +262,7 @@ ASKED = pytest.mark.parametrize("asked", [(True, False), (False, True), (True, T
 def test_everything_is_mixed_by_one_share_per_border(base, made, asked, name):
     for seed in range(3):
         one = Reference(base, asked, seed)
-        found = getattr(made, name)(one.t, one.x, [], base.p, base.u, one.sliding()).full().ravel()
+        found = made.functions[name](one.t, one.x, [], base.p, base.u, one.sliding()).full().ravel()
         np.testing.assert_allclose(found, one.mixed(name), rtol=1e-9, atol=1e-12)
 
 
