@@ -187,8 +187,9 @@ class Powers:
             weights[bent, :, :2] = _BESIDE * np.diff(every.times[ends[:, bent]], axis=0)[0][:, None, None]
             coarse = self._coarse(every.terms, ends, places, weights, bent, bends, depth)
         again, finer = self._again(every, ends, _stretches(coarse, first) if depth < _DEEPEST else [])
-        # What is unknown in intervals that remain too coarse.
-        missed = coarse & ~again
+        # What is unknown in intervals that remain too coarse. Dense output is known down to its last digit: if stored
+        # energy changes there without a power, it jumps.
+        missed = coarse & ~again if self._dense is None or depth < _DEEPEST else np.zeros_like(coarse)
         for k in missed.nonzero()[0]:
             change = np.diff(every.terms[0][:, ends[:, k]])[:, 0]
             self.unknown += np.abs(change - every.terms[POWERS][:, places[k]] @ weights[k, 0])

@@ -16,6 +16,8 @@ from modelica_like.language import (
     absolute,
     der,
     floor,
+    maximum,
+    minimum,
     mod,
     param,
     sign,
@@ -23,7 +25,7 @@ from modelica_like.language import (
     where,
 )
 
-Kind = Literal["where", "sign", "floor", "mod", "meets", "time", "clock"]
+Kind = Literal["where", "sign", "floor", "mod", "meets", "steep", "time", "clock"]
 
 
 class Way(Component):
@@ -50,9 +52,10 @@ class Way(Component):
                 return a + (1 - a) * (x - mod(x, b, events=events)) / b
             case "meets":
                 return a + where(x < b, 0.0, x - b, events=events) + absolute(x - b) - absolute(x - b)
+            case "steep":
+                return minimum(a, maximum(1.0, a - 1e6 * (x - b)))
             case "time":
                 return where(self.time < 0.5, a, 1.0, events=events)
-
             case "clock":
                 return where(self.time < b, a, 1.0, events=events)
 
@@ -93,6 +96,13 @@ def test_branches_that_meet_and_fixed_times_have_derivatives(solver: Any) -> Non
     np.testing.assert_allclose(meets.derivatives, [[grown - 1.0 + 0.5 * grown, 1.0 - grown]], rtol=1e-6)
     fixed = sensitivities(simulate(Way(kind="time"), END, solver=solver), "x", ["a", "b"])
     np.testing.assert_allclose(fixed.derivatives, [[0.5, 0.0]], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_what_is_merely_steep_has_derivatives(solver: Any) -> None:
+    """Where the rate falls within a way of 1e-6: nearly those of the jump with an event."""
+    found = sensitivities(simulate(Way(kind="steep"), END, solver=solver), "x", ["a", "b"])
+    np.testing.assert_allclose(found.derivatives, [[0.25, 0.5]], rtol=1e-5)
 
 
 def test_only_parameters_that_move_the_jump_have_none() -> None:

@@ -27,8 +27,10 @@ _ZEROS = (ca.OP_FABS, ca.OP_SIGN)
 _NOISE = 1e-12
 _AWAY = 10.0 ** np.arange(-12, -4)
 """Distances from a kink, relative to the time; the first one on a side counts. Where rates jump, steps end roughly."""
+_BESIDE = 1e-15
+"""Distance of two points on both sides of a kink, relative to the time: rounding."""
 _JUMP = 1e-4
-"""Change of a rate over such a distance that is no slope."""
+"""Change of a rate between these that is no slope."""
 _AT_IT = 1e-9
 
 
@@ -89,16 +91,17 @@ class Kinks:
             integrands: gives those of the quadratures at a point.
         """
         model = self.model
-        rates, sides = call(model, model.equations.ode, at), list[Vector]()
-        for side in (-1.0, 1.0):
-            for away in _AWAY * max(1.0, abs(at.t)):
-                point = Point(at.t + side * away, at.x + side * away * rates, at.z.copy(), at.d)
-                solve_implicit(model, point)
-                if self.at(point)[number] * begin[number] * side < 0.0:
-                    sides.append(np.concatenate([call(model, model.equations.ode, point), integrands(point)]))
-                    break
-        if len(sides) < 2:
+        rates = call(model, model.equations.ode, at)
+
+        def along(time: float) -> Point:
+            point = Point(at.t + time, at.x + time * rates, at.z.copy(), at.d)
+            solve_implicit(model, point)
+            return point
+
+        crossed = self._crossed(along, number, begin, max(1.0, abs(at.t)))
+        if crossed is None:
             return None  # it only touches the kink
+        sides = [np.append(call(model, model.equations.ode, point), integrands(point)) for point in crossed]
         sizes = np.ones(len(sides[0]))
         sizes[: len(rates)] = model.equations.nominals
         jumps = np.flatnonzero(np.abs(sides[1] - sides[0]) > _JUMP * (sizes + np.abs(sides[0]) + np.abs(sides[1])))
@@ -113,6 +116,27 @@ class Kinks:
             advice="Let it be an event: leave out events=False, or noEvent in Modelica text.",
         )
         return Coincidence(-kink.by[0] / kink.rate[0], SAME * max(1.0, abs(at.t)), reason)
+
+    def _crossed(
+        self, along: Callable[[float], Point], number: int, begin: Vector, size: float
+    ) -> tuple[Point, Point] | None:
+        """Return neighbouring points on both sides of a kink, so that what differs there jumps and is not merely steep.
+
+        Args:
+            along: gives the point at a time from the kink on, or before it.
+            number: of the kink.
+            begin: kinks where the step there began.
+            size: of times, in s.
+        """
+        behind = lambda time: float(self.at(along(time))[number] * begin[number]) < 0.0  # noqa: E731
+        last = next((-away for away in _AWAY * size if not behind(-away)), None)
+        first = next((away for away in _AWAY * size if behind(away)), None)
+        if last is None or first is None:
+            return None
+        while first - last > _BESIDE * size:
+            middle = (last + first) / 2.0
+            last, first = (last, middle) if behind(middle) else (middle, first)
+        return along(last), along(first)
 
     def _over(self, segment: Segment) -> Vector:
         """Values at the results of a segment, shape (count, n)."""
