@@ -7,9 +7,10 @@ import pytest
 from modelica_like import Options, build
 from modelica_like.errors import StepFailed
 from modelica_like.language import Component, Equations, Parameter, Variable, cos, der, param, var
+from modelica_like.native.start import initialize
 from modelica_like.solve import idas
 from modelica_like.solve.idas import Grid, Integrator, linear_solver
-from modelica_like.solve.initialize import Point, initialize
+from modelica_like.solve.initialize import Point
 
 TIGHT = Options(rtol=1e-10, atol=1e-12)
 

@@ -6,6 +6,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from fakes import fake_model
 
 from modelica_like.compile.compiled import StartEntry
 from modelica_like.errors import ContradictingStart
@@ -88,7 +89,7 @@ ENTRIES = (
 
 def table(entries: Any = ENTRIES) -> Any:
     names = ["a", "b", "c", "e", "z4", "z5", "z6", "z7", "f", "g"]
-    return SimpleNamespace(starts=entries, flat_variables=[variable(one) for one in names], differentiated=())
+    return fake_model(entries=entries, flat_variables=[variable(one) for one in names], differentiated=())
 
 
 @pytest.mark.parametrize(
