@@ -346,7 +346,8 @@ double seen_length(Instance *c, double least, double *most);
 void keep_edges(Instance *c);
 int is_over_edge(Instance *c);
 int stands_on_edge(Instance *c, unsigned char *zero);
-int leads_off_edge(Instance *c, double least);
+int leads_off_edge(Instance *c, double least, int crossed);
+int jumps_between(Instance *c, double before, double behind);
 double edge_ahead(Instance *c, double t, double *behind);
 /* fixed.c */
 Arrival step_fixed(Instance *c, double target);

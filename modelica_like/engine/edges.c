@@ -11,6 +11,8 @@
 #define UNSEEN 10        /* error of a window between two edges, in tolerances, from which on the step ends before it */
 #define UNEXPLAINED 300  /* of a piece of another integrator: less is the error of its steps, which are longer */
 #define CURVED 4         /* parts of a window whose slopes may be curved: their error is 256 times as small */
+#define BESIDE 1e-14     /* of the time: rounding, by which counts rise before or behind their edges */
+#define JUMP 1e-4        /* of slopes at neighbouring times: much more than they change there if they are steep */
 #define ALREADY 1e-9     /* of the step: edges at its beginning, on which it stands */
 #define MOST_WINDOWS 200 /* of a step: with more, it becomes shorter */
 #define MOST_NOISE 16    /* windows shorter than the time resolution: what stays at an edge has them by rounding */
@@ -107,13 +109,34 @@ double edge_ahead(Instance *c, double t, double *behind) {
     return fmax(t, fmin(*behind - most, nextafter(*behind, t)));
 }
 
-/* Does a tangent, whose dots are loaded, move an edge on which the piece stands by more than a part? */
-int leads_off_edge(Instance *c, double least) {
+/* Does a tangent, whose dots are loaded, move an edge on which the piece stands, or that it crosses between the times
+ * looked at, by more than a part? */
+int leads_off_edge(Instance *c, double least, int crossed) {
     int n = c->model->settings->n_kinks, any = 0;
     const double *here = c->edges_middle, *end = here + c->model->tapes.edges.n_outputs;
     double *moved = c->edges_middle + 2 * c->model->tapes.edges.n_outputs;
     if (n > 0) tangent_now(c, &c->model->tapes.edges, moved);
-    for (int k = 0; k < n; k++) any |= fabs(here[k]) <= AT_EDGE && fabs(end[k]) <= AT_EDGE && fabs(moved[k]) > least;
+    for (int k = 0; k < n; k++) {
+        int stands = fabs(here[k]) <= AT_EDGE && fabs(end[k]) <= AT_EDGE;
+        any |= fabs(moved[k]) > least && (crossed ? differs(here[k], end[k]) : stands);
+    }
+    return any;
+}
+
+/* Do slopes differ at two neighbouring times of the piece? Edges tell where a step of a count is but for rounding. */
+int jumps_between(Instance *c, double before, double behind) {
+    const Model *m = c->model;
+    double *point = c->vector + m->n_z, *first = c->edge_slopes, *last = c->edge_change;
+    double beside = BESIDE * fmax(1, fabs(behind));
+    int any = 0;
+    for (int side = 0; side < 2; side++) {
+        double t = side == 0 ? fmax(before - beside, c->piece->begin) : fmin(behind + beside, c->piece->end);
+        edges_inside(c, t, c->edges_middle + side * m->tapes.edges.n_outputs);
+        if (!solve_implicit(c, t, point, 1)) return 0;
+        evaluate_special(c, &m->tapes.rates, t, point, side == 0 ? first : last);
+    }
+    for (int k = 0; k < m->n_x; k++)
+        any |= fabs(last[k] - first[k]) > JUMP * (m->nominals[k] + fabs(first[k]) + fabs(last[k]));
     return any;
 }
 

@@ -177,7 +177,7 @@ static double felt_beside(Instance *c, const Tangent *one, double part) {
 static int has_kink(Instance *c, const Tangent *one) {
     double part = small_part(c, one), here;
     load_tangent(c, one, 1);
-    if (!leads_off_edge(c, AT_EDGE * NEARBY / part)) return 0;
+    if (!leads_off_edge(c, AT_EDGE * NEARBY / part, 0)) return 0;
     here = felt_beside(c, one, part);
     return here > 0 && felt_beside(c, one, CLOSER * part) > 0.5 * here;
 }
@@ -213,6 +213,18 @@ static void check_kinks(Instance *c) {
     c->variables_valid = c->state.z_valid = 0;
 }
 
+/* Slopes jump at the present point without an event: nothing tells by how much that moves along a tangent. */
+static void check_jump(Instance *c) {
+    if (!factor_implicit(c)) return;
+    for (int j = 0; j < c->gradient->n; j++) {
+        const Tangent *one = &c->gradient->tangents[j];
+        load_tangent(c, one, 1);
+        if (leads_off_edge(c, AT_EDGE * NEARBY / small_part(c, one), 1))
+            gradient_lose(c, FAILURE_LOST_AT_JUMP, one->by);
+    }
+    c->variables_valid = c->state.z_valid = 0;
+}
+
 /* States are smooth enough at edges within a step, slopes of tangents are not. */
 void gradient_move(Instance *c, double end) {
     if (c->gradient != NULL && c->gradient->lost == 0 && c->state.t < end) check_kinks(c);
@@ -223,6 +235,7 @@ void gradient_move(Instance *c, double end) {
         piece_at(c->model, c->piece, behind, c->x);
         c->state.t = behind;
         c->variables_valid = c->state.z_valid = 0;
+        if (jumps_between(c, before, behind)) check_jump(c);
     }
 }
 

@@ -72,6 +72,7 @@ class Code(IntEnum):
     LOST_AT_END = auto()
     LOST_AT_SINGULAR = auto()
     LOST_AT_KINK = auto()
+    LOST_AT_JUMP = auto()
     LOST_AT_TOUCH = auto()
     LOST_IN_ROUNDS = auto()
     LOST_AT_OTHER_MODES = auto()

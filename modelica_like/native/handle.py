@@ -120,13 +120,14 @@ class Native:
         """Return the derivatives of `outputs` with respect to `by`, through all events since the start.
 
         Where the run stays at a kink that changes no mode (an output limited to what it just is), they are those of one
-        side, and where a law jumps without an event, they lack what the jump moves; `sensitivities` refuses both.
+        side; `sensitivities` refuses that.
 
         Returns:
             Shape (outputs, by).
 
         Raises:
-            NoGradient: at an event a small change leads to other modes, or a copy was restored.
+            NoGradient: at an event a small change leads to other modes, a rate jumps without an event, or a copy was
+                restored.
         """
         self._read(self._references[1], self.outputs)  # after events that come first
         found = np.zeros((len(self.outputs), self._by.size))

@@ -5,7 +5,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from modelica_like import sensitivities, simulate
+from modelica_like import build, sensitivities, simulate
 from modelica_like.errors import NoGradient
 from modelica_like.language import (
     Component,
@@ -114,3 +114,12 @@ def test_only_parameters_that_move_the_jump_have_none() -> None:
     whole = sensitivities(run, "x")
     assert [*whole.left_out] == ["b"]
     assert whole["x", "a"] == pytest.approx(0.5, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", [*JUMPS, "clock"])
+def test_the_engine_refuses_them_too(kind: Kind) -> None:
+    """By both parameters, or b alone if it is when the rate jumps."""
+    native = build(Way(kind=kind, b=0.5)).native(outputs=["x"], by=["b"])
+    native.run(END)
+    with pytest.raises(NoGradient, match="a rate jumps without an event there"):
+        native.gradient()

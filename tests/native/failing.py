@@ -34,6 +34,7 @@ from modelica_like.language import (
     terminate,
     var,
     when,
+    where,
 )
 
 TABLE = ((0, 1), (2, 3))
@@ -210,6 +211,13 @@ class Kinked(Basis):
     def equations(self) -> Equations:
         yield der(self.v) == self.a - 1 - self.v
         yield der(self.x) == maximum(self.v, 0)
+
+
+class Silent(Basis):
+    """The rate jumps at x = 0.5 without an event."""
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.a + where(self.x < 0.5, 0.0, 1.0, events=False)
 
 
 class Touching(Basis):
