@@ -231,7 +231,7 @@ void gradient_move(Instance *c, double end) {
     for (int k = 0; c->gradient != NULL && c->gradient->lost == 0 && c->state.t < end; k++) {
         double behind = INFINITY, before = k < MOST_EDGES ? edge_ahead(c, c->state.t, &behind) : INFINITY;
         move_smoothly(c, fmin(before, end));
-        if (!(behind < end)) return;
+        if (!(behind <= end)) return;
         piece_at(c->model, c->piece, behind, c->x);
         c->state.t = behind;
         c->variables_valid = c->state.z_valid = 0;
