@@ -3,7 +3,11 @@
 #include "core.h"
 
 #define MAX_NEWTON 50
-#define STEADY 1e-6    /* the largest rate, in SI units, that counts as none */
+#define STEADY 1e-6 /* the largest rate, in SI units, that counts as none */
+/* Where unknowns are large, or inertias and heat capacities, smaller rates are no rest: what rounding leaves, unknowns
+ * explain that change by this share, or it is smaller than any that is told. */
+#define EXPLAINED 1e-8
+#define LEAST_RATE 1e-12
 #define MOST_DENSE 200 /* unknowns with which a drive settles: with more, steps with dense matrices take minutes */
 /* Steps in s: the first one, one that only a settled drive bears, one that nothing bears, the longest after an event,
  * as coarse ones overshoot and switch for ever. */
@@ -61,9 +65,14 @@ static Result solve_steady(Instance *c) {
         }
         if (change <= 1e-13) break;
     }
-    evaluate_now(c, &m->tapes.rates, c->rhs);
-    for (int k = 0; k < n; k++)
-        if (!(fabs(c->rhs[m->steady[k]]) <= STEADY)) return fail(c, NOT_STEADY, c->state.t);
+    steady_equations(c, slopes, values);
+    for (int k = 0; k < n; k++) {
+        double explained = LEAST_RATE;
+        for (int j = 0; j < n; j++)
+            explained += EXPLAINED * fabs(slopes[(size_t)k * n + j]) * (1 + fabs(c->x[m->steady[j]]));
+        /* Slopes that are not finite explain anything. */
+        if (!(fabs(values[k]) <= STEADY) || fabs(values[k]) > explained) return fail(c, NOT_STEADY, c->state.t);
+    }
     return RESULT_OK;
 }
 

@@ -7,7 +7,7 @@ import pytest
 
 from modelica_like import build
 from modelica_like.errors import InitializationError
-from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, sqrt, var
+from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, sqrt, tanh, var
 from modelica_like.native.start import initialize
 from modelica_like.solve.initialize import steady
 from modelica_like.solve.initialize.kept import Kept
@@ -143,3 +143,23 @@ def test_changes_of_a_steady_state(monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_allclose(changed(), free + by_r, atol=1e-13)
     of_s = np.outer([0.0, 0.0, 0.0, -2.0], [0.0, 1.0, 1.0, 1.0])
     np.testing.assert_allclose(changed(moved), free + by_r + of_s, atol=1e-13)
+
+
+class Store(Component):
+    """A store of heat whose losses saturate, so slowly that the rates of all temperatures are small numbers."""
+
+    C: Parameter = param("J/K", "heat capacity", default=1e7)
+    P: Parameter = param("W", "heating", default=0.5)
+    most: Parameter = param("W", "largest loss", default=1.0)
+    scale: Parameter = param("K", "temperature of 76 % of it", default=1.0)
+    T: Variable = var("K", "temperature")
+
+    def equations(self) -> Equations:
+        yield self.C * der(self.T) == self.P - self.most * tanh(self.T / self.scale)
+
+
+def test_small_rates_of_a_large_store_are_no_rest() -> None:
+    found = initialize(build(Store(T=guess(0.2))), start="steady")
+    assert found.x == pytest.approx([np.arctanh(0.5)], rel=1e-8)
+    assert told(Store(T=guess(5.0))) == "T keeps changing."  # Newton's method goes to -2748 K from there
+    assert told(Store(most=0.4)) == "T keeps changing."
