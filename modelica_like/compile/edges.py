@@ -19,7 +19,9 @@ _DIFFERENCES = frozenset({ca.OP_LT, ca.OP_LE, ca.OP_FMIN, ca.OP_FMAX})
 _OPERANDS = frozenset({ca.OP_FABS, ca.OP_SIGN, ca.OP_COPYSIGN})
 _COUNTS = frozenset({ca.OP_FLOOR, ca.OP_CEIL})
 _RATIOS = frozenset({ca.OP_FMOD, ca.OP_REMAINDER})
-_EDGES = _DIFFERENCES | _OPERANDS | _COUNTS | _RATIOS
+_EDGES = _DIFFERENCES | _OPERANDS | _COUNTS | _RATIOS | {ca.OP_ATAN2}
+_FLAT = 3.0
+"""Slope of the second line on which the edge of an angle is zero: one that few angles reach, and where none rests."""
 _WAVES = frozenset({ca.OP_SIN, ca.OP_COS, ca.OP_TAN})
 
 
@@ -70,7 +72,12 @@ def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, gu
 
 def kinks_of(arguments: dict[str, Any], expressions: Any) -> list[Any]:
     """Return what is zero where the slope of expressions may change or jump while time, states and unknowns move."""
-    return _different([_edge(*one) for one in _operations(arguments, expressions, _EDGES)])
+    return _different([_edge(*one) for one in _operations(arguments, expressions, _EDGES) if not _never_turns(*one)])
+
+
+def _never_turns(code: int, operands: list[Any]) -> bool:
+    """Whether this is an angle, of less than a quarter turn."""
+    return code == ca.OP_ATAN2 and operands[1].is_constant() and float(operands[1]) > 0.0
 
 
 def _edge(code: int, operands: list[Any]) -> Any:
@@ -79,6 +86,11 @@ def _edge(code: int, operands: list[Any]) -> Any:
         return right - left if code == ca.OP_LT else left - right
     if code in _OPERANDS:
         return operands[-1]
+    if code == ca.OP_ATAN2:
+        # An angle jumps by a turn where the ordinate passes zero with a negative abscissa. Every edge is zero on one
+        # more line, because a turn crosses it an even number of times: not where the angle is zero, at which many rest.
+        ordinate, abscissa = operands
+        return ordinate + _FLAT * ca.fmax(abscissa, 0.0)
     return ca.sin(math.pi * (operands[0] / operands[1] if code in _RATIOS else operands[0]))
 
 

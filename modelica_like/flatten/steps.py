@@ -72,7 +72,13 @@ def honest(expression: Any) -> Any:
 
 def _has_steps(whole: Any) -> bool:
     function = ca.Function("steps", [], [whole], {"allow_free": True})
-    return any(function.instruction_id(k) in STEPS for k in range(function.n_instructions()))
+    return any(function.instruction_id(k) in STEPS | {ca.OP_ATAN2} for k in range(function.n_instructions()))
+
+
+def _is_wrapped(angle: Any) -> bool:
+    """Whether an angle has a slope that is constant, as that of `atan2(sin(x), cos(x))`, though it jumps by turns."""
+    single = ca.cse(angle)
+    return any(not ca.depends_on(ca.jacobian(single, symbol), symbol) for symbol in symbols_in(single))
 
 
 class _Written:
@@ -132,7 +138,7 @@ class _Written:
         whole = self._with(node, parts)
         if operation in _EVENTS:
             return self._step((node.element_hash(), 0), node, whole)
-        if operation in _SILENT:
+        if operation in _SILENT or (operation == ca.OP_ATAN2 and _is_wrapped(whole)):
             self._hide(whole)
         return whole
 

@@ -14,6 +14,8 @@ from modelica_like.language import (
     Parameter,
     Variable,
     absolute,
+    atan2,
+    cos,
     der,
     floor,
     maximum,
@@ -21,6 +23,7 @@ from modelica_like.language import (
     mod,
     param,
     sign,
+    sin,
     var,
     where,
 )
@@ -123,3 +126,44 @@ def test_the_engine_refuses_them_too(kind: Kind) -> None:
     native.run(END)
     with pytest.raises(NoGradient, match="a rate jumps without an event there"):
         native.gradient()
+
+
+class Angle(Component):
+    """x = a t, and y integrates its angle, from -π to π, by the coordinates of its point on a circle."""
+
+    units_checked = False
+    x: Variable = var("1", "way", default=0.0)
+    y: Variable = var("1", "integral", default=0.0)
+    angle: Variable = var("1", "angle")
+    a: Parameter = param("1", "rate", default=2.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.a
+        yield self.angle == atan2(sin(self.x), cos(self.x))
+        yield der(self.y) == self.angle
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_an_angle_jumps_at_a_half_turn(solver: Any) -> None:
+    """Before it y = a t²/2, and behind it 2π (t - π/a) less: the angle's slope, which is one, tells nothing of that."""
+    for end in (1.5, 2.0):
+        run = simulate(Angle(), end, solver=solver)
+        assert run.final["y"] == pytest.approx(end**2 - (end > 1.6) * 2 * np.pi * (end - np.pi / 2), abs=1e-5)
+        np.testing.assert_allclose(run["angle"], np.angle(np.exp(2j * run.time)), atol=1e-7)
+        handle = build(Angle()).native([], ["y"], by=["a"])
+        handle.reset(until=end)
+        handle.step(end)
+        if end > 1.6:
+            with pytest.raises(NoGradient, match="the rate of y jumps without an event"):
+                sensitivities(run, "y", ["a"])
+            with pytest.raises(NoGradient, match="a rate jumps without an event"):
+                handle.gradient()
+        else:
+            np.testing.assert_allclose(sensitivities(run, "y", ["a"]).derivatives, [[end**2 / 2]], rtol=1e-7)
+            np.testing.assert_allclose(handle.gradient(), [[end**2 / 2]], rtol=1e-6)
+
+
+def test_an_angle_that_rests_at_zero_has_derivatives() -> None:
+    """y = 0, and a t²/2 is its slope."""
+    found = sensitivities(simulate(Angle(a=0.0), 1.0), "y", ["a"])
+    np.testing.assert_allclose(found.derivatives, [[0.5]], rtol=1e-7)

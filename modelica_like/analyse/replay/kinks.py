@@ -113,7 +113,8 @@ class Kinks:
         reason = NoGradient(
             f"No gradient at t = {at.t:.9g} s: {what} jumps without an event.",
             why="The jump moves with the parameter, and only the time of an event has a derivative.",
-            advice="Let it be an event: leave out events=False, or noEvent in Modelica text.",
+            advice="Let it be an event: leave out events=False, or noEvent in Modelica text. An atan2, which jumps at "
+            "a half turn, makes none: keep it off that.",
         )
         return Coincidence(-kink.by[0] / kink.rate[0], SAME * max(1.0, abs(at.t)), reason)
 
