@@ -43,9 +43,12 @@ _ROUNDING = 10.0
 """Errors that are left, in such changes."""
 _CANCELLED = 0.1
 """Share of the sizes of stored energies below which these cancel."""
-_MORE, _LEAST, _DEEPEST = 4, 4, 12
-"""Finer results per interval, the smallest number of intervals for this, and the number of repetitions."""
-COARSE = _DEEPEST + 1
+_MORE, _LEAST, _DEEPEST, _DEEPEST_READ = 4, 4, 12, 24
+"""Finer results per interval, the smallest number of intervals for this, and the numbers of repetitions: by IDAS, and
+off dense output, which costs little, and may show a start of nanoseconds between results that are hours apart."""
+_SHORTEST = 1e-13
+"""Length of an interval, relative to the time, in which more results would differ in the last digits of time only."""
+COARSE = _DEEPEST_READ + 1
 """Depth at which results are taken as they are."""
 _FINEST_RESULTS, _FOR_EACH = 100_000, 100
 """Finer results off dense output in all, and for each result: what is no number, or noise, never becomes fine."""
@@ -186,10 +189,15 @@ class Powers:
             weights[bent] = 0.0
             weights[bent, :, :2] = _BESIDE * np.diff(every.times[ends[:, bent]], axis=0)[0][:, None, None]
             coarse = self._coarse(every.terms, ends, places, weights, bent, bends, depth)
-        again, finer = self._again(every, ends, _stretches(coarse, first) if depth < _DEEPEST else [])
+        if self._dense is None:
+            finest = np.full(len(coarse), depth >= _DEEPEST)
+        else:
+            begin, end = every.times[ends]
+            finest = (depth >= _DEEPEST_READ) | (end - begin <= _SHORTEST * np.abs(end))
+        again, finer = self._again(every, ends, _stretches(coarse & ~finest, first))
         # What is unknown in intervals that remain too coarse. Dense output is known down to its last digit: if stored
         # energy changes there without a power, it jumps.
-        missed = coarse & ~again if self._dense is None or depth < _DEEPEST else np.zeros_like(coarse)
+        missed = coarse & ~again if self._dense is None else coarse & ~again & ~finest
         for k in missed.nonzero()[0]:
             change = np.diff(every.terms[0][:, ends[:, k]])[:, 0]
             self.unknown += np.abs(change - every.terms[POWERS][:, places[k]] @ weights[k, 0])

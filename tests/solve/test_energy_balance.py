@@ -124,6 +124,18 @@ def test_powers_along_straight_lines_are_no_straight_lines(points: int) -> None:
     assert balance.drift < 1e-8
 
 
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize("points", [1, 5, 500])
+def test_a_start_of_nanoseconds_is_seen_in_a_run_of_hours(points: int, solver: Any) -> None:
+    """An oil stops a small wheel: it loses J·w²/2, all of it within J/d = 1 ns."""
+    parts = {"J": Inertia(J=1e-9, phi=0.0, w=3.0), "oil": Damper(d=1.0), "wall": Fixed()}
+    drive = Assembly("drive", parts=parts, series={"s": list(parts)})
+    balance = simulate(drive, 3600.0, points=points, solver=solver).energy()
+    assert balance["oil"].lost == pytest.approx(0.5e-9 * 9.0, rel=1e-6)
+    assert balance["J"].stored == pytest.approx(-0.5e-9 * 9.0, rel=1e-6)
+    assert balance.closure < 1e-6
+
+
 def test_a_power_that_is_over_at_once_does_not_widen_tolerances() -> None:
     """Contacts begin with 250 N.s/m: their power lasts a microsecond, the first interval of results 0.2 s."""
     run = simulate(load(EXAMPLES / "msl/translational/PreLoad.toml"))
