@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import Literal, get_args
 
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
@@ -60,6 +61,8 @@ class Options:
     def __post_init__(self) -> None:
         for name, low, high in (("rtol", 1e-14, 0.1), ("atol", SMALLEST_ATOL, 1.0), ("points", 1, 10_000_000)):
             value = getattr(self, name)
+            if not isinstance(value, Integral if name == "points" else Real):
+                raise ValueOutOfRange(f"{name} = {value!r} is no {'whole ' * (name == 'points')}number.")
             if not low <= value <= high:
                 told, least, most = (f"{one:,}" if isinstance(one, int) else f"{one:g}" for one in (value, low, high))
                 raise ValueOutOfRange(f"{name} = {told} is out of range: it must be between {least} and {most}.")

@@ -301,5 +301,5 @@ def _options(base: Options, settings: Mapping[str, Any], **given: Any) -> Option
     told |= {name: value for name, value in given.items() if value is not None}
     if "rtol" in told and "atol" not in told:
         # Otherwise what is small compared with its nominal value would not become more precise.
-        told["atol"] = min(values["atol"], told["rtol"] / 100)
+        told["atol"] = min(values["atol"], replace(base, rtol=told["rtol"]).rtol / 100)
     return Options(**(values | told))

@@ -18,6 +18,9 @@ from modelica_like.options import Options
 from modelica_like.simulation import positive_step
 from modelica_like.solve.initialize import StartKind
 
+_ROUNDING = 1e-9
+"""Relative distance by which a time may be before the present one: sums of steps differ in their last digits."""
+
 
 class Native:
     """One instance of a model in memory.
@@ -78,10 +81,12 @@ class Native:
             until: end of the run, if known.
 
         Raises:
-            UnknownName, ValueOutOfRange: a value cannot be set.
+            UnknownName, ValueOutOfRange: a value cannot be set, or a time is no number.
             InitializationError, SolveError: there is no start with these values.
         """
         given = values or {}
+        for name, time in (("t0", t0), ("until", until)):
+            _number(name, time)
         self._instance.reset(t0, until, *self._tolerances)
         self.set(given)
         if self._by.size:
@@ -109,8 +114,10 @@ class Native:
 
         Raises:
             SolveError: the run cannot continue; use `restore` or `reset`.
-            ValueOutOfRange: an input cannot be set, or the time is not a whole number of fixed steps away.
+            ValueOutOfRange: an input cannot be set, the time is before the present one or not finite, or it is not a
+                whole number of fixed steps away.
         """
+        self._check_later(time)
         code = self._library.step(self._address, time, *self._step)
         if code:
             self._instance.check(code)
@@ -182,15 +189,44 @@ class Native:
 
         Returns:
             Times, shape (n,), and outputs, shape (n, outputs).
+
+        Raises:
+            SolveError: the run cannot continue; use `restore` or `reset`.
+            ValueOutOfRange: the time is before the present one or not finite, or the number of intervals is no positive
+                whole number.
         """
+        self._check_later(until)
+        if not isinstance(points, (int, np.integer)) or points < 1:
+            raise ValueOutOfRange(f"points must be a positive whole number, not {points!r}.")
         widths = {"times": 1, "outputs": len(self.outputs)}
         written = Buffers(self._instance, until, points, widths, self._references[1])
         self._instance.check(written.go(lambda _: True))
         return written["times"][:, 0], written["outputs"]
 
+    def _check_later(self, time: float) -> None:
+        """Refuse what is no time from now on: C would step for ever, or stay where it is."""
+        if not math.isfinite(_number("time", time)):
+            raise ValueOutOfRange(f"The time must be finite, not {time} s.")
+        present = self._library.time(self._address)
+        if time < present - _ROUNDING * max(1.0, abs(present)):
+            raise ValueOutOfRange(
+                f"The time {time:.9g} s is before the present one, {present:.9g} s.",
+                advice="Go back with `restore`, or begin again with `reset`.",
+            )
+
     def _read(self, references: Any, values: Vector) -> Vector:
         self._instance.check(self._library.get(self._address, len(values), references.ctypes.data, values.ctypes.data))
         return values
+
+
+def _number(name: str, time: float) -> float:
+    """Return a time, unless it is none: in the middle of a control loop there are no units."""
+    try:
+        if not math.isnan(time):
+            return time
+    except TypeError:
+        pass
+    raise ValueOutOfRange(f"{name} must be a number of seconds, not {time!r}.")
 
 
 class Copy:

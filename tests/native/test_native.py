@@ -318,6 +318,24 @@ def test_what_a_handle_refuses():
         build(CLUTCHES).native().restore(handle.copy())
 
 
+@pytest.mark.parametrize("time", [np.inf, -np.inf, np.nan, "0.3 s", None, 0.1])
+def test_a_handle_refuses_what_is_no_time_from_now_on(time):
+    """It would run for ever, or stay where it is and return what is there."""
+    handle = build(CLUTCHES).native(outputs=["J2.w"])
+    handle.step(0.2)
+    handle.step(0.2 - 1e-12)  # rounding
+    for go in (handle.step, handle.run):
+        with pytest.raises(ValueOutOfRange, match=r"time must be|is before the present one"):
+            go(time)
+    assert handle.time == 0.2
+    if time not in (0.1, np.inf, -np.inf):
+        with pytest.raises(ValueOutOfRange, match="until must be a number of seconds"):
+            handle.reset(until=time)
+    for points in (0, 2.5, None):
+        with pytest.raises(ValueOutOfRange, match="points must be a positive whole number"):
+            handle.run(0.3, points)  # type: ignore[arg-type]
+
+
 class Turning(Component):
     """A value whose rate changes its sign once."""
 
