@@ -26,6 +26,10 @@ def memory() -> float:
         return math.inf
 
 
+def _fits(value: object, *, whole: bool) -> bool:
+    return isinstance(value, Integral if whole else Real)
+
+
 @dataclass(frozen=True)
 class Options:
     """Tolerances and limits of a simulation.
@@ -61,7 +65,7 @@ class Options:
     def __post_init__(self) -> None:
         for name, low, high in (("rtol", 1e-14, 0.1), ("atol", SMALLEST_ATOL, 1.0), ("points", 1, 10_000_000)):
             value = getattr(self, name)
-            if not isinstance(value, Integral if name == "points" else Real):
+            if not _fits(value, whole=name == "points"):
                 raise ValueOutOfRange(f"{name} = {value!r} is no {'whole ' * (name == 'points')}number.")
             if not low <= value <= high:
                 told, least, most = (f"{one:,}" if isinstance(one, int) else f"{one:g}" for one in (value, low, high))

@@ -24,6 +24,7 @@ from modelica_like.language import (
     param,
     sign,
     sin,
+    sqrt,
     var,
     where,
 )
@@ -167,3 +168,29 @@ def test_an_angle_that_rests_at_zero_has_derivatives() -> None:
     """y = 0, and a t²/2 is its slope."""
     found = sensitivities(simulate(Angle(a=0.0), 1.0), "y", ["a"])
     np.testing.assert_allclose(found.derivatives, [[0.5]], rtol=1e-7)
+
+
+class Orifice(Component):
+    """x = a t, and y integrates the root of its distance from b, or its square."""
+
+    units_checked = False
+    x: Variable = var("1", "way", default=0.0)
+    y: Variable = var("1", "integral", default=0.0)
+    a: Parameter = param("1", "rate", default=2.0)
+    b: Parameter = param("1", "where the flow turns", default=1.0)
+    rounded: bool = False
+
+    def equations(self) -> Equations:
+        away = absolute(self.x - self.b)
+        yield der(self.x) == self.a
+        yield der(self.y) == (away**2 if self.rounded else sqrt(away))
+
+
+def test_a_slope_without_bound_is_told() -> None:
+    """Steps of any length err by its derivative, of one in a thousand here; with squares y = (b³ + (a t - b)³)/3a."""
+    with pytest.raises(NoGradient, match=r"No gradient at t = 0\.5 s: the slope of the rate of y has no bound there"):
+        sensitivities(simulate(Orifice(), END), "y", ["a", "b"])
+    found = sensitivities(simulate(Orifice(rounded=True), END), "y", ["a", "b"])
+    way = 2 * END - 1
+    by_a, by_b = (3 * END * way**2 - (1 + way**3) / 2) / 6, (1 - way**2) / 2
+    np.testing.assert_allclose(found.derivatives, [[by_a, by_b]], rtol=1e-7)

@@ -32,6 +32,10 @@ _BESIDE = 1e-15
 _JUMP = 1e-4
 """Change of a rate between these that is no slope."""
 _AT_IT = 1e-9
+_NEAR, _FAR = 1e-10, 1e-6
+"""Distances from a kink, relative to the time, between which a slope without bound grows by `_GROWTH` or more."""
+_GROWTH, _STEEP = 10.0, 1e3
+"""Least change of a rate over a time, relative to its size, that is more than rounding."""
 
 
 class Kinks:
@@ -82,7 +86,7 @@ class Kinks:
         return sorted({*np.flatnonzero(zero).tolist(), last} - {-1})
 
     def jump(self, at: Point, number: int, begin: Vector, integrands: Callable[[Point], Vector]) -> Coincidence | None:
-        """Return how the time of a kink moves if rates or integrands jump there, else None.
+        """Return how the time of a kink moves if rates or integrands jump or their slopes have no bound there, or None.
 
         Args:
             at: point at the kink.
@@ -98,30 +102,57 @@ class Kinks:
             solve_implicit(model, point)
             return point
 
-        crossed = self._crossed(along, number, begin, max(1.0, abs(at.t)))
+        size = max(1.0, abs(at.t))
+        crossed = self._crossed(along, number, begin, size)
         if crossed is None:
             return None  # it only touches the kink
-        sides = [np.append(call(model, model.equations.ode, point), integrands(point)) for point in crossed]
+
+        def both(time: float) -> Vector:
+            return np.append(call(model, model.equations.ode, along(time)), integrands(along(time)))
+
+        sides = [both(time) for time in crossed]
         sizes = np.ones(len(sides[0]))
         sizes[: len(rates)] = model.equations.nominals
         jumps = np.flatnonzero(np.abs(sides[1] - sides[0]) > _JUMP * (sizes + np.abs(sides[0]) + np.abs(sides[1])))
-        if not jumps.size:
-            return None
-        k = int(jumps[0])
-        what = f"the rate of {model.states[k]}" if k < len(rates) else "what is integrated"
         kink = slopes(model, at, f"{self._key}", [number], lambda: self._function)
+        when = -kink.by[0] / kink.rate[0], SAME * size
+        if not jumps.size:
+            roots = self._roots(both, crossed, sides, size, sizes)
+            if not roots.size:
+                return None
+            steep = NoGradient(
+                f"No gradient at t = {at.t:.9g} s: the slope of {self._named(int(roots[0]))} has no bound there.",
+                why="No step is short enough for the derivative of what follows.",
+                advice="Round the law there, as sqrt(x) by x/(x**2 + small**2)**0.25.",
+            )
+            return Coincidence(*when, steep)
         reason = NoGradient(
-            f"No gradient at t = {at.t:.9g} s: {what} jumps without an event.",
+            f"No gradient at t = {at.t:.9g} s: {self._named(int(jumps[0]))} jumps without an event.",
             why="The jump moves with the parameter, and only the time of an event has a derivative.",
             advice="Let it be an event: leave out events=False, or noEvent in Modelica text. An atan2, which jumps at "
             "a half turn, makes none: keep it off that.",
         )
-        return Coincidence(-kink.by[0] / kink.rate[0], SAME * max(1.0, abs(at.t)), reason)
+        return Coincidence(*when, reason)
+
+    def _named(self, k: int) -> str:
+        states = self.model.states
+        return f"the rate of {states[k]}" if k < len(states) else "what is integrated"
+
+    @staticmethod
+    def _roots(
+        both: Callable[[float], Vector], crossed: tuple[float, float], sides: list[Vector], size: float, sizes: Vector
+    ) -> Any:
+        """Return which rates have a slope without bound at a kink: it grows the more, the nearer to it on one side."""
+        found = np.zeros(len(sizes), bool)
+        for sign, begin, value in zip((-1.0, 1.0), crossed, sides, strict=True):
+            near, far = (abs(both(begin + sign * away * size) - value) / away for away in (_NEAR, _FAR))
+            found |= (near > _GROWTH * far) & (near > _STEEP * (sizes + abs(value)))
+        return np.flatnonzero(found)
 
     def _crossed(
         self, along: Callable[[float], Point], number: int, begin: Vector, size: float
-    ) -> tuple[Point, Point] | None:
-        """Return neighbouring points on both sides of a kink, so that what differs there jumps and is not merely steep.
+    ) -> tuple[float, float] | None:
+        """Return neighbouring times on both sides of a kink, so that what differs there jumps and is not merely steep.
 
         Args:
             along: gives the point at a time from the kink on, or before it.
@@ -137,7 +168,7 @@ class Kinks:
         while first - last > _BESIDE * size:
             middle = (last + first) / 2.0
             last, first = (last, middle) if behind(middle) else (middle, first)
-        return along(last), along(first)
+        return last, first
 
     def _over(self, segment: Segment) -> Vector:
         """Values at the results of a segment, shape (count, n)."""
