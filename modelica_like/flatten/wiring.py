@@ -14,7 +14,7 @@ from modelica_like.language.equation import Connection, FreeEnd
 from modelica_like.language.expr import Symbol
 from modelica_like.language.fields import Input, Output
 from modelica_like.language.inside import inside
-from modelica_like.language.units import Unit, same_dimension
+from modelica_like.language.units import ONE, Unit, same_dimension
 
 End = tuple[int, bool]
 """A connector (its id) seen from inside or from outside (True) its component."""
@@ -125,6 +125,9 @@ class Wiring:
             if not all((inside(symbol.owner).owner or symbol.owner).units_checked for symbol in (driver, sink)):
                 continue
             units = [self.inferred.get((id(s.owner), s.name)) or unit_of_field(s.owner, s.name) for s in (driver, sink)]
+            # In Modelica text, a signal without a unit takes any.
+            if any(unit == ONE and not s.owner.units_checked for s, unit in zip((driver, sink), units, strict=True)):
+                continue
             if not same_dimension(*units):
                 what = f"{_name(driver)} is in {units[0]}, {_name(sink)} expects {units[1]}."
                 self._refuse(what, source, "Give the source's parameters in that unit.")

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from modelica_like import export_fmu, load, simulate
-from modelica_like.errors import ModelicaTextError
+from modelica_like.errors import ModelicaTextError, WrongConnection
 from modelica_like.netlist import loads
 from modelica_like.netlist.modelica.netlist_form import netlist_text
 from modelica_like.netlist.modelica.read import read_modelica
+from modelica_like.netlist.modelica.write import modelica_text
 
 ROTATIONAL = "Modelica.Mechanics.Rotational.Components"
 TRANSLATIONAL = "Modelica.Mechanics.Translational"
@@ -303,3 +304,73 @@ def test_arrays_of_other_sizes_are_refused(text_file: Any) -> None:
     for call in ("atan2({1, 2}, {1, 2, 3})", "homotopy({x[1], x[2]}, {1, 2, 3})"):
         with pytest.raises(ModelicaTextError, match="has arrays of 2 and 3 elements"):
             load(text_file(f"model A\n  Real x[2];\nequation\n  x = {call};\nend A;"))
+
+
+CONTROLLED = """
+package P
+  type Law = enumeration(linear, quadratic);
+  model Brake
+    parameter Law law = Law.linear;
+    parameter Real k = 1;
+    Modelica.Blocks.Interfaces.RealInput w;
+    Modelica.Blocks.Interfaces.RealOutput tau;
+  equation
+    tau = -k*(if law == Law.linear then w else w*abs(w));
+  end Brake;
+  model Squared extends Brake(law = Law.quadratic); end Squared;
+  model Drive
+    Modelica.Mechanics.Rotational.Components.Inertia J(J = 2, phi(fixed = true), w(fixed = true, start = 3));
+    Modelica.Mechanics.Rotational.Sensors.SpeedSensor sensor;
+    Modelica.Mechanics.Rotational.Sources.Torque torque;
+    replaceable Brake brake(k = 4);
+  equation
+    connect(J.flange_b, sensor.flange);
+    connect(J.flange_b, torque.flange);
+    connect(sensor.w, brake.w);
+    connect(brake.tau, torque.tau);
+    annotation(experiment(StopTime = 1));
+  end Drive;
+  model Other
+    extends Drive(brake(law = Law.quadratic));
+  end Other;
+  model Named
+    extends Drive(redeclare Squared brake(k = 4));
+  end Named;
+end P;
+"""
+
+
+def _as_netlist(path: Path, name: str) -> Any:
+    model, notes = read_modelica(path, name)
+    return loads(netlist_text(model, path.parent, notes), str(path.parent / "a.toml"))
+
+
+def test_signals_without_units_of_an_own_class_take_any_in_a_netlist(text_file: Any) -> None:
+    # 2·dw/dt = -4·w, and -4·w² for the class that has a name of its own
+    result = simulate(_as_netlist(text_file(CONTROLLED), "P.Drive"), 1.0, rtol=1e-10)
+    assert result["J.w"] == pytest.approx(3 * np.exp(-2 * result.time), rel=1e-8)
+    result = simulate(_as_netlist(text_file(CONTROLLED), "P.Named"), 1.0, rtol=1e-10)
+    assert result["J.w"] == pytest.approx(3 / (1 + 6 * result.time), rel=1e-8)
+
+
+def test_a_signal_with_a_unit_of_an_own_class_is_checked_in_a_netlist(text_file: Any) -> None:
+    text = CONTROLLED.replace("RealInput w;", 'RealInput w(unit = "m/s");')
+    with pytest.raises(WrongConnection, match=r"sensor\.w is in rad/s, brake\.w expects m/s\."):
+        simulate(_as_netlist(text_file(text), "P.Drive"))
+
+
+def test_what_a_netlist_cannot_say_of_an_own_class_is_refused(text_file: Any) -> None:
+    with pytest.raises(ModelicaTextError) as caught:
+        _as_netlist(text_file(CONTROLLED), "P.Other")
+    assert str(caught.value).replace(str(text_file(CONTROLLED)), "a.mo") == (
+        "brake has other equations than its class P.Brake: it is given what a netlist cannot say, such as a Boolean, "
+        "an Integer, an enumeration, a table or another class.\n"
+        "  in a.mo:17 `replaceable Brake brake(k = 4);`\n"
+        "Give what it is a name of its own in the text and use that: `model Mine extends P.Brake(…); end Mine;`."
+    )
+
+
+def test_a_class_with_equations_is_not_written_without_them(text_file: Any) -> None:
+    with pytest.raises(ModelicaTextError) as caught:
+        modelica_text(_as_netlist(text_file(CONTROLLED), "P.Drive"))
+    assert str(caught.value).startswith("brake is P.Brake, a class of Modelica text with equations of its own.\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,11 @@ from modelica_like.language import Assembly, Component, Connector, Input, Output
 from modelica_like.language.assembly import end_at
 from modelica_like.language.fields import Field, Value
 from modelica_like.language.formula import Formula
-from modelica_like.language.inside import inside
+from modelica_like.language.inside import declarations, inside
 from modelica_like.language.units import ANY, ONE, Unit, parse_unit, same_dimension
 from modelica_like.netlist import dumps, loads
+from modelica_like.netlist.modelica.read import load_modelica
+from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.written import Written
 
 _GAINS = {"Gain": 0, "FirstOrder": 0, "SecondOrder": 0, "TransferFunction": 0, "Integrator": -1, "Derivative": 1}
@@ -156,7 +159,8 @@ class _Form:
 
     def _unit(self, part: Component, name: str) -> Unit | None:
         declared = part.fields[name].unit
-        return declared if declared != ANY else self.units.get((part.path, name))
+        takes_any = declared == ANY or (declared == ONE and not part.units_checked)  # the second one: of an own class
+        return self.units.get((part.path, name)) if takes_any else declared
 
     def _set(self, part: Component, name: str, unit: Unit | None) -> None:
         if unit is not None:
@@ -197,7 +201,8 @@ class _Form:
 
     def _part(self, path: str, part: Component) -> Component:
         twin = part.copy()
-        if isinstance(twin, Written):
+        if isinstance(part, Written):
+            self._check_class(path, part)
             return twin
         for name, field in part.fields.items():
             value = inside(part).values.get(name)
@@ -213,6 +218,19 @@ class _Form:
                 text = self._text(start, field.unit, f"{path}.{name}")
                 twin.give(name, text if start.fixed else guess(text))
         return twin
+
+    def _check_class(self, path: str, part: Written) -> None:
+        """Refuse a part that its class alone does not give: a netlist changes numbers, not equations."""
+        own = inside(part)
+        if _equations(part) == _equations(load_modelica(own.origin)):
+            return
+        raise ModelicaTextError(
+            f"{path} has other equations than its class {own.text}: it is given what a netlist cannot say, such as a "
+            "Boolean, an Integer, an enumeration, a table or another class.",
+            where=part.place_of(),
+            advice="Give what it is a name of its own in the text and use that: "
+            f"`model Mine extends {own.text}(…); end Mine;`.",
+        )
 
     def _text(self, value: Value, unit: Unit, path: str) -> Any:
         """Return a number with its unit; a formula stays if its unit fits."""
@@ -233,6 +251,30 @@ class _Form:
         if value is None:
             raise ModelicaTextError(f"{path} has no value.")
         return (value.number or 0.0) if value.formula is None else float(value.formula.evaluate(self._number))
+
+
+def _equations(model: Component) -> list[Any]:
+    """Return what numbers of a netlist do not change: parts with their structure, connections and equations."""
+    every: list[Any] = []
+    for part in model.walk():
+        path = part.path.removeprefix(model.path)
+        structure = {name: getattr(part, name) for name in declarations(part).structural}
+        every.append((path, type(part).__name__, structure, sorted(part.fields)))
+        if isinstance(part, Written):
+            own = inside(part)
+            pairs = [(left, right) for left, right, _ in (*own.initial, *own.statements)]
+            happenings = [(one.branches, one.text) for one in own.happenings]
+            every.append(([*part.wires.values()], _without_lines((pairs, happenings))))
+    return every
+
+
+def _without_lines(node: Any) -> Any:
+    """Return expressions without their places."""
+    if isinstance(node, Expr):
+        return node.kind, _without_lines(node.args)
+    if isinstance(node, Mapping):
+        return {name: _without_lines(value) for name, value in node.items()}
+    return [_without_lines(one) for one in node] if isinstance(node, list | tuple) else node
 
 
 def _quantity(number: float, unit: Unit) -> Any:

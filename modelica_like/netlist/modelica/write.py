@@ -20,6 +20,7 @@ from modelica_like.netlist.modelica.own_classes import class_of_equations, conne
 from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.tokens import identifier
 from modelica_like.netlist.modelica.tree import calls_in, names_in
+from modelica_like.netlist.modelica.written import InsideWritten
 
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "**": 4}
 _BLOCKS = "Modelica.Blocks.Interfaces.Real"
@@ -51,6 +52,13 @@ class _Writer:
 
     def model(self, assembly: Assembly, name: str) -> str:
         """Return the class of an assembly."""
+        own = inside(assembly)
+        if isinstance(own, InsideWritten) and (own.statements or own.initial or own.happenings):
+            raise ModelicaTextError(
+                f"{assembly.label} is {own.text}, a class of Modelica text with equations of its own.",
+                where=assembly.place_of(),
+                advice="Parts and connections are written, such a class is not: use the text it comes from.",
+            )
         joined = {_path(assembly, end) for ends in self._wires(assembly) for end in ends}
         quoted = inside(assembly).description.replace("\\", "\\\\").replace('"', '\\"')
         lines = [f'model {name} "{quoted}"' if quoted else f"model {name}"]
