@@ -57,7 +57,9 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
     what = f"{kind} declares {count} for {listed}."
     base = type(component).__mro__[1]
     missing = len(equations) < len(unknowns)
-    if missing and getattr(base, "equations", Component.equations) is not Component.equations:
+    if missing and not component.units_checked:
+        advice = "Each own variable, output and flow needs one: add an equation, or take the unknown away."
+    elif missing and getattr(base, "equations", Component.equations) is not Component.equations:
         advice = f"Its base {base.__name__} has equations of its own: is `yield from super().equations()` missing?"
     elif missing:
         advice = "Each own variable, output and flow needs one: is a `yield` missing?"
@@ -68,7 +70,7 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
         )
     else:
         advice = "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."
-    where = equations[-1].source if equations else ()
+    where = equations[-1].source if equations else component.place_of()
     raise ComponentUnbalanced(what, where=where, advice=advice)
 
 

@@ -35,7 +35,7 @@ def der(expression: Expr) -> Expr:
     Args:
         expression: a variable, or an expression of variables.
     """
-    if isinstance(expression, Symbol) and expression is not TIME:
+    if isinstance(expression, Symbol) and expression is not TIME and not expression.owner.is_constant(expression.name):
         return expression.derivative()
     total: Any = 0.0
     for symbol in symbols_in(expression):

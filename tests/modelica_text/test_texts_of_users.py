@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from modelica_like import export_fmu, load, simulate
-from modelica_like.errors import ModelicaTextError, WrongConnection
+from modelica_like.errors import ModelicaLikeError, ModelicaTextError, WrongConnection
 from modelica_like.netlist import loads
 from modelica_like.netlist.modelica.netlist_form import netlist_text
 from modelica_like.netlist.modelica.read import read_modelica
@@ -374,3 +374,57 @@ def test_a_class_with_equations_is_not_written_without_them(text_file: Any) -> N
     with pytest.raises(ModelicaTextError) as caught:
         modelica_text(_as_netlist(text_file(CONTROLLED), "P.Drive"))
     assert str(caught.value).startswith("brake is P.Brake, a class of Modelica text with equations of its own.\n")
+
+
+MEANT = """
+model Meant
+  parameter Real q = 2;
+  parameter Integer n = 2;
+  parameter Boolean on = true;
+  parameter Real k[2] = {1, 2};
+  Modelica.Mechanics.Rotational.Components.Inertia J(J = 2, phi(fixed = true), w(fixed = true, start = 3));
+  Real y;
+equation
+  y = if on then q*n*k[1]*J.w + der(q) + der(J.J) else 0;
+  annotation(experiment(StopTime = 1));
+end Meant;
+"""
+
+
+def test_the_derivative_of_a_parameter_is_zero(text_file: Any) -> None:
+    assert run(text_file(MEANT))["y"] == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize(
+    ("meant", "written", "message"),
+    [
+        ("n = 2", "n = 2.5", "n is an Integer, and 2.5 is none.\n  in a.mo:4 `parameter Integer n = 2.5;`"),
+        ("on = true", "on = 1", "on is a Boolean, and 1 is none.\n  in a.mo:5 `parameter Boolean on = 1;`"),
+        ("k[2]", "k[3]", "k has the size 3, and its value the size 2.\n  in a.mo:6 `parameter Real k[3] = {1, 2};`"),
+        (
+            "Real y;", "Real y; Real q;",
+            "q is declared twice in Meant.\n  in a.mo:3 `parameter Real q = 2;`\n  in a.mo:8 `Real y; Real q;`",
+        ),
+        (
+            "der(J.J)", "J.speed",
+            "Meant uses J.speed, but J has no variable 'speed'.\n"
+            "  in a.mo:10 `y = if on then q*n*k[1]*J.w + der(q) + J.speed else 0;`",
+        ),
+        (
+            "der(J.J)", "delay(J.w, -1)",
+            "delay(w, -1): the delay must be positive.\n"
+            "  in a.mo:10 `y = if on then q*n*k[1]*J.w + der(q) + delay(J.w, -1) else 0;`\n"
+            "Write the value itself where nothing is delayed.",
+        ),
+        (
+            "Real y;", "Real y; Real z;",
+            "Meant declares 1 equation for 2 unknowns (y, z).\n"
+            "  in a.mo:10 `y = if on then q*n*k[1]*J.w + der(q) + der(J.J) else 0;`\n"
+            "Each own variable, output and flow needs one: add an equation, or take the unknown away.",
+        ),
+    ],
+)  # fmt: skip
+def test_mistakes_are_told_in_words_of_the_text(text_file: Any, meant: str, written: str, message: str) -> None:
+    with pytest.raises(ModelicaLikeError) as caught:
+        run(text_file(MEANT.replace(meant, written)))
+    assert str(caught.value) == message

@@ -127,7 +127,11 @@ class Instance:
             raise refused(what, text, line)
         if text.short is not None:
             self._extend(text.short, text.owner or text, outer, depth)
+        declared: dict[str, Declaration] = {}
         for element in text.elements:
+            if isinstance(element, Declaration) and declared.setdefault(element.name, element) is not element:
+                places = [text.place(line) for line in (declared[element.name].line, element.line)]
+                raise ModelicaTextError(f"{element.name} is declared twice in {text.name}.", where=places)
             if isinstance(element, Extends):
                 self._extend(element, text, outer, depth)
             elif not isinstance(element, Import):

@@ -89,7 +89,29 @@ def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
         value = resolve.Resolver(*given.scope, numeric=True)(given.value)
     finally:
         owner.folded.remove(name)
+    _check_value(owner, member, value)
     return value
+
+
+def _check_value(owner: Instance, member: Member, value: Expr) -> None:
+    """Refuse a value that is not of the declared type, or an array of another size."""
+    declared, basic = member.declaration, basic_type(owner, member)
+    wrong = ""
+    numbers = [leaf.args[0] for leaf in _elements(value) if leaf.kind == "number"]
+    if basic is not None and basic.kind in ("Integer", "Boolean"):
+        others = [number for number in numbers if basic.kind == "Boolean" or number != math.floor(number)]
+        kind = "an Integer" if basic.kind == "Integer" else "a Boolean"
+        wrong = f"is {kind}, and {others[0]:g} is none" if others else ""
+    # A colon takes the size of the value.
+    if value.kind == "array" and declared.dimensions and all(one.kind != "all" for one in declared.dimensions):
+        size, given_size = sizes(owner, member)[0], len(value.args)
+        wrong = f"has the size {size}, and its value the size {given_size}" if size != given_size else wrong
+    if wrong:
+        raise ModelicaTextError(f"{declared.name} {wrong}.", where=member.text.place(declared.line))
+
+
+def _elements(value: Expr) -> list[Expr]:
+    return [one for inner in value.args for one in _elements(inner)] if value.kind == "array" else [value]
 
 
 def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known | str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 
-from modelica_like.errors import LanguageError, Source
+from modelica_like.errors import LanguageError, ModelicaLikeError, Source
 from modelica_like.language import (
     TIME,
     Assembly,
@@ -56,6 +57,16 @@ class Happening:
     branches: tuple[tuple[tuple[Node, ...], Mapping[str, Node]], ...]
     source: Source
     text: str = ""
+
+
+@contextmanager
+def _told_at(source: Source) -> Iterator[None]:
+    """Give errors the place in the text: that of the caller is within this package."""
+    try:
+        yield
+    except ModelicaLikeError as error:
+        error.where = (source,)
+        raise
 
 
 TERMINATE, ASSERT = "terminate()", "assert()"
@@ -118,23 +129,27 @@ class Written(Assembly):
 
     def _equations(self, statements: Iterable[tuple[Node, Node, Source]]) -> Equations:
         for left, right, source in statements:
-            yield Equation(self.symbolic(left), self.symbolic(right), source)
+            with _told_at(source):
+                sides = self.symbolic(left), self.symbolic(right)
+            yield Equation(*sides, source)
 
     def events(self) -> Events:
         """Yield the whens and the assertions."""
         for happening in self._inside.happenings:
-            if happening.text:
-                yield replace(
-                    assert_(self.symbolic(happening.branches[0][0][0]), happening.text), source=happening.source
-                )
-                continue
-            event = None
-            for conditions, values in happening.branches:
-                active = tuple(self.symbolic(condition) for condition in conditions)
-                new = dict[Any, Any](self._changed(path, value) for path, value in values.items())
-                event = when(active, new) if event is None else event.elsewhen(active, new)
+            with _told_at(happening.source):
+                event = self._event(happening)
             if event is not None:
                 yield replace(event, source=happening.source)
+
+    def _event(self, happening: Happening) -> Any:
+        if happening.text:
+            return assert_(self.symbolic(happening.branches[0][0][0]), happening.text)
+        event = None
+        for conditions, values in happening.branches:
+            active = tuple(self.symbolic(condition) for condition in conditions)
+            new = dict[Any, Any](self._changed(path, value) for path, value in values.items())
+            event = when(active, new) if event is None else event.elsewhen(active, new)
+        return event
 
     def _changed(self, path: str, value: Node) -> tuple[Any, Any]:
         """Return what a `when` changes, and its new value."""
