@@ -1,6 +1,7 @@
 """Ideal elements: combinations of modes, conditions on states; against closed forms and a mode machine by hand."""
 
 from math import atan, cos, exp, pi, sin
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -24,8 +25,9 @@ from components import (
     Sine,
     Torque,
 )
-from modelica_like import Assembly, Component, Solution, build, sensitivities, simulate
-from modelica_like.errors import NoValidModes
+from modelica_like import Assembly, Component, Solution, build, export_fmu, sensitivities, simulate
+from modelica_like.errors import MissingStart, NoValidModes
+from modelica_like.language.inside import inside
 
 Solver = Literal["idas", "native"]
 TIGHT: dict[str, Any] = {"rtol": 1e-10, "atol": 1e-12}
@@ -213,3 +215,31 @@ def test_random_networks_are_complementary(seed: int, solver: Solver) -> None:
     for name in [name for name in run.model.components if name.startswith("D")]:
         v, i = run[f"{name}.v"], run[f"{name}.i"]
         assert max(v.max(), -i.min(), np.abs(v * i).max()) < 1e-5
+
+
+def chopper(**given: float) -> Assembly:
+    parts = circuit(
+        {
+            "gate": ["p.y", "S.closed"], "in": ["U.p", "S.p"], "x": ["S.n", "D.n", "R.p"], "y": ["R.n", "L.p"],
+            "minus": ["U.n", "D.p", "L.n", "earth.p"],
+        },
+        U=ConstantVoltage(V=48.0), p=Pulse(period=1.0, width=0.05), S=IdealSwitch(), D=IdealDiode(),
+        R=Resistor(R=2.0), L=Inductor(L=0.1, **given),
+    )  # fmt: skip
+    inside(parts).simulate["start"] = "rest"
+    return parts
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_current_that_open_elements_block_is_zero_at_rest(solver: Solver, tmp_path: Path) -> None:
+    # All elements start open: then the current is zero whatever its start, and the potential between them is open.
+    run = simulate(chopper(), 0.1, solver=solver, **TIGHT)
+    rises = 24 * (1 - np.exp(-20 * run.time))
+    falls = 24 * (1 - exp(-1)) * np.exp(-20 * (run.time - 0.05))
+    assert run["L.i"] == pytest.approx(np.where(run.time <= 0.05, rises, falls), abs=1e-6)
+    assert not export_fmu(chopper(), tmp_path / "chopper.fmu").check.differs
+
+
+def test_without_a_start_from_rest_that_current_is_named() -> None:
+    with pytest.raises(MissingStart, match=r"lacks one equation: give R\.i a start value"):
+        simulate(chopper(), 0.1, start="given")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -198,15 +199,21 @@ class _Choice:
         self.own = ny + nz
         self.row_of = {node: self.own + k for k, node in enumerate(self.system.nodes)}
 
-    def plan(self, matrix: Any) -> StartPlan:
-        """Choose by structure, or by the numbers of a Jacobian."""
+    def plan(self, matrix: Any, still: Sequence[int] = ()) -> StartPlan:
+        """Choose by structure, or by the numbers of a Jacobian.
+
+        Args:
+            matrix: the Jacobian, None for the structure.
+            still: states at rest whatever the modes, which determine them otherwise.
+        """
         direct = tuple(self.direct.items())
         general = [k for k, e in enumerate(self.model.starts.entries) if e.strength == "fixed" and e.state is None]
         if self.kind == "steady" or not (self.free or general):
             return StartPlan(self.kind, self.system, direct)
         # Where modes do not determine reactions, redundant implicit equations and as many reactions are left out.
-        own = self._begin(matrix)
+        own = self._begin(matrix, still)
         kept = self._keep(len(own) < self.own)
+        by_modes = [] if still else self._at_rest_by_modes()
         rows = [k for k in general if self._accept(self.model.starts.entries[k].node)]
         taken = set(rows)
         dependent = [k for k in general if k not in taken]
@@ -216,7 +223,13 @@ class _Choice:
         ]
         resting, zero = self._rest()
         if self.choice.size < len(self.columns):
+            if by_modes and not self._states_left():
+                return self.plan(matrix, by_modes)
             raise self._missing()
+        zero = [*still, *zero]
+        if still and len(zero) == len(self.free) and not rows:
+            # All states are known, and what is implicit follows in any mode.
+            return StartPlan(self.kind, self.system, direct, dependent=tuple(dependent), zero=tuple(zero))
         known = {*zero, *kept}
         columns = [column for column in self.columns if column not in known]
         nodes = [*(self.model.starts.entries[k].node for k in rows), *resting]
@@ -224,7 +237,18 @@ class _Choice:
         lists = (rows, dependent, resting, zero, columns, wanted)
         return StartPlan(self.kind, self.system, direct, *map(tuple, lists))
 
-    def _begin(self, matrix: Any) -> list[int]:
+    def _at_rest_by_modes(self) -> list[int]:
+        """States that rest, of which the modes leave no choice: currents that ideal elements block.
+
+        Such elements leave potentials open instead, and other modes at the same instant leave the states open.
+        """
+        left = {self.columns[k] for k in self.choice.undetermined()}
+        return [s for _, s in self.system.rest if s is not None and s in self.place and s not in left]
+
+    def _states_left(self) -> bool:
+        return any(k < len(self.free) for k in self.choice.undetermined())
+
+    def _begin(self, matrix: Any, still: Sequence[int]) -> list[int]:
         """Start with the explicit equations, which determine y, and the implicit ones, which determine z."""
         pattern = self.system.function.sparsity_out(1)
         numbers = [1.0] * pattern.nnz() if matrix is None else matrix.nonzeros()
@@ -236,6 +260,8 @@ class _Choice:
         if matrix is None:  # each has its own unknown, whatever structure solves it
             for row in range(self.own):
                 self.entries[row][len(self.free) + row] = 1.0
+        for state in still:
+            self.choice.add({self.place[state]: 1.0})
         return [row for row in range(self.own) if self.choice.add(self.entries[row])]
 
     def _keep(self, some: bool) -> list[int]:
@@ -264,7 +290,9 @@ class _Choice:
 
     def _missing(self) -> MissingStart:
         model, count = self.model, len(self.columns) - self.choice.size
-        names = [model.states[self.free[k]] for k in self.choice.undetermined() if k < len(self.free)]
+        left = [k for k in self.choice.undetermined() if k < len(self.free)]
+        # Where modes determine states, and leave potentials open instead, the states need values in other modes.
+        names = [model.states[self.free[k]] for k in left or range(len(self.free))]
         parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
         names = [_to_give(model, name) for name in names]
         if count == 1:
