@@ -8,9 +8,9 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import MissingValue, ValueOutOfRange
+from modelica_like.errors import MissingValue
 from modelica_like.runs.polynomials import SAME, Curves
-from modelica_like.runs.readings import Output, Part, is_series, read_output
+from modelica_like.runs.readings import Output, Part, read_number
 from modelica_like.runs.recorded import RecordedSolution
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Trajectories
@@ -154,11 +154,9 @@ def collector(model: CompiledDae, names: Sequence[str], atol: float) -> Collecto
 
     Raises:
         UnknownName: a reading is not known.
+        ValueOutOfRange: it is a trajectory.
     """
-    for name in names:
-        if is_series(name):
-            raise ValueOutOfRange(f"{name} is a trajectory, not a number.", advice="Take it from the results.")
-    return Collector(model, [read_output(model, name) for name in names], atol)
+    return Collector(model, [read_number(model, name) for name in names], atol)
 
 
 def dense_of(solution: Trajectories, what: str) -> Dense:

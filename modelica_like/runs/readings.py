@@ -130,6 +130,18 @@ def listed(names: str | Sequence[str], what: str) -> list[str]:
     return result
 
 
+def read_number(model: CompiledDae, name: str) -> Output:
+    """Read the name of an output that is a number, not a trajectory.
+
+    Raises:
+        UnknownName: the model has no such output.
+        ValueOutOfRange: it is a trajectory.
+    """
+    if is_series(name):
+        raise ValueOutOfRange(f"{name} is a trajectory, not a number.", advice="Take it from the results.")
+    return read_output(model, name)
+
+
 def is_series(name: str) -> bool:
     """Return whether this is a trajectory, not a number."""
     return name.replace(" ", "").startswith("series(")

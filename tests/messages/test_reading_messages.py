@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modelica_like import ModelicaLikeError, build, calibrate, load_spectrum, sensitivities, simulate
+from modelica_like import ModelicaLikeError, build, calibrate, load_spectrum, sensitivities, simulate, sweep
 from modelica_like.analyse.sizing import load_of
 from modelica_like.errors import MissingValue, NetlistError, UnknownName, ValueOutOfRange
 from modelica_like.runs.readings import read_output
@@ -34,6 +34,9 @@ def unsteady(times: int) -> RecordedSolution:
 
 
 CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
+    "a trajectory in a sweep": (ValueOutOfRange, lambda: sweep(DRIVE, {"clutch.capacity": [90.0]}, ["series(clutch.tau)"]), """\
+series(clutch.tau) is a trajectory, not a number.
+Take it from the results."""),
     "a run without its polynomials": (MissingValue, lambda: pickle.loads(pickle.dumps(run())).read("max(clutch.tau)"), """\
 max(clutch.tau) cannot be read off this run: what happens between its results was not kept.
 Ask before the run: simulate(…, readings=["max(clutch.tau)"])."""),

@@ -22,7 +22,7 @@ import numpy as np
 from modelica_like.analyse.sweeps.native_runs import NativeRuns
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ModelicaLikeError, WorkersLost, extra_module
-from modelica_like.runs.readings import read_output
+from modelica_like.runs.readings import read_number, read_output
 from modelica_like.simulation import plan, simulate
 
 _RESTARTS = 3
@@ -66,7 +66,7 @@ class Job:
         identity = repr(
             [model.summary, [variable.path for variable in model.flat_variables], model.p.tolist(), model.u.tolist()]
         )
-        units = tuple(str(read_output(model, name).unit) for name in outputs)
+        units = tuple(str(read_number(model, name).unit) for name in outputs)
         return cls(pickle.dumps(model), identity, tuple(names), tuple(outputs), units, settings)
 
 
