@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from itertools import combinations, pairwise
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
-from modelica_like.errors import MissingExtra, NetlistError
+from modelica_like import build
+from modelica_like.errors import LanguageError, MissingExtra, NetlistError
 from modelica_like.language import Component
 from modelica_like.netlist import load, loads
 from modelica_like.show.draw import layout, save_schematic, schematic
@@ -212,3 +214,16 @@ def test_what_cannot_be_written_is_told_first(tmp_path: Path, monkeypatch: pytes
     with pytest.raises(MissingExtra, match="resvg_py is not installed"):
         save_schematic(drive("fan.toml"), tmp_path / "fan.png")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_netlist_is_drawn_by_its_path(tmp_path: Path) -> None:
+    netlist = EXAMPLES / "two_mass.toml"
+    save_schematic(netlist, tmp_path / "drive.svg")
+    assert (tmp_path / "drive.svg").read_text() == schematic(load(netlist))
+
+
+def test_a_compiled_drive_is_not_drawn() -> None:
+    compiled: Any = build(EXAMPLES / "two_mass.toml")
+    with pytest.raises(LanguageError) as caught:
+        schematic(compiled)
+    assert str(caught.value) == ("A compiled drive has no parts to draw.\nGive the component or the netlist.")

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from modelica_like.errors import NetlistError, missing_extra
+from modelica_like.errors import LanguageError, NetlistError, missing_extra
 from modelica_like.language.component import Component
 from modelica_like.runs.energy import EnergyBalance
 from modelica_like.runs.trajectories import Trajectories
@@ -45,14 +45,14 @@ def layout(component: Component, *, depth: int = 1, notes: Notes | None = None) 
 
 
 def schematic(
-    component: Component, *, depth: int = 1, background: bool = True, run: Trajectories | None = None,
+    component: Component | str | Path, *, depth: int = 1, background: bool = True, run: Trajectories | None = None,
     at: float | None = None, flow: bool = False, moving: bool = False, balance: EnergyBalance | None = None,
     modes: Modes | None = None,
 ) -> str:  # fmt: skip
     """Draw a drive as SVG: power from left to right, a symbol for each machine element.
 
     Args:
-        component: the drive.
+        component: the drive, or its netlist.
         depth: number of levels of open assemblies.
         background: fill the paper; a page has one already.
         run: a run of the drive, whose modes are shown by colours: held, sliding, open.
@@ -63,8 +63,16 @@ def schematic(
         modes: small motions of the drive, drawn below: the shapes of the first four oscillations.
 
     Raises:
+        LanguageError: the drive is compiled already.
+        NetlistError: the netlist cannot be read.
         ValueOutOfRange: the run has no such time.
     """
+    if isinstance(component, str | Path):
+        from modelica_like.netlist import load
+
+        component = load(component)
+    if not isinstance(component, Component):
+        raise LanguageError("A compiled drive has no parts to draw.", advice="Give the component or the netlist.")
     drawn = layout(component, depth=depth, notes=energy_notes(balance) if balance else None)
     added = running(drawn, run, at=at, flow=flow, moving=moving, balance=balance) if run is not None else None
     below = shapes(drawn, modes, _SHAPES) if modes is not None else ()
@@ -107,13 +115,13 @@ def check_format(path: Path, *, moving: bool = False) -> None:
 
 
 def save_schematic(
-    component: Component, path: str | Path, *, depth: int = 1, run: Trajectories | None = None,
+    component: Component | str | Path, path: str | Path, *, depth: int = 1, run: Trajectories | None = None,
     at: float | None = None, flow: bool = False, moving: bool = False, modes: Modes | None = None,
 ) -> None:  # fmt: skip
     """Write the schematic of a drive as SVG, PNG or PDF, by the ending of the file.
 
     Args:
-        component: the drive.
+        component: the drive, or its netlist.
         path: the file.
         depth: number of levels of open assemblies.
         run: a run of the drive, as of `schematic`.
