@@ -213,14 +213,18 @@ void begin_start(Instance *c) {
 /* The solution of what is simplified is led to that of the actual expressions. */
 static Result lead(Instance *c) {
     int place = c->model->settings->homotopy, steady = c->model->settings->steady;
-    double step = SHARE;
+    double step = SHARE, led = 0; /* of its own: a damaged model may have the place of a mode */
     begin_start(c);
     if (!(steady ? start_steady(c) : find_start(c))) return RESULT_ERROR;
-    while (place >= 0 && c->d[place] < 1) {
+    while (place >= 0 && led < 1) {
+        double next = fmin(led + step, 1);
         keep_start(c, KEPT_LED, 0);
-        c->d[place] = fmin(c->d[place] + step, 1);
+        c->d[place] = next;
         share(c);
-        if (steady ? find_steady(c, 0, 0) : find_start(c)) continue;
+        if (steady ? find_steady(c, 0, 0) : find_start(c)) {
+            led = next;
+            continue;
+        }
         step /= 2;
         if (step < LEAST_SHARE) return RESULT_ERROR;
         keep_start(c, KEPT_LED, 1);
