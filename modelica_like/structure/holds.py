@@ -47,6 +47,7 @@ class HeldMotion:
         rigid: whether the equation is only der(motion) = 0.
         approach: position in d of the prescribed derivative of the motion; zero except in impacts.
         state: (state, factor) if the motion is one.
+        position: state whose rate the motion is, up to a factor, or -1.
     """
 
     component: str
@@ -59,6 +60,7 @@ class HeldMotion:
     rigid: bool
     approach: int
     state: tuple[int, float] | None = None
+    position: int = -1
 
 
 @dataclass(frozen=True)
@@ -284,10 +286,11 @@ def share_reactions(system: System, holds: tuple[HeldMotion, ...], circuits: lis
 
 
 def held_rates(model: FlatModel, ode: Any, values: Any, holds: tuple[HeldMotion, ...], circuits: list[Circuit]) -> Any:
-    """Let states that modes hold stay where they are, exactly.
+    """Let states that modes hold stay where they are, exactly, and those whose rates modes hold.
 
     What holds them would otherwise be solved for among accelerations that may be a million times as large, and in hours
-    their rounding adds up: a state that drifts under a large reaction takes power.
+    their rounding adds up: a state that drifts under a large reaction takes power. The slip of a stuck clutch would be
+    the difference of other speeds: its rounding is far more than what an integrator allows for its angle.
 
     Args:
         model: the flat model, with approaches and circuits.
@@ -299,10 +302,14 @@ def held_rates(model: FlatModel, ode: Any, values: Any, holds: tuple[HeldMotion,
     switched = {k: circuit.first + place for circuit in circuits for place, k in enumerate(circuit.members)}
     gain, rates, d = hold_terms(model, values)[:, 0], ca.SX(ode), model.d
     for k, hold in enumerate(holds):
-        if hold.rigid and hold.state is not None:
+        if not hold.rigid:
+            continue
+        holding = ca.logic_and(d[hold.mode] == hold.number, gain[k] != 0)
+        if k in switched:
+            holding = ca.logic_and(holding, d[switched[k]] == 0)
+        if hold.state is not None:
             state, factor = hold.state
-            rate = ca.logic_and(d[hold.mode] == hold.number, gain[k] != 0)
-            if k in switched:
-                rate = ca.logic_and(rate, d[switched[k]] == 0)
-            rates[state] = ca.if_else(rate, d[hold.approach] / factor, rates[state])
+            rates[state] = ca.if_else(holding, d[hold.approach] / factor, rates[state])
+        if hold.position >= 0:
+            rates[hold.position] = ca.if_else(holding, 0, rates[hold.position])
     return rates

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -164,11 +165,20 @@ def reduce(flat: FlatModel) -> ReducedDae:
         solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
     degrees = len(counts) - sum(len(choice.chains) for choice in chosen.following)
     reduced = _assemble(system, counts[:degrees], states, unknowns, origins, solved)
-    held = tuple(replace(hold, state=reduced.node_states[hold.motion]) for hold in holds)
+    held = tuple(_placed(holds, reduced, states))
     ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
     choices = tuple(write_choice(choice, system, states, reduced.level_values) for choice in chosen.following)
     reduced = replace(reduced, ode=ode, holds=held, circuits=tuple(circuits), choices=choices)
     return complete(reduced, ideals, solved.rows) if ideals else reduced
+
+
+def _placed(holds: Iterable[HeldMotion], reduced: ReducedDae, states: list[int]) -> Iterator[HeldMotion]:
+    """Yield holds with the states of their motions and those of the positions whose rates these are."""
+    system, rates = reduced.system, {reduced.system.derivative(level): k for k, level in enumerate(states)}
+    for hold in holds:
+        placed = system.node_level[hold.motion]
+        position = rates.get(placed[0], -1) if placed is not None else -1
+        yield replace(hold, state=reduced.node_states[hold.motion], position=position)
 
 
 @dataclass

@@ -11,6 +11,7 @@ from components import (
     BearingFriction,
     Brake,
     Clutch,
+    Constant,
     ConstantSpeed,
     ConstantTorque,
     IdealGear,
@@ -23,6 +24,7 @@ from components import (
     Torque,
 )
 from modelica_like import Assembly, Component, Solution, simulate
+from modelica_like.simulation import Solver
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
@@ -383,3 +385,24 @@ def test_brakes_share_anew_while_others_slip() -> None:
     run = simulate(Assembly("shared", parts=parts, connect=wires), 1.0, points=4)
     assert not [event for event in run.events if event.mode.endswith(".mode")]
     assert run.final["near.tau"] + 2 * run.final["far.tau"] == pytest.approx(3.2, rel=1e-12)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_clutch_that_sticks_in_fast_shafts_does_not_move_at_all(solver: Solver) -> None:
+    """Its slip is the difference of speeds of 1e6 rad/s: their rounding is no motion, and asks for no steps."""
+    presses = {"one": Constant(k=1.0), "two": Constant(k=1.0)}
+    parts = {
+        "motor": ConstantTorque(tau_constant=7.0),
+        "left": still(1e6, J=2.0),
+        "stuck": Clutch(fn_max=1000.0, cgeo=1.0, mu_pos=[[0.0, 0.3]]),
+        "right": still(1e6, J=3.0),
+        "slipping": Clutch(fn_max=1e-3, cgeo=1.0, mu_pos=[[0.0, 0.3]]),
+        "gear": IdealGear(ratio=2.0),
+        "slow": still(-3e6, J=0.5),
+    }
+    wires = {"one": ("one.y", "stuck.f_normalized"), "two": ("two.y", "slipping.f_normalized")}
+    drive = Assembly("drive", parts={**parts, **presses}, series={"shaft": list(parts)}, connect=wires)
+    run = simulate(drive, 1e5, solver=solver)
+    assert np.ptp(run["stuck.phi_rel"]) == 0.0
+    assert run.final["left.w"] == pytest.approx(1e6 + (7.0 - 3e-4) / 5.0 * 1e5, rel=1e-12)
+    assert run.statistics.steps < 200
