@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 Start = Annotated[
     Literal["given", "rest", "steady"] | None,
-    Option(help="Start values that are missing: none (given), zero (rest), or those of the steady state."),
+    Option(help="Missing start values: none (given), zero (rest); or steady, for which given ones are guesses."),
 ]
 Solver = Annotated[
     Literal["idas", "native"] | None,
