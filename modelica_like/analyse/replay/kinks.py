@@ -114,25 +114,24 @@ class Kinks:
         sizes = np.ones(len(sides[0]))
         sizes[: len(rates)] = model.equations.nominals
         jumps = np.flatnonzero(np.abs(sides[1] - sides[0]) > _JUMP * (sizes + np.abs(sides[0]) + np.abs(sides[1])))
-        kink = slopes(model, at, f"{self._key}", [number], lambda: self._function)
-        when = -kink.by[0] / kink.rate[0], SAME * size
-        if not jumps.size:
-            roots = self._roots(both, crossed, sides, size, sizes)
-            if not roots.size:
-                return None
-            steep = NoGradient(
+        roots = self._roots(both, crossed, sides, size, sizes)
+        if jumps.size:
+            reason = NoGradient(
+                f"No gradient at t = {at.t:.9g} s: {self._named(int(jumps[0]))} jumps without an event.",
+                why="The jump moves with the parameter, and only the time of an event has a derivative.",
+                advice="Let it be an event: leave out events=False, or noEvent in Modelica text. An atan2, which jumps "
+                "at a half turn, makes none: keep it off that.",
+            )
+        elif roots.size:
+            reason = NoGradient(
                 f"No gradient at t = {at.t:.9g} s: the slope of {self._named(int(roots[0]))} has no bound there.",
                 why="No step is short enough for the derivative of what follows.",
                 advice="Round the law there, as sqrt(x) by x/(x**2 + small**2)**0.25.",
             )
-            return Coincidence(*when, steep)
-        reason = NoGradient(
-            f"No gradient at t = {at.t:.9g} s: {self._named(int(jumps[0]))} jumps without an event.",
-            why="The jump moves with the parameter, and only the time of an event has a derivative.",
-            advice="Let it be an event: leave out events=False, or noEvent in Modelica text. An atan2, which jumps at "
-            "a half turn, makes none: keep it off that.",
-        )
-        return Coincidence(*when, reason)
+        else:
+            return None
+        kink = slopes(model, at, f"{self._key}", [number], lambda: self._function)
+        return Coincidence(-kink.by[0] / kink.rate[0], SAME * size, reason)
 
     def _named(self, k: int) -> str:
         states = self.model.states
