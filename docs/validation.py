@@ -34,7 +34,7 @@ class Run(NamedTuple):
 
 
 BY_HAND = {
-    "RANDOM_LAWS": Run(5000, {"": None}),
+    "RANDOM_LAWS": Run(5000, {"": 5012}),
     "NARROW_FORCES": Run(20, {"forces": 1024, "carriers": 512}),
     "LIBRARY_DRIVES": Run(500, {"": None}),
 }
