@@ -29,7 +29,7 @@ from modelica_like.language import (
     where,
 )
 
-Kind = Literal["where", "sign", "floor", "mod", "meets", "steep", "time", "clock"]
+Kind = Literal["where", "cubic", "sign", "floor", "mod", "meets", "steep", "time", "clock"]
 
 
 class Way(Component):
@@ -48,6 +48,8 @@ class Way(Component):
         match self.kind:
             case "where":
                 return where(x < b, a, 1.0, events=events)
+            case "cubic":
+                return where((x - b) ** 3 < 0, a, 1.0, events=events)
             case "sign":
                 return (a + 1) / 2 - (a - 1) / 2 * sign(x - b, events=events)
             case "floor":
@@ -69,6 +71,8 @@ class Way(Component):
 
 
 JUMPS: tuple[Kind, ...] = ("where", "sign", "floor", "mod")
+FLAT: Kind = "cubic"
+"""Its condition is flat where the rate jumps: no event tells when that is, either."""
 END = 0.9
 
 
@@ -107,6 +111,14 @@ def test_what_is_merely_steep_has_derivatives(solver: Any) -> None:
     """Where the rate falls within a way of 1e-6: nearly those of the jump with an event."""
     found = sensitivities(simulate(Way(kind="steep"), END, solver=solver), "x", ["a", "b"])
     np.testing.assert_allclose(found.derivatives, [[0.25, 0.5]], rtol=1e-5)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_jump_where_its_condition_is_flat_has_none_either(solver: Any) -> None:
+    run = simulate(Way(kind=FLAT), END, solver=solver)
+    assert run.final["x"] == pytest.approx(1.4, abs=1e-5)
+    with pytest.raises(NoGradient, match=r"the rate of x jumps without an event"):
+        sensitivities(run, "x", ["a", "b"])
 
 
 def test_only_parameters_that_move_the_jump_have_none() -> None:

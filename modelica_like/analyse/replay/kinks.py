@@ -25,8 +25,9 @@ from modelica_like.solve.recorder import Segment
 _DIFFERENCES = (ca.OP_LT, ca.OP_LE, ca.OP_FMIN, ca.OP_FMAX)
 _ZEROS = (ca.OP_FABS, ca.OP_SIGN)
 _NOISE = 1e-12
-_AWAY = 10.0 ** np.arange(-12, -4)
-"""Distances from a kink, relative to the time; the first one on a side counts. Where rates jump, steps end roughly."""
+_AWAY = 10.0 ** np.arange(-12, -2)
+"""Distances from a kink, relative to the time; the first one on a side counts. Where rates jump, steps end roughly, and
+the cube of a distance is as good as zero long before it."""
 _BESIDE = 1e-15
 """Distance of two points on both sides of a kink, relative to the time: rounding."""
 _JUMP = 1e-4
@@ -93,6 +94,9 @@ class Kinks:
             number: of the kink.
             begin: kinks at the beginning of the step that leads there.
             integrands: gives those of the quadratures at a point.
+
+        Raises:
+            NoGradient: they do where nothing tells when that is.
         """
         model = self.model
         rates = call(model, model.equations.ode, at)
@@ -131,6 +135,8 @@ class Kinks:
         else:
             return None
         kink = slopes(model, at, f"{self._key}", [number], lambda: self._function)
+        if not kink.rate[0]:
+            raise reason  # nothing tells which parameters move it
         return Coincidence(-kink.by[0] / kink.rate[0], SAME * size, reason)
 
     def _named(self, k: int) -> str:
