@@ -132,7 +132,8 @@ def shown(value: Any, quantity: Quantity) -> str:
         return str(value)
     if isinstance(value, tuple):
         return ", ".join(shown(item, quantity) for item in cast("tuple[Any, ...]", value))
-    numbers = np.ravel(np.asarray(value, dtype=float)) / quantity.factor + 0.0
+    with np.errstate(over="ignore"):  # 1e308 m is inf in mm
+        numbers = np.ravel(np.asarray(value, dtype=float)) / quantity.factor + 0.0
     return ", ".join(f"{number:.6g}" for number in numbers)
 
 

@@ -202,12 +202,16 @@ class Integrator:
 
         With `gentle`, a step s moves them by s² times rates times the span.
         """
-        rates = np.abs(call(self.model, self.model.equations.ode, start)) * span
-        fastest = float(np.max(rates / self.weights(start.x)))
+        fastest = float(np.max(self._rates(start))) * span
         step = _FIRST_STEP
         while np.isfinite(fastest) and (step * _SHORTENED) ** 2 * fastest > 1.0:
             step *= _FIRST_STEP
         return step
+
+    def _rates(self, point: Point) -> np.ndarray:
+        """Return the rates of the states in their tolerances, 1/s; infinite beyond the largest number."""
+        with np.errstate(over="ignore"):
+            return np.abs(call(self.model, self.model.equations.ode, point)) / self.weights(point.x)
 
     def _make(self, grid: Grid, steps: int, gentle: bool, first: float, longest: float) -> ca.Function:
         length = self._seconds or 1.0
@@ -337,10 +341,10 @@ class Integrator:
 
     def failure(self, what: str, point: Point) -> StepFailed:
         """Return an error that names the state which changes fastest at a point."""
-        speed = np.abs(call(self.model, self.model.equations.ode, point)) / self.weights(point.x)
+        fastest = self.model.states[int(np.argmax(np.nan_to_num(self._rates(point))))]
         return StepFailed(
             what,
-            why=f"{self.model.states[int(np.argmax(np.nan_to_num(speed)))]} changes fastest relative to its tolerance.",
+            why=f"{fastest} changes fastest relative to its tolerance.",
             advice="Look for a stiff spring, a vanishing mass or a speed without bound; then try other tolerances.",
         )
 

@@ -1,5 +1,6 @@
 """Schematics of all examples, checked from their coordinates."""
 
+import re
 from collections.abc import Iterator
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -227,3 +228,9 @@ def test_a_compiled_drive_is_not_drawn() -> None:
     with pytest.raises(LanguageError) as caught:
         schematic(compiled)
     assert str(caught.value) == ("A compiled drive has no parts to draw.\nGive the component or the netlist.")
+
+
+def test_control_characters_of_a_name_do_not_spoil_the_picture() -> None:
+    text = (EXAMPLES / "two_mass.toml").read_text("utf-8")
+    drive = loads(re.sub('name = ".*"', r'name = "a\\u0000b\\u001b"', text, count=1))
+    assert ElementTree.fromstring(schematic(drive))[0].text == "a b "

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import tomllib
 import traceback
+import warnings
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from typing import Any
 from drives import crossing, drive, examples
 from files import archive, fmu, folder, sizing, ssp, system, table
 from inputs import STRANGE, document, mutated_text, mutated_tree, pieces
+from matplotlib.font_manager import get_font_names
 from modelica import modelica
 
 from components import Inertia
@@ -271,5 +273,7 @@ def main() -> None:
 
 if __name__ == "__main__":
     os.environ.setdefault("MPLBACKEND", "agg")
+    get_font_names()  # A list of fonts is written where matplotlib is used for the first time on a machine.
+    warnings.simplefilter("error")  # Nobody reads the lines that a warning writes among the results.
     watch()
     main()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from xml.sax.saxutils import escape
+from xml.sax import saxutils
 
 from modelica_like.language.icon import Icon, Stroke
 from modelica_like.show.draw.labels import NAME, VALUE, Text, meet
@@ -21,6 +21,11 @@ _MARGIN = 16.0
 _STRIP, _SWING = 96.0, 24.0
 """Height of a mode shape with its heading, and largest deviation."""
 _FONT = "Helvetica, Arial, 'Liberation Sans', sans-serif"
+
+
+def _escaped(text: str) -> str:
+    """Return text for XML, which has no control characters: a name or a value may have some."""
+    return saxutils.escape("".join(character if character.isprintable() else " " for character in text))
 
 
 def svg(
@@ -45,7 +50,7 @@ def svg(
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{_n(width)}" height="{_n(height)}" '
         f'viewBox="0 0 {_n(width)} {_n(height)}" font-family="{_FONT}">',
-        f"<title>{escape(title)}</title>",
+        f"<title>{_escaped(title)}</title>",
         f"<style>@media (prefers-color-scheme: dark){{{''.join(rules)}}}</style>",
     ]
     if background:
@@ -117,7 +122,7 @@ def _part(at: Point, part: Placed, run: Running) -> Iterator[str]:
     node, (x, y), (half_x, half_y) = part.node, (at[0] + part.at[0], at[1] + part.at[1]), part.half
     yield f'<g transform="translate({_n(x)} {_n(y)})">'
     kind = type(node.component).__name__
-    yield f"<title>{escape(f'{node.name}: {kind}')}</title>"
+    yield f"<title>{_escaped(f'{node.name}: {kind}')}</title>"
     if node.icon and (looks := run.modes.get(node)):
         yield from _looks(node.icon, looks, run, half_y, turned=node.turned)
     elif node.icon:
@@ -164,7 +169,7 @@ def _text(text: Text, look: str = "") -> str:
     bold = "" if text.size == VALUE else ' font-weight="bold"'
     return (
         f'<text class="{kind}" x="{_n(text.at[0])}" y="{_n(text.at[1])}" fill="{fill}" '
-        f'font-size="{_n(text.size)}" text-anchor="{text.anchor}"{bold}>{escape(text.text)}</text>'
+        f'font-size="{_n(text.size)}" text-anchor="{text.anchor}"{bold}>{_escaped(text.text)}</text>'
     )
 
 
