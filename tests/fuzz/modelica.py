@@ -18,7 +18,7 @@ from modelica_like.netlist.modelica.read import read_modelica
 from modelica_like.netlist.modelica.write import modelica_text
 
 HERE = Path(__file__).parent
-SHARED = Path(__file__).parents[4] / "shared"
+SHARED = next((up / "shared" for up in HERE.parents if (up / "shared").is_dir()), HERE.parents[2] / "shared")
 LARGEST = 30_000
 """Characters of the texts that are mutated."""
 WORDS = (

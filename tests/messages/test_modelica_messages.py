@@ -194,6 +194,14 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("Real x[3];", "for i in 1:0:2 loop x[i] = 1; end for;"),
         "The range 1:0:2 has a step of 0.\n  in a.mo:5 `for i in 1:0:2 loop x[i] = 1; end for;`",
     ),
+    "a text beside a number": (
+        model("Real x;", 'x = (if "x" > 1 then 1 else 0);'),
+        'A text and a number cannot be compared.\n  in a.mo:5 `x = (if "x" > 1 then 1 else 0);`',
+    ),
+    "an order of an enumeration": (
+        model("type M = enumeration(a, b); parameter M m = M.a; Real x;", "x = (if m < M.b then 1 else 0);"),
+        "M.a and M.b have no order here: compare them by == or <>.\n  in a.mo:5 `x = (if m < M.b then 1 else 0);`",
+    ),
     "a large array": (
         model("Real v[100000000];"),
         "An array cannot have 1e+08 elements: it has 0 to 100000.\n  in a.mo:3 `Real v[100000000];`",

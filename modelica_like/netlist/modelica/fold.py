@@ -22,6 +22,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "mod": lambda x, y: x - math.floor(x / y) * y, "div": lambda x, y: float(math.trunc(x / y)), "rem": math.fmod,
 }  # fmt: skip
 KNOWN = ("number", "boolean", "literal", "string")
+_KINDS = {"number": "a number", "boolean": "a truth value", "literal": "a value of an enumeration", "string": "a text"}
 
 
 LONGEST = 100_000
@@ -101,12 +102,20 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
             return Expr("boolean", (not decides,), line)
         return left[0] if len(left) == 1 else Expr(kind, args, line)
     if kind in _RELATIONS and all(argument.kind in KNOWN for argument in args):
-        return Expr("boolean", (_RELATIONS[kind](args[0].args[0], args[1].args[0]),), line)
+        return Expr("boolean", (_related(kind, *args),), line)
     if kind in _BINARY and all(argument.kind == "number" for argument in args):
         return _computed(_BINARY[kind], args, line)
     if kind == "+" and all(argument.kind == "string" for argument in args):
         return Expr("string", (args[0].args[0] + args[1].args[0],), line)
     return Expr(kind, args, line)
+
+
+def _related(kind: str, left: Expr, right: Expr) -> bool:
+    if left.kind != right.kind:
+        raise Unfit(f"{_KINDS[left.kind].capitalize()} and {_KINDS[right.kind]} cannot be compared")
+    if left.kind == "literal" and kind not in ("==", "<>"):
+        raise Unfit(f"{left.args[0]} and {right.args[0]} have no order here: compare them by == or <>")
+    return _RELATIONS[kind](left.args[0], right.args[0])
 
 
 def _computed(function: Callable[..., float], args: tuple[Expr, ...], line: int) -> Expr:
