@@ -179,6 +179,18 @@ static void take_piece(Instance *c) {
     keep_edges(c);
 }
 
+/* Whether a step has moved a state against a rate by which it would go a hundred times as far as it is large: a step
+ * that is long beside the growth or the swing of a state ends where these are balanced, and its errors look small. */
+static int is_against_rate(const Instance *c, double h, const double *first, const double *last) {
+    for (int k = 0; k < c->model->n_x; k++) {
+        double moved = last[k] - first[k], asked = h * c->first_rates[k], size = fmax(fabs(first[k]), fabs(last[k]));
+        if (asked * moved < 0 && fabs(asked) > 100 * size
+            && fabs(moved) > c->state.tolerance * size + c->state.absolute * c->model->nominals[k])
+            return 1;
+    }
+    return 0;
+}
+
 /* Takes one step from the present point towards `limit`, shorter where accuracy or an event asks for it. */
 static Result take_step(Instance *c, double limit) {
     State *s = &c->state;
@@ -195,7 +207,7 @@ static Result take_step(Instance *c, double limit) {
         if (h < least || !isfinite(h)) break;
         error = rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece);
         memcpy(c->step_error, c->stages + (size_t)(STAGES - 1) * c->model->n_unknowns, c->model->n_x * sizeof(double));
-        if (!(error >= 0 && isfinite(error))) error = 1e30;
+        if (!(error >= 0 && isfinite(error)) || is_against_rate(c, h, first, last_of(c->model, c->piece))) error = 1e30;
         else if (error > 1 && h < LEAST_OVER_EDGE * least && is_over_edge(c)) error = 1;
         if (cut) c->piece->end = limit;
         factor = 0.9 * pow(fmax(error, 1e-10), -0.2);

@@ -121,6 +121,7 @@ def _dense(run: Solution) -> Dense | None:
     return None if run.dense is None else run.dense()
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what is not finite has its notice in the balance
 def _drifts(
     model: CompiledDae, segments: Sequence[Segment], options: Options, dense: Dense | None, *, finer: bool = True
 ) -> tuple[Vector, Powers]:

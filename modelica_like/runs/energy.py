@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -150,9 +150,8 @@ class EnergyBalance(Shown):
 
         It judges the equations of components, whatever the precision of the integration.
         """
-        residuals = [abs(row.residual) for row in self.rows]
-        exchanged = abs(sum(row.inflow for row in self.rows))
-        return max([*residuals, exchanged], default=0.0) / (self.throughput or 1.0)
+        open_ends = [*(row.residual for row in self.rows), sum(row.inflow for row in self.rows)]
+        return _largest(open_ends) / (self.throughput or 1.0) if np.isfinite(self.throughput) else np.inf
 
     @property
     def imbalance(self) -> float:
@@ -165,6 +164,8 @@ class EnergyBalance(Shown):
         notes: list[str] = []
         for row in self.rows:
             name = row.component or "The model itself"
+            if not np.isfinite([row.inflow, row.source, row.stored, row.lost]).all():
+                notes.append(f"{name} has energies that are not finite numbers: there is no balance.")
             if row.imbalance:
                 notes.append(
                     f"{name} does not balance at {row.imbalance_time:.9g} s: power in, source, loss and rate of the "
@@ -174,7 +175,7 @@ class EnergyBalance(Shown):
                 notes.append(f"{name} has a negative loss, {-row.gain:.6g} W at {row.gain_time:.9g} s.")
         if self.at_events > _ROUNDING * self.throughput:
             notes.append(f"At an event {self.at_events:.6g} J appear or vanish without an impact or a reset.")
-        if self.tolerance and self.drift > _ADDED_UP * self.tolerance:
+        if self.tolerance and _ADDED_UP * self.tolerance < self.drift < np.inf:
             worst = max(self.rows, key=lambda row: abs(row.drift))
             notes.append(
                 f"The stored energy of {worst.component or 'the model itself'} drifts by {worst.drift:.2g} J, "
@@ -186,7 +187,8 @@ class EnergyBalance(Shown):
     @property
     def drift(self) -> float:
         """Largest integration error of a stored energy, relative to the throughput."""
-        return max((abs(row.drift) for row in self.rows), default=0.0) / (self.throughput or 1.0)
+        drifts = _largest(row.drift for row in self.rows)
+        return drifts / (self.throughput or 1.0) if np.isfinite(self.throughput) else np.inf
 
     def __str__(self) -> str:
         width = max([len("component"), *(len(row.component) for row in self.rows)])
@@ -210,6 +212,7 @@ class EnergyBalance(Shown):
         )
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what is not finite gets a notice
 def energy_balance(
     model: CompiledDae,
     segments: tuple[Segment, ...],
@@ -256,6 +259,11 @@ def energy_balance(
     unexplained = [(hit.time, hit.energy - float(np.sum(work))) for hit, work in zip(impacts, given, strict=True)]
     at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, unexplained)
     return EnergyBalance(rows, throughput, at_events, options.rtol)
+
+
+def _largest(values: Iterable[float]) -> float:
+    """Return the largest amount, infinite if one is not a number."""
+    return float(np.max(np.nan_to_num(np.abs([*values]), nan=np.inf), initial=0.0))
 
 
 class _Audit:

@@ -41,6 +41,8 @@ _STRICTER, _NOISY = 0.3, 1e-11
 is three to ten times as precise; below the second number rounding makes more steps than tolerances do."""
 _SHORTENED = 1e-6
 """Largest factor by which IDAS shortens its first step before it gives up."""
+_ENDLESS = 1e100
+"""Largest way of a state in tolerances: IDAS takes their squares, and searches for ever where these are not finite."""
 _SPARSE_FROM = 50
 """Number of unknowns from which CSparse is faster, if their order is good."""
 _FILLS = 1.5
@@ -264,6 +266,9 @@ class Integrator:
         p = np.concatenate([[start.t, span], self._tail, start.d])
         steps = self.options.max_steps if patient else min(self.options.max_steps, _PANEL_STEPS)
         gentle = span >= self._gentle_from
+        if not gentle and np.max(self._rates(start)) * span > _ENDLESS:
+            self.gave_up = self.too_fast(start)
+            raise self.gave_up
         x, z, why = self._call(start, p, grid, steps, gentle)
         if why and not gentle and _at_the_start(why):
             # IDAS searches for consistent slopes at the start, and may not find them; with `gentle` they are known.

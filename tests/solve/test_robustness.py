@@ -267,3 +267,42 @@ def test_the_seventh_failure_at_one_place_relaxes_the_tolerance(more: int, monke
     assert left == [0]
     assert len(run.notices) == more
     assert run.final["a.w"] == pytest.approx(1.0, rel=1e-6)
+
+
+class Growing(Component):
+    """x = exp(k·t)."""
+
+    x: Variable = var("1", "value")
+    k: Parameter = param("1/s", "rate", default=1.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.k * self.x
+
+
+@pytest.mark.parametrize("k", [1e12, 1e16, 1e20, 1e30, 1e100, 1e160, 1e300])
+def test_what_grows_faster_than_time_can_tell_is_refused(k: float) -> None:
+    """A step that is long beside the growth ends near 0, with an error that looks small: the state goes backwards."""
+    for run in (lambda: simulate(Growing(x=1.0, k=k), 1.0), lambda: build(Growing(x=1.0, k=k)).native().run(1.0)):
+        with pytest.raises(StepFailed, match="x changes fastest"):
+            run()
+
+
+@pytest.mark.parametrize("k", [1e20, 1e30, 1e100])
+def test_what_decays_faster_than_time_can_tell_is_gone(k: float) -> None:
+    assert simulate(Growing(x=1.0, k=-k), 1.0)["x"][-1] == pytest.approx(0, abs=1e-12)
+    assert build(Growing(x=1.0, k=-k)).native().run(1.0)[1][-1] == pytest.approx(0, abs=1e-12)
+
+
+def test_a_speed_whose_square_is_infinite() -> None:
+    """IDAS took the squares of the ways in its tolerances, and never ended; the own steps of the run-time do it."""
+    drive = Assembly("fast", parts={"J": Inertia(J=1.0, w=1e160), "brake": Damper(d=1.0, phi_rel=0.0), "wall": Fixed()},
+                     series={"shaft": ["J", "brake", "wall"]})  # fmt: skip
+    with pytest.raises(StepFailed, match="changes fastest"):
+        simulate(drive, 1.0, solver="idas")
+    run = simulate(drive, 1.0)
+    assert run.final["J.w"] == pytest.approx(1e160 * math.exp(-1), rel=1e-6)
+    energy = run.energy()
+    assert energy.closure == math.inf
+    assert energy.notices == tuple(
+        f"{name} has energies that are not finite numbers: there is no balance." for name in ("J", "brake")
+    )
