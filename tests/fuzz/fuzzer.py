@@ -218,8 +218,9 @@ def attempt(number: int, kind: str = "") -> Crash | None:
     except ModelicaLikeError:
         return None
     except OSError as error:
-        # The command line names the file and the reason, if the file is one that was asked for.
-        asked = str(error.filename or "").startswith((str(folder()), str(EXAMPLES)))
+        # The command line names the file and the reason, if the file is one that was asked for; `--output ""` is ".".
+        named = str(error.filename or "")
+        asked = named == "." or named.startswith((str(folder()), str(EXAMPLES)))
         return None if asked else Crash(number, make.__name__, given, error)
     except (Exception, Hang, Touched) as error:  # noqa: BLE001 - whatever it is
         return Crash(number, make.__name__, given, error)
