@@ -164,10 +164,11 @@ def _verdict(value: Number, bound: Number, quantity: Quantity, *, above: bool) -
     worst = int(np.argmax(np.where(np.isfinite(excess), excess, np.inf)))
     if excess[worst] <= _ROUNDING * abs(bounds[worst]):
         return "ok"
-    share = f" ({100 * float(excess[worst]) / abs(float(bounds[worst])):.3g} %)" if bounds[worst] else ""
+    more, limit = float(excess[worst]), float(bounds[worst])
+    share = f" ({100 * (more / abs(limit)):.3g} %)" if limit else ""
     unit = f" {quantity.shown}".rstrip()
-    limit, difference = shown(bounds[worst], quantity), f"{excess[worst] / quantity.factor:.4g}"
-    return f"{'above' if above else 'below'} the limit {limit}{unit} by {difference}{unit}{share}"
+    difference = f"{more / quantity.factor:.4g}{unit}{share}"
+    return f"{'above' if above else 'below'} the limit {shown(limit, quantity)}{unit} by {difference}"
 
 
 def _aligned(rows: list[tuple[str, ...]]) -> str:

@@ -194,6 +194,22 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("Real x[3];", "for i in 1:0:2 loop x[i] = 1; end for;"),
         "The range 1:0:2 has a step of 0.\n  in a.mo:5 `for i in 1:0:2 loop x[i] = 1; end for;`",
     ),
+    **{
+        f"arrays: {formula}": (model("Real x;", f"x = {formula};"), f"{what}.\n  in a.mo:5 `x = {formula};`")
+        for formula, what in {
+            "identity(time)": "The size of an array must be known",
+            "identity(100000)": "An array cannot have 1e+10 elements: it has 0 to 100000",
+            "scalar({1, 2})": "scalar(…) needs an array of one element, not of 2",
+            "scalar(fill(1, 0))": "scalar(…) needs an array of one element, not of 0",
+            "transpose({{1, 2}, {3}})": "transpose(…) needs a matrix: rows of the same length",
+            "sum({1, 2}, {3})": "sum(…) has 1 argument, not 2",
+            "product(3)": "product(…) needs an array",
+            "zeros()": "zeros(…) has at least 1 argument, not 0",
+            "fill(1)": "fill(…) has at least 2 arguments, not 1",
+            "Integer()": "Integer(…) has 1 argument, not 0",
+            "x[1]": "x is no array and has no subscript",
+        }.items()
+    },
     "a text beside a number": (
         model("Real x;", 'x = (if "x" > 1 then 1 else 0);'),
         'A text and a number cannot be compared.\n  in a.mo:5 `x = (if "x" > 1 then 1 else 0);`',

@@ -428,3 +428,14 @@ def test_mistakes_are_told_in_words_of_the_text(text_file: Any, meant: str, writ
     with pytest.raises(ModelicaLikeError) as caught:
         run(text_file(MEANT.replace(meant, written)))
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("formula", "value"),
+    [("sum({{1, 2}, {3, 4}})", 10), ("product({{1, 2}, {3, 4}})", 24), ("sum(identity(3))", 3),
+     ("sum(vector({{1, 2}, {3, 4}}))", 10), ("scalar({{7}})", 7), ("sum(transpose({{1, 2}, {3, 4}})*{1, 0})", 3)],
+)  # fmt: skip
+def test_functions_of_arrays_see_all_elements(formula: str, value: float, tmp_path: Path) -> None:
+    file = tmp_path / "a.mo"
+    file.write_text(f"model A\n  Real x(start = 0, fixed = true);\nequation\n  der(x) = {formula};\nend A;\n", "utf-8")
+    assert simulate(load(file), 1.0).final["x"] == pytest.approx(value, rel=1e-9)

@@ -24,7 +24,7 @@ def _filled(value: Expr, shape: tuple[Expr, ...], line: int) -> Expr:
 
 
 def _line(args: tuple[Expr, ...], line: int) -> Expr:
-    if len(args) != 3 or any(argument.kind != "number" for argument in args):
+    if any(argument.kind != "number" for argument in args):
         raise fold.Unfit("linspace needs three known numbers")
     start, stop, count = (argument.args[0] for argument in args)
     return Expr(
@@ -34,34 +34,69 @@ def _line(args: tuple[Expr, ...], line: int) -> Expr:
     )
 
 
+def elements(items: Expr) -> list[Expr]:
+    """Return the elements of an array of any dimensions, row by row."""
+    return [one for item in items.args for one in elements(item)] if items.kind == "array" else [items]
+
+
 def _product(args: tuple[Expr, ...], line: int) -> Expr:
     product = fold.number(1, line)
-    for argument in args[0].args:
+    for argument in elements(args[0]):
         product = fold.operation("*", (product, argument), line)
     return product
 
 
 def _identity(args: tuple[Expr, ...], line: int) -> Expr:
-    size = int(args[0].args[0])
+    if args[0].kind != "number":
+        raise fold.Unfit("The size of an array must be known")
+    size = fold.count(args[0].args[0])
+    fold.count(size * size)
     rows = (tuple(fold.number(row == column, line) for column in range(size)) for row in range(size))
     return Expr("array", tuple(Expr("array", row, line) for row in rows), line)
 
 
-OF_ARRAYS: dict[str, Callable[[tuple[Expr, ...], int], Expr]] = {
-    "sum": lambda args, line: fold.total(list(args[0].args), line),
-    "product": _product,
-    "fill": lambda args, line: _filled(args[0], args[1:], line),
-    "zeros": lambda args, line: _filled(fold.number(0, line), args, line),
-    "ones": lambda args, line: _filled(fold.number(1, line), args, line),
-    "identity": _identity,
-    "linspace": _line,
-    "vector": lambda args, line: args[0],
-    "scalar": lambda args, line: args[0].args[0],
-    "transpose": lambda args, line: Expr(
-        "array", tuple(Expr("array", c, line) for c in zip(*(row.args for row in args[0].args), strict=True)), line
-    ),
+def _scalar(args: tuple[Expr, ...], _: int) -> Expr:
+    inside = elements(args[0])
+    if len(inside) != 1:
+        raise fold.Unfit(f"scalar(…) needs an array of one element, not of {len(inside)}")
+    return inside[0]
+
+
+def _transposed(args: tuple[Expr, ...], line: int) -> Expr:
+    rows = args[0].args
+    if any(row.kind != "array" or len(row.args) != len(rows[0].args) for row in rows):
+        raise fold.Unfit("transpose(…) needs a matrix: rows of the same length")
+    return Expr("array", tuple(Expr("array", c, line) for c in zip(*(row.args for row in rows), strict=True)), line)
+
+
+OF_ARRAYS: dict[str, tuple[int, Callable[[tuple[Expr, ...], int], Expr]]] = {
+    "sum": (1, lambda args, line: fold.total(elements(args[0]), line)),
+    "product": (1, _product),
+    "fill": (-2, lambda args, line: _filled(args[0], args[1:], line)),
+    "zeros": (-1, lambda args, line: _filled(fold.number(0, line), args, line)),
+    "ones": (-1, lambda args, line: _filled(fold.number(1, line), args, line)),
+    "identity": (1, _identity),
+    "linspace": (3, _line),
+    "vector": (1, lambda args, line: Expr("array", tuple(elements(args[0])), line)),
+    "scalar": (1, _scalar),
+    "transpose": (1, _transposed),
 }
-"""Functions whose arguments or results are arrays."""
+"""Functions whose arguments or results are arrays, each with the number of its arguments; of -2 it has 2 or more."""
+
+
+def of_arrays(name: str, args: tuple[Expr, ...], line: int) -> Expr:
+    """Return the result of a function of `OF_ARRAYS`.
+
+    Raises:
+        Unfit: it has other arguments.
+    """
+    wanted, compute = OF_ARRAYS[name]
+    if len(args) < -wanted or (wanted > 0 and len(args) != wanted):
+        many = f"at least {-wanted}" if wanted < 0 else str(wanted)
+        raise fold.Unfit(f"{name}(…) has {many} argument{'' if wanted in (-1, 1) else 's'}, not {len(args)}")
+    if name in ("sum", "product", "scalar", "transpose") and args[0].kind != "array":
+        raise fold.Unfit(f"{name}(…) needs an array")
+    return compute(args, line)
 
 
 def size(items: Expr, dimension: int, line: int) -> Expr:
@@ -88,6 +123,8 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
     name, line = expression.args[0], expression.line
     text = resolver.find(name)
     if name == "Integer":
+        if len(given) != 1:
+            raise fold.Unfit(f"Integer(…) has 1 argument, not {len(given)}")
         return given[0]
     if not isinstance(text, ClassText) or text.kind not in ("function", "record"):
         raise refused(f"the function {name}", resolver.text, line, "Own functions with an algorithm are read.")

@@ -207,7 +207,7 @@ class Resolver:
             return self._scalar(owner, member, basic, before + name, subscripts, line)
         shape = members.sizes(owner, member)
         if len(subscripts) > len(shape):
-            raise refused(f"a subscript of {name}, which is no array,", self.text, line)
+            raise ModelicaTextError(f"{name} is no array and has no subscript.", where=self.text.place(line))
         whole = Expr("range", (fold.number(1), Expr("name", (("end", ()),), line)), line)
         every = bool(shape) and (not subscripts or subscripts[0].kind == "all")
         chosen = self.index(whole if every else subscripts[0], shape[0]) if shape else 0
@@ -239,6 +239,8 @@ class Resolver:
         if fixed and (self.numeric or basic.kind != "Real" or declared.dimensions or "constant" in fixed):
             return self.indexed(members.value_of(owner, declared.name, self.text, line), subscripts, line)
         if not declared.dimensions:
+            if subscripts:
+                raise ModelicaTextError(f"{path} is no array and has no subscript.", where=self.text.place(line))
             return Expr("name" if basic.kind != "Boolean" else "condition", ((path, ()),), line)
         return self.indexed(members.named_array(path, members.sizes(owner, member), basic.kind), subscripts, line)
 
@@ -322,9 +324,7 @@ class Resolver:
             return functions.size(items, int(self.number(given[1])) if len(given) > 1 else 0, line)
         values = tuple(self(argument) for argument in given)
         if short in functions.OF_ARRAYS:
-            if not values or (short in ("sum", "product", "scalar", "transpose") and values[0].kind != "array"):
-                raise ModelicaTextError(f"{short}(…) needs an array.", where=self.text.place(line))
-            return self._told(lambda: functions.OF_ARRAYS[short](values, line), line)
+            return self._told(lambda: functions.of_arrays(short, values, line), line)
         if short in ELEMENTARY:
             return self._told(lambda: fold.function(short, values, line), line)
         others = {key: self(argument) for key, argument in named}
