@@ -26,6 +26,13 @@ def memory() -> float:
         return math.inf
 
 
+_RANGES = (
+    ("rtol", 1e-14, 0.1), ("atol", SMALLEST_ATOL, 1.0), ("points", 1, 10_000_000), ("max_steps", 1, 10**9),
+    ("max_events", 1, 10**9), ("iterations", 1, 10**6),
+)  # fmt: skip
+"""Of the numbers of options: least and largest, whole ones where these are."""
+
+
 def _fits(value: object, *, whole: bool) -> bool:
     return isinstance(value, Integral if whole else Real)
 
@@ -63,10 +70,10 @@ class Options:
     on_energy_drift: OnEnergyDrift = "stop"
 
     def __post_init__(self) -> None:
-        for name, low, high in (("rtol", 1e-14, 0.1), ("atol", SMALLEST_ATOL, 1.0), ("points", 1, 10_000_000)):
-            value = getattr(self, name)
-            if not _fits(value, whole=name == "points"):
-                raise ValueOutOfRange(f"{name} = {value!r} is no {'whole ' * (name == 'points')}number.")
+        for name, low, high in _RANGES:
+            value, whole = getattr(self, name), isinstance(low, int)
+            if not _fits(value, whole=whole):
+                raise ValueOutOfRange(f"{name} = {value!r} is no {'whole ' * whole}number.")
             if not low <= value <= high:
                 told, least, most = (f"{one:,}" if isinstance(one, int) else f"{one:g}" for one in (value, low, high))
                 raise ValueOutOfRange(f"{name} = {told} is out of range: it must be between {least} and {most}.")

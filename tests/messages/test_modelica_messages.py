@@ -210,6 +210,11 @@ MESSAGES: dict[str, tuple[str, str]] = {
             "x[1]": "x is no array and has no subscript",
         }.items()
     },
+    "a run that begins later": (
+        "model A\n  Real x = time;\n  annotation(experiment(StartTime = 1, StopTime = 3));\nend A;\n",
+        "experiment(StartTime = 1): a model that is read runs from 0 s.\n  in a.mo:1 `model A`\n"
+        "Leave StartTime out, and call simulate(…, t0=…) in Python.",
+    ),
     "a text beside a number": (
         model("Real x;", 'x = (if "x" > 1 then 1 else 0);'),
         'A text and a number cannot be compared.\n  in a.mo:5 `x = (if "x" > 1 then 1 else 0);`',

@@ -232,6 +232,8 @@ The methods are forward, adjoint and auto (the cheaper of both)."""),
 There is no output 'table.v' in these sensitivities; did you mean 'table.s'?"""),
     "a precision out of range": (ValueOutOfRange, lambda: table("table.s", precision=1e-20), """\
 The precision of a replay, 1e-20, is out of range: it must be between 1e-13 and 0.001."""),
+    "an output that is infinite": (NoGradient, lambda: table("table.s/0"), """\
+table.s/0 is inf: what is not finite has no derivative."""),
     "a series as output of a function": (
         LanguageError, lambda: simulation_function(DIRECT, ["lead"], ["series(table.s)"]), """\
 series(table.s) is a trajectory; the outputs of a simulation function are numbers.

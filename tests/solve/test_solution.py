@@ -373,6 +373,13 @@ def test_wrong_options(arguments, kind, message):
     assert caught.value.what == message
 
 
+def test_wrong_limits():
+    with pytest.raises(ValueOutOfRange, match=r"^max_steps = 0 is out of range: it must be between 1 and 1,000,000,"):
+        Options(max_steps=0)
+    with pytest.raises(ValueOutOfRange, match=r"^iterations = 1\.5 is no whole number\.$"):
+        Options(iterations=1.5)  # type: ignore[arg-type]
+
+
 def test_arguments_win_over_options():
     found = simulate(Drive(), 0.5, options=Options(points=3, rtol=1e-5), points=2)
     assert (found.options.points, found.options.rtol) == (2, 1e-5)

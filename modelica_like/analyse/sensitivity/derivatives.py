@@ -117,6 +117,11 @@ def _differentiate(
     series = [output for output in outputs if output.kind == "series"]
     nodes = [*chain.nodes] if series else []
     readings = read_off(solution, chain, plain)
+    # The same name has the same number everywhere, though the replay is more precise.
+    values = solution.read(*(output.name for output in plain))
+    for output, value in zip(plain, values, strict=True):
+        if not np.isfinite(value):
+            raise NoGradient(f"{output.name} is {value:g}: what is not finite has no derivative.")
     over_time = [value_at(chain, output.path, node) for output in series for node in nodes]
     on_edge = [*edges(chain, readings), *at_instants(chain, readings, plain)]
     at_kink = kinks(chain, outputs)
@@ -145,8 +150,6 @@ def _differentiate(
     derivatives, chosen = of_outputs[:, kept], [chosen[k] for k in kept]
     if freed.slopes:
         derivatives = derivatives @ freed.taken_along([quantity.name for _, quantity in chosen])
-    # The same name has the same number everywhere, though the replay is more precise.
-    values = solution.read(*(output.name for output in plain))
     rows = derivatives[len(plain) :].reshape(len(series), len(nodes), len(chosen))
     return Sensitivities(
         chain.model.name,

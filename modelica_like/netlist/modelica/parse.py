@@ -277,9 +277,11 @@ class _Parser(Expressions):
             if text == "experiment" and kind == "name" and depth == 1 and class_text is not None:
                 self.at += 1
                 for argument in self.modification().arguments:
-                    value = argument.modification.value
+                    value, sign = argument.modification.value, 1.0
+                    if value is not None and value.kind == "neg":
+                        value, sign = value.args[0], -1.0
                     if value is not None and value.kind == "number":
-                        class_text.experiment[argument.name] = value.args[0]
+                        class_text.experiment[argument.name] = sign * value.args[0]
                 continue
             if kind == "end of file":
                 self.refuse("An annotation has no end.", line)

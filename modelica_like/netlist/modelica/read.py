@@ -37,6 +37,11 @@ def read_modelica(path: Path, name: str = "") -> tuple[Written, list[str]]:
         raise ModelicaTextError(
             "Classes, functions or formulas are nested too deeply.", where=text.place(text.line)
         ) from None
+    if text.experiment.get("StartTime", 0.0) != 0.0:
+        raise ModelicaTextError(
+            f"experiment(StartTime = {text.experiment['StartTime']:g}): a model that is read runs from 0 s.",
+            where=text.place(text.line), advice="Leave StartTime out, and call simulate(…, t0=…) in Python.",
+        )  # fmt: skip
     # A variable whose start value is not fixed starts at the start value of its class, which is zero.
     settings = {"start": "rest", "on_chattering": "rest"} | (
         {"until": f"{text.experiment['StopTime']:g} s"} if "StopTime" in text.experiment else {}
