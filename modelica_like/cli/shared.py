@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -194,10 +194,15 @@ def values(assignments: list[str] | None) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """Read a value of the command line: true, false, a number, or a text with a unit."""
+    """Read a value of the command line: true, false, a number, a table as in a netlist, or a text with a unit."""
     words: dict[str, Any] = {"true": True, "false": False}
     if text in words:
         return words[text]
+    if text.startswith("["):
+        import tomllib
+
+        with suppress(tomllib.TOMLDecodeError, RecursionError):
+            return tomllib.loads(f"table = {text}")["table"]
     readers: tuple[Callable[[str], Any], ...] = (int, float)
     for reader in readers:
         try:

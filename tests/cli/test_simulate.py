@@ -35,6 +35,25 @@ def pendulum(tmp_path: Path) -> str:
     return str(tmp_path / "pendulum.toml")
 
 
+def test_a_table_is_set(pendulum: str, tmp_path: Path) -> None:
+    """An angle of 0.1 rad is at rest under the torque of the table: 100 N·m/rad · 0.1 rad."""
+    netlist = tmp_path / "held.toml"
+    netlist.write_text(
+        Path(pendulum).read_text("utf-8").replace("w = 1 }", "w = 0 }\ntorque = { is = 'Torque' }\n"
+        "table = { is = 'Table', table = [[0, 0], [1, 0]], scale = '1 N.m' }")
+        .replace("[start]", "[connect]\nload = ['torque.flange', 'mass.flange_b']\n"
+        "value = ['table.y', 'torque.tau']\n[start]"), "utf-8",
+    )  # fmt: skip
+    file = tmp_path / "held.csv"
+    result = called(["simulate", str(netlist), "--set", "table.table=[[0, 10], [1, 10]]", "--csv", str(file)])
+    assert result.exit_code == 0, result.stderr
+    with file.open(encoding="utf-8") as lines:
+        assert {round(float(row["mass.phi"]), 9) for row in csv.DictReader(lines)} == {0.1}
+    spoilt = called(["simulate", str(netlist), "--set", "table.table=[[0, 10], [1, 10]"])
+    assert spoilt.exit_code == 2
+    assert "table = '[[0, 10], [1, 10]' must be" in spoilt.stderr
+
+
 def test_check_tells_the_structure() -> None:
     result = called(["check", DIRECT])
     assert result.exit_code == 0
