@@ -16,7 +16,7 @@ from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import LanguageError, Source
+from modelica_like.errors import LanguageError, Source, UnknownName
 
 _LANGUAGE = str(Path(__file__).parent)
 _PACKAGE = str(Path(__file__).parent.parent)
@@ -58,6 +58,8 @@ def located(generator: Any, label: str = "equations()") -> Iterator[tuple[Any, S
             item = next(items, _END)
         except RuntimeError as error:
             raise _undecided(error, label) or _left_open(error) or error from None
+        except AttributeError as error:
+            raise _lacking(error) or error from None
         except (OSError, SystemExit) as error:
             raise LanguageError(f"{label} fails.", why=f"It raises {type(error).__name__}: {error}.") from error
         if item is _END:
@@ -65,18 +67,36 @@ def located(generator: Any, label: str = "equations()") -> Iterator[tuple[Any, S
         yield item, _place(items)
 
 
-def _undecided(error: RuntimeError, label: str) -> LanguageError | None:
-    """Explain the error of CasADi if Python asks for the truth value of a symbolic relation."""
-    if "truth value" not in str(error):
-        return None
+def _raised_at(error: Exception) -> Source:
+    """Return the last place outside this package and CasADi that an error came through."""
     place, frame = NOWHERE, error.__traceback__
     while frame is not None:
         if not frame.tb_frame.f_code.co_filename.startswith((_PACKAGE, _CASADI)):
             place = source_of(frame.tb_frame.f_code, frame.tb_lasti)
         frame = frame.tb_next
+    return place
+
+
+def _lacking(error: AttributeError) -> UnknownName | None:
+    """Explain the error of a part that lacks what its owner uses."""
+    from modelica_like.language.component import Component
+
+    part = error.obj
+    if not isinstance(part, Component):
+        return None
+    return UnknownName(
+        f"{part.label} is of type {type(part).__name__} and has no '{error.name}', which its owner uses.",
+        where=_raised_at(error), advice="A part that takes the place of another needs its connectors and signals.",
+    )  # fmt: skip
+
+
+def _undecided(error: RuntimeError, label: str) -> LanguageError | None:
+    """Explain the error of CasADi if Python asks for the truth value of a symbolic relation."""
+    if "truth value" not in str(error):
+        return None
     return LanguageError(
         f"{label} asks Python whether a relation of symbols is true; that is known only during a run.",
-        where=place,
+        where=_raised_at(error),
         advice="Write where(condition, a, b), all_of(…), any_of(…); only structural fields decide an `if`.",
     )
 

@@ -56,6 +56,13 @@ class Twist(Component, partial=True):
         yield self.flange_b.tau == self.tau
 
 
+class Coupled(Component):
+    clutch: Clutch = Clutch()
+
+    def equations(self) -> Equations:
+        yield self.clutch.f_normalized == 1.0  # pressed
+
+
 def revving() -> CombustionEngine:
     """An engine that reaches its rev limit, below which its speed need not fall."""
     return CombustionEngine(
@@ -461,6 +468,15 @@ case(
     """\
 No component type has 'worm' and 'gear' in its name or text.
 Search for fewer or shorter words; `modelica-like library` lists all types.""",
+)
+case(
+    errors.UnknownName,
+    "a part in the place of another",
+    lambda: build(Coupled(clutch=Inertia(J=1.0))),
+    """\
+clutch is of type Inertia and has no 'f_normalized', which its owner uses.
+  in test_component_messages.py:{pressed} `self.clutch.f_normalized`
+A part that takes the place of another needs its connectors and signals.""",
 )
 
 

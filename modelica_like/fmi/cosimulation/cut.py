@@ -11,6 +11,7 @@ from modelica_like.language import Assembly, Connector
 from modelica_like.language.equation import Connection
 from modelica_like.language.expr import Symbol
 from modelica_like.language.inside import inside
+from modelica_like.language.places import located
 
 _TRIED, _SHOWN = 40, 8
 """Parts that are tried and named for a list of possible cuts."""
@@ -94,7 +95,7 @@ def _wires(assembly: Assembly) -> list[Wire]:
     """Return all connections of the netlist itself, those of series named after their parts."""
     names = {ends: name for name, ends in assembly.wires.items()}
     wires: list[Wire] = []
-    for statement in assembly.equations():
+    for statement, _ in located(assembly.equations()):
         if not isinstance(statement, Connection):
             continue
         ends = tuple(_path(end) for end in statement.ends)

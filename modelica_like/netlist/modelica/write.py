@@ -12,6 +12,7 @@ from modelica_like.language import Assembly, Component, Connector, Input, Output
 from modelica_like.language.fields import Value
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import declarations, inside
+from modelica_like.language.places import located
 from modelica_like.language.units import coherent, parse_unit, read_quantity, to_si
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.modelica import fold
@@ -159,7 +160,7 @@ class _Writer:
     # -- connections -------------------------------------------------------------------------------------------------
 
     def _wires(self, assembly: Assembly) -> Iterator[list[Any]]:
-        for statement in assembly.equations():
+        for statement, _ in located(assembly.equations()):
             ends = getattr(statement, "ends", None)
             if ends is not None:
                 yield list(ends)

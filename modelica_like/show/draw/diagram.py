@@ -14,6 +14,7 @@ from modelica_like.language.expr import Symbol
 from modelica_like.language.fields import Input, Output
 from modelica_like.language.icon import PLAIN, SIGNAL, Icon, Side, Stroke
 from modelica_like.language.inside import declarations, inside
+from modelica_like.language.places import located
 
 _USUAL: dict[str, Side] = {
     "flange_b": "E", "n": "E", "port_b": "E", "flange_t": "E", "support": "S", "heat_port": "S",
@@ -168,7 +169,7 @@ def _opens(part: Component, depth: int) -> bool:
 def _joined(component: Component) -> Iterator[list[Connector | Symbol]]:
     """Yield each set of joined ports once."""
     sets: list[dict[tuple[int, str], Connector | Symbol]] = []
-    for statement in component.equations():
+    for statement, _ in located(component.equations()):
         if isinstance(statement, Connection):
             new = {
                 (id(end.owner), end.name) if isinstance(end, Symbol) else (id(end), ""): end for end in statement.ends
