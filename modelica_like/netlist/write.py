@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import tomlkit
-from tomlkit.items import Item, Table
+from tomlkit.items import Item
 
 from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component
@@ -38,7 +38,7 @@ def dumps(component: Component, *, folder: str | Path = ".") -> str:
         NetlistError: the component has something a netlist cannot contain, such as equations of its own.
     """
     assembly = component if isinstance(component, Assembly) else as_assembly(component)
-    return tomlkit.dumps(_Writer(Path(folder)).document(assembly))
+    return _Writer(Path(folder)).document(assembly)
 
 
 class _Writer:
@@ -49,7 +49,7 @@ class _Writer:
         self.start: dict[str, Any] = {}
         self.guess: dict[str, Any] = {}
 
-    def document(self, assembly: Assembly) -> tomlkit.TOMLDocument:
+    def document(self, assembly: Assembly) -> str:
         parts = {name: self.part(name, part) for name, part in inside(assembly).parts.items()}
         sections: dict[str, Mapping[str, Any]] = {
             "parameters": {
@@ -66,19 +66,14 @@ class _Writer:
             "simulate": inside(assembly).simulate,
             "display": inside(assembly).display,
         }
-        document = tomlkit.document()
-        document.add("name", tomlkit.item(inside(assembly).name))
+        top: dict[str, Any] = {"name": inside(assembly).name}
         if inside(assembly).description:
-            document.add("description", tomlkit.item(inside(assembly).description))
+            top["description"] = inside(assembly).description
         if inside(assembly).sizing:
-            sizing = Path(os.path.relpath(inside(assembly).sizing, self.folder.resolve()))
-            document.add("sizing", tomlkit.item(sizing.as_posix()))
+            top["sizing"] = Path(os.path.relpath(inside(assembly).sizing, self.folder.resolve())).as_posix()
         if assembly.free_ends:
-            document.add("free", tomlkit.item(list(assembly.free_ends)))
-        for name, entries in sections.items():
-            if entries:
-                document.add(name, _table(entries))
-        return document
+            top["free"] = list(assembly.free_ends)
+        return "\n".join([_lines(top), *(f"[{name}]\n{_lines(some)}" for name, some in sections.items() if some)])
 
     def part(self, path: str, part: Component | list[Component]) -> Any:
         if not isinstance(part, list):
@@ -162,11 +157,17 @@ def plain(value: Any) -> Any:
     raise NetlistError(f"{value!r} cannot be written to a netlist.")
 
 
-def _table(entries: Mapping[str, Any]) -> Table:
-    table = tomlkit.table()
-    for name, entry in entries.items():
-        table.add(tomlkit.key(name), entry if isinstance(entry, Item) else tomlkit.item(entry))
-    return table
+def _lines(entries: Mapping[str, Any]) -> str:
+    """Return a section; a document of tomlkit looks through all its lines for each one that is added."""
+    return "".join(f"{tomlkit.key(name).as_string()} = {_text(entry)}\n" for name, entry in entries.items())
+
+
+def _text(entry: Any) -> str:
+    if isinstance(entry, Item):
+        return entry.as_string()
+    if isinstance(entry, list):  # an array of tomlkit counts all its elements for each one that is added
+        return f"[{', '.join(map(_text, cast('list[Any]', entry)))}]"
+    return tomlkit.item(entry).as_string()
 
 
 def _inline(entry: Any) -> Any:

@@ -175,7 +175,7 @@ def _signals_first(slot: Slot) -> bool:
 
 def _sort(layers: Layers, n: int, east: bool) -> None:
     """Order column n by the places in the column before (or after)."""
-    places = _places(layers)
+    places = _places(layers, n)
     channel = layers.channels[n if east else n + 1]
     wanted: dict[Slot, list[tuple[float, int]]] = defaultdict(list)
     for net, (before, after) in channel.nets.items():
@@ -204,8 +204,10 @@ def _port_shift(end: End) -> float:
     return up + 0.004 * end.port.along
 
 
-def _places(layers: Layers) -> dict[Slot, float]:
-    return {slot: float(k) for column in layers.columns for k, slot in enumerate(column)}
+def _places(layers: Layers, near: int | None = None) -> dict[Slot, float]:
+    """Places of slots in their columns; with a number only in that column and its neighbours, where its lines end."""
+    columns = layers.columns if near is None else layers.columns[max(near - 1, 0) : near + 2]
+    return {slot: float(k) for column in columns for k, slot in enumerate(column)}
 
 
 def _crossings_in(channel: Channel, places: dict[Slot, float]) -> float:
@@ -228,7 +230,7 @@ def _swap(layers: Layers) -> None:
     """Exchange neighbours as long as crossings decrease."""
     for n, column in enumerate(layers.columns):
         near = (layers.channels[n], layers.channels[n + 1])
-        places = _places(layers)
+        places = _places(layers, n)
         now = sum(_crossings_in(channel, places) for channel in near)
         better = True
         while better:
