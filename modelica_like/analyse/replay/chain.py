@@ -17,7 +17,7 @@ import numpy as np
 
 from modelica_like.analyse.replay.jumps import Jump, Work, make_jump
 from modelica_like.analyse.replay.kinks import Kinks
-from modelica_like.analyse.replay.start import start_slopes
+from modelica_like.analyse.replay.start import product, start_slopes
 from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try_step
 from modelica_like.analyse.replay.steps import ABSOLUTE, StepFunctions, Tolerances
 from modelica_like.analyse.replay.tangents import Tangents
@@ -69,8 +69,8 @@ class Replay:
         functions: of its steps.
         nodes: the points between the moves; the first is the start after its events.
         moves: steps and jumps; move k leads from node k to node k + 1.
-        start_x: derivatives of the first node's states by (p, u), shape (nx, np + nu).
-        start_d: derivatives of its discrete values, shape (nd, np + nu).
+        start_x: derivatives of the first node's states by (p, u), shape (nx, np + nu), sparse.
+        start_d: derivatives of its discrete values, shape (nd, np + nu), likewise.
         chances: motions of zero that modes hold from the start, by (x, theta) there.
         silent: nodes at which rates or integrands jump without an event, and how the time of that moves.
     """
@@ -78,8 +78,8 @@ class Replay:
     functions: StepFunctions
     nodes: list[Point] = field(default_factory=list)
     moves: list[Move] = field(default_factory=list)
-    start_x: Vector = field(default_factory=lambda: np.zeros((0, 0)))
-    start_d: Vector = field(default_factory=lambda: np.zeros((0, 0)))
+    start_x: ca.DM = field(default_factory=lambda: ca.DM(0, 0))
+    start_d: ca.DM = field(default_factory=lambda: ca.DM(0, 0))
     chances: list[Coincidence] = field(default_factory=list)
     silent: list[tuple[Point, Coincidence]] = field(default_factory=list)
 
@@ -142,7 +142,7 @@ class Replay:
         Returns:
             Shape (readings, m).
         """
-        begin = np.vstack([self.start_x @ directions, directions, self.start_d @ directions])
+        begin = np.vstack([product(self.start_x, directions), directions, product(self.start_d, directions)])
         return self.carried(readings, begin, 0, len(self.moves))[0]
 
     def carried(self, readings: Sequence[Reading], whole: Vector, first: int, last: int) -> tuple[Vector, Vector]:
@@ -194,7 +194,7 @@ class Replay:
             if kept is not None and k in kept:
                 kept[k] = whole.copy()
         x, fixed, d = np.split(whole, [size.x, size.x + size.fixed])
-        return x.T @ self.start_x + fixed.T + d.T @ self.start_d
+        return product(x.T, self.start_x) + fixed.T + product(d.T, self.start_d)
 
 
 def _by_node(readings: Sequence[Reading]) -> dict[int, list[tuple[int, Vector]]]:
@@ -266,6 +266,10 @@ def _check_end(solution: Solution, end: Point) -> None:
         )
 
 
+def _sparse(matrix: Vector) -> ca.DM:
+    return ca.sparsify(ca.DM(matrix))
+
+
 class _Maker:
     def __init__(self, solution: Solution, chain: Replay, stops: Sequence[float] | Vector) -> None:
         self.solution, self.model, self.chain = solution, solution.model, chain
@@ -286,20 +290,26 @@ class _Maker:
         changes = self.events[0] or self.model.events.update_rows
         point = initialize(self.model, t0, kind) if changes else self.solution.segments[0].start
         begin_x, begin_d = start_slopes(self.model, point, kind)
-        whole = np.concatenate([begin_x, np.eye(size.fixed), begin_d])
-        work = Work.at(self.model, point)
-        work.resting.update(holding(self.model, point))
-        work.differentiate_shares()
-        chances = work.chances()
-        start_x, start_d = begin_x, work.d @ whole
+        whole = ca.vertcat(begin_x, ca.DM.eye(size.fixed), begin_d)
+        chances: tuple[Coincidence, ...] = ()
+        start_x, start_d = begin_x, begin_d
+        if size.d:
+            work = Work.at(self.model, point)
+            work.resting.update(holding(self.model, point))
+            work.differentiate_shares()
+            chances = work.chances()
+            start_d = _sparse(product(work.d, whole))
         if changes:
             integrands = self.chain.functions.integrands
             jump = make_jump(self.model, point, tuple(self.events[0]), point, integrands, first=True)
             chances += jump.chances
-            whole = np.concatenate([start_x, np.eye(size.fixed), start_d])
-            start_x, start_d, point = jump.x @ whole, jump.d @ whole, jump.after
+            whole = ca.vertcat(start_x, ca.DM.eye(size.fixed), start_d)
+            start_x, start_d, point = _sparse(product(jump.x, whole)), _sparse(product(jump.d, whole)), jump.after
         self.chain.start_x, self.chain.start_d = start_x, start_d
-        self.chain.chances += [replace(chance, by=np.pad(chance.by @ whole, (size.x, size.d))) for chance in chances]
+        by = [product(chance.by[None], whole)[0] for chance in chances]
+        self.chain.chances += [
+            replace(chance, by=np.pad(row, (size.x, size.d))) for chance, row in zip(chances, by, strict=True)
+        ]
         self.chain.nodes.append(point)
         self.tangents.begin(start_x, start_d)
 

@@ -17,7 +17,7 @@ from modelica_like.solve.initialize.steady import steady_change
 _MAX_NEWTON = 50
 
 
-def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vector, Vector]:
+def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[ca.DM, ca.DM]:
     """Differentiate the states and the discrete values of a start by (p, u).
 
     Args:
@@ -26,7 +26,7 @@ def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vec
         kind: the kind of start of the run.
 
     Returns:
-        Shapes (nx, np + nu) and (nd, np + nu).
+        Shapes (nx, np + nu) and (nd, np + nu), sparse: of many parameters few influence the start.
     """
     size, plan, given = Sizes.of(model), start_plan(model, kind, point), (model.p, model.u, point.d)
     jacobians = [
@@ -53,12 +53,17 @@ def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vec
         states = steady_change(model, point, theta, states)
     elif plan.columns and moved:
         _follow(plan, system, moved, states, starts, values)
-    x, d = np.zeros((size.x, size.fixed)), np.zeros((size.d, size.fixed))
-    x[:, moved], d[:, moved] = states, starts
+    x, d = ca.DM(size.x, size.fixed), ca.DM(size.d, size.fixed)
+    x[:, moved], d[:, moved] = ca.sparsify(ca.DM(states)), ca.sparsify(ca.DM(starts))
     return x, _determined(model, point, x, d)
 
 
-def _determined(model: CompiledDae, point: Point, x: Vector, d: Vector) -> Vector:
+def product(left: Vector | ca.DM, right: Vector | ca.DM) -> Vector:
+    """Return a product of matrices, one of them sparse, as an array."""
+    return np.asarray(ca.mtimes(ca.DM(left), ca.DM(right)).full())
+
+
+def _determined(model: CompiledDae, point: Point, x: ca.DM, d: ca.DM) -> ca.DM:
     """Derivatives of discrete values, those with an equation by it; see initialize.started."""
     places = [(k, row.reset.index) for k, row in enumerate(model.events.update_rows) if row.at_start]
     if not places:
@@ -66,8 +71,8 @@ def _determined(model: CompiledDae, point: Point, x: Vector, d: Vector) -> Vecto
     (rows, variables), before = map(list, zip(*places, strict=True)), point.copy()
     before.d[variables] = call(model, model.starts.discretes, point)[variables]
     part, fixed = slopes(model, before, "updates"), x.shape[1]
-    total = part.x @ x + part.theta[:, :fixed] + part.theta[:, fixed:] @ d
-    d[variables] = total[rows]
+    total = product(part.x, x) + part.theta[:, :fixed] + product(part.theta[:, fixed:], d)
+    d[variables, :] = ca.sparsify(ca.DM(total[rows]))
     return d
 
 

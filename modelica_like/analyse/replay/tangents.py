@@ -6,9 +6,11 @@ derivative by the free angle of a spring was a fifth off.
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.replay.jumps import Jump
+from modelica_like.analyse.replay.start import product
 from modelica_like.analyse.replay.step import Step
 from modelica_like.analyse.replay.steps import Tolerances
 from modelica_like.compile.buffers import Vector
@@ -32,12 +34,12 @@ class Tangents:
         self._tried: tuple[Step | None, Vector] = None, np.zeros(0)
         self._largest = np.zeros(len(model.states))
 
-    def begin(self, x: Vector, d: Vector) -> None:
+    def begin(self, x: ca.DM, d: ca.DM) -> None:
         """Start from the derivatives of states and discrete variables by (p, u)."""
         values = np.abs(np.concatenate([self._model.p, self._model.u]))
         # Each changes by about its size, those that are zero by one; no two of them cancel out.
         changes = np.where(values > 0.0, values, 1.0) * np.random.default_rng(1).uniform(0.5, 1.0, len(values))
-        self._add(np.concatenate([x @ changes, changes, d @ changes]))
+        self._add(np.concatenate([product(x, changes)[:, 0], changes, product(d, changes)[:, 0]]))
 
     def carry(self, move: Step | Jump) -> None:
         """Go on over a move."""

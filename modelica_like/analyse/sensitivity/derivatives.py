@@ -132,7 +132,9 @@ def _differentiate(
     if way == "adjoint":
         derivatives = chain.adjoint(total)[:, positions]
     else:
-        derivatives = chain.forward(total, np.eye(len(chain.model.fixed_position))[:, positions])
+        directions = np.zeros((len(chain.model.fixed_position), len(positions)))
+        directions[positions, np.arange(len(positions))] = 1.0
+        derivatives = chain.forward(total, directions)
     # Without `to`, the other parameters still get their derivatives.
     if series:
         # Somewhere along the run everything is felt.
