@@ -193,7 +193,8 @@ static void take_stretch(Batch *b, double begin, double h) {
 }
 
 static void read_along(Batch *b, double t, double end) {
-    double least = LEAST_PART * (end - t), h = end - t;
+    /* Halves of what is less than a few last digits of the time are as long as the whole. */
+    double least = fmax(LEAST_PART * (end - t), least_step(&b->c->state)), h = end - t;
     look_along(b, t, 0);
     while (t < end && !b->failed) {
         if (t + 1.0001 * h >= end) h = end - t;

@@ -317,6 +317,7 @@ unsigned char *nothing_wanting(Instance *c);
 double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece);
 double *last_of(const Model *m, Piece *piece);
 double error_norm(const Instance *c, const double *first, const double *last, const double *error);
+double least_step(const State *s);
 double step_diagonal(double h);
 int factor_step(Instance *c, double diagonal);
 int factor_at(Instance *c, double t, const double *first, double h);

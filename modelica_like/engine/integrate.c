@@ -171,7 +171,7 @@ static double largest_step(const Instance *c) {
 }
 
 /* Below this, two times are the same. */
-static double least_step(const State *s) { return 1e-15 * fmax(1, fabs(s->t)); }
+double least_step(const State *s) { return 1e-15 * fmax(1, fabs(s->t)); }
 
 static void take_piece(Instance *c) {
     c->state.n_steps++;
@@ -184,8 +184,8 @@ static void take_piece(Instance *c) {
 static int is_against_rate(const Instance *c, double h, const double *first, const double *last) {
     for (int k = 0; k < c->model->n_x; k++) {
         double moved = last[k] - first[k], asked = h * c->first_rates[k], size = fmax(fabs(first[k]), fabs(last[k]));
-        if (asked * moved < 0 && fabs(asked) > 100 * size
-            && fabs(moved) > c->state.tolerance * size + c->state.absolute * c->model->nominals[k])
+        if (asked * moved < 0 && fabs(asked) > 100 * size &&
+            fabs(moved) > c->state.tolerance * size + c->state.absolute * c->model->nominals[k])
             return 1;
     }
     return 0;

@@ -74,7 +74,7 @@ static int is_behind_event(Instance *c) {
  * infinity; where waves ask for shorter pieces, `longest` is smaller than before. */
 static double judge_panel(Instance *c) {
     Panel *panel = &c->panel;
-    double least = 1e-15 * fmax(1, fabs(c->state.t)), most, end = INFINITY;
+    double least = least_step(&c->state), most, end = INFINITY;
     c->edges_valid = 0;
     for (panel->number = 0; panel->number < panel->pieces && isinf(end); panel->number++) {
         load_piece(c);

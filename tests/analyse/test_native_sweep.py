@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from components import Clutch, ConstantTorque, Fixed, Inertia
-from modelica_like import build
+from modelica_like import build, simulate
 from modelica_like.analyse.sweeps import workers
 from modelica_like.analyse.sweeps.native_runs import NativeRuns
 from modelica_like.analyse.sweeps.sweep import sweep
@@ -181,3 +181,13 @@ def test_the_report_tells_what_idas_had_to_do(capsys):
     found = sweep(build(braked()), {"mass.J": [2.0, 0.0]}, ["mass.w"], until=1.0)
     Console(width=200).print(sweep_report(found))
     assert "IDAS did 1 of 2 runs, where the native run-time failed." in capsys.readouterr().out
+
+
+def test_the_last_digits_of_the_time_are_read():
+    """The table's edge at 1.2 s leaves a step of 1e-12 s, in which the torque jumps: its halves had no length."""
+    model = build(ROOT / "examples" / "components" / "screw_lift.toml")
+    names = ["peak(motor.flange.tau)", "integral(motor.flange.tau)"]
+    table = sweep(model, {"weight": [2000.0]}, names)
+    run = simulate(model, solver="idas", readings=names)
+    for name, tolerance in zip(names, (1e-6, 1e-5), strict=True):
+        assert float(table[name][0]) == pytest.approx(run.readings[name], rel=tolerance)
