@@ -7,7 +7,6 @@ import math
 from modelica_like.netlist.modelica.tokens import Tokens
 from modelica_like.netlist.modelica.tree import Expr, chain
 
-_ELEMENTWISE = {".+": "+", ".-": "-", ".*": "*", "./": "/", ".^": "^"}
 _OR, _AND, _NOT, _RELATION, _SUM, _PRODUCT, _POWER = range(1, 8)
 _LEVELS = {
     "or": _OR, "and": _AND, **dict.fromkeys(("<", "<=", ">", ">=", "==", "<>"), _RELATION),
@@ -64,7 +63,7 @@ class Expressions(Tokens):
         while level <= (precedence := _LEVELS.get(self.kind, 0)) < below:
             signs, terms = list[str](), [left]
             while _LEVELS.get(self.kind) == precedence and not (precedence in _SINGLE and signs):
-                signs.append(_ELEMENTWISE.get(self.kind, self.kind))
+                signs.append(self.kind)
                 self.at += 1
                 terms.append(self._operation(precedence + 1))
             left, below = chain(signs, terms), precedence
@@ -122,7 +121,7 @@ class Expressions(Tokens):
             rows.append(Expr("array", tuple(items), line))
             if not self.take(";"):
                 self.need("]")
-                return Expr("array", tuple(rows), line)
+                return Expr("matrix", tuple(rows), line)
 
     def _named(self, line: int) -> Expr:
         if self.take("initial"):

@@ -25,6 +25,7 @@ KNOWN = ("number", "boolean", "literal", "string")
 _KINDS = {"number": "a number", "boolean": "a truth value", "literal": "a value of an enumeration", "string": "a text"}
 
 
+_LARGEST_POWER = 100
 LONGEST = 100_000
 """Elements of an array, and steps of an algorithm."""
 
@@ -78,17 +79,11 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
     """
     if kind == "array":
         return Expr("array", args, line)
+    if kind == "matrix":
+        return _matrix(args, line)
     if any(argument.kind == "array" for argument in args):
-        if kind == "*" and all(argument.kind == "array" for argument in args):
-            return _product(args[0], args[1], line)
-        length = next(len(argument.args) for argument in args if argument.kind == "array")
-        if any(argument.kind == "array" and len(argument.args) != length for argument in args):
-            raise Unfit("The sizes of two arrays differ")
-        rows = (
-            tuple(argument.args[k] if argument.kind == "array" else argument for argument in args)
-            for k in range(length)
-        )
-        return Expr("array", tuple(operation(kind, row, line) for row in rows), line)
+        return _of_arrays(kind, args, line)
+    kind = kind.removeprefix(".")
     if kind == "neg":
         return number(-args[0].args[0], line) if args[0].kind == "number" else Expr("neg", args, line)
     if kind == "not":
@@ -108,6 +103,80 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
     if kind == "+" and all(argument.kind == "string" for argument in args):
         return Expr("string", (args[0].args[0] + args[1].args[0],), line)
     return Expr(kind, args, line)
+
+
+def _of_arrays(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
+    arrays = [argument for argument in args if argument.kind == "array"]
+    if kind == "*" and len(arrays) == 2:
+        return _product(args[0], args[1], line)
+    if kind == "^":
+        return _power(args[0], args[1], line)
+    if (kind in ("+", "-") and len(arrays) < len(args)) or (kind == "/" and args[1].kind == "array"):
+        raise Unfit(f"An array and a number: .{kind} is element by element")
+    if any(len(argument.args) != len(arrays[0].args) for argument in arrays):
+        raise Unfit("The sizes of two arrays differ")
+    rows = (
+        tuple(argument.args[k] if argument.kind == "array" else argument for argument in args)
+        for k in range(len(arrays[0].args))
+    )
+    return Expr("array", tuple(operation(kind, row, line) for row in rows), line)
+
+
+def _power(base: Expr, exponent: Expr, line: int) -> Expr:
+    """Return the power of a square matrix, by repeated products."""
+    times, size = exponent.args[0] if exponent.kind == "number" else -1.0, len(base.args)
+    square = base.kind == "array" and all(row.kind == "array" and len(row.args) == size for row in base.args)
+    if not square or not 0 <= times <= _LARGEST_POWER or times != int(times):
+        raise Unfit(f"Only a square matrix has powers, from 0 to {_LARGEST_POWER}: .^ is element by element")
+    unit = (tuple(number(row == column, line) for column in range(size)) for row in range(size))
+    result = Expr("array", tuple(Expr("array", row, line) for row in unit), line)
+    for _ in range(int(times)):
+        result = _product(result, base, line)
+    return result
+
+
+def _matrix(rows: tuple[Expr, ...], line: int) -> Expr:
+    """Join matrices, columns and numbers: those of a row side by side, the rows one below the other."""
+    lines: list[tuple[Expr, ...]] = []
+    for row in rows:
+        blocks = [_promoted(item) for item in row.args]
+        if len({len(block) for block in blocks}) > 1:
+            raise Unfit("The parts of a matrix that stand side by side have different numbers of rows")
+        lines += [tuple(item for part in parts for item in part) for parts in zip(*blocks, strict=True)]
+    if len({len(one) for one in lines}) > 1:
+        raise Unfit("The rows of a matrix have different lengths")
+    return Expr("array", tuple(Expr("array", one, line) for one in lines), line)
+
+
+def _promoted(item: Expr) -> list[tuple[Expr, ...]]:
+    """Return the rows of a matrix; a vector is a column."""
+    if item.kind != "array":
+        return [(item,)]
+    return [row.args if row.kind == "array" else (row,) for row in item.args]
+
+
+def choice(kept: list[Expr], otherwise: Expr, line: int) -> Expr:
+    """Return a choice by conditions, each followed by its value; of arrays element by element.
+
+    Raises:
+        Unfit: the values have different sizes.
+    """
+    values = [*kept[1::2], otherwise]
+    sizes = {len(one.args) if one.kind == "array" else None for one in values}
+    if len(sizes) > 1:
+        raise Unfit("The values of an 'if' have different sizes")
+    if otherwise.kind != "array":
+        return Expr("if", (*kept, otherwise), line)
+    rows = (
+        [part for condition, value in zip(kept[::2], kept[1::2], strict=True) for part in (condition, value.args[k])]
+        for k in range(len(otherwise.args))
+    )
+    return Expr("array", tuple(choice(row, otherwise.args[k], line) for k, row in enumerate(rows)), line)
+
+
+def elements(items: Expr) -> list[Expr]:
+    """Return the elements of an array of any dimensions, row by row."""
+    return [one for item in items.args for one in elements(item)] if items.kind == "array" else [items]
 
 
 def _related(kind: str, left: Expr, right: Expr) -> bool:
@@ -152,12 +221,14 @@ def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
         Unfit: it has no value, or the number of arguments is wrong.
     """
     if name in ("min", "max") and len(args) == 1 and args[0].kind == "array":
-        if not args[0].args:
+        if not elements(args[0]):
             raise Unfit(f"{name} of an array without elements has no value")
-        return joined(lambda left, other: function(name, (left, other), line), list(args[0].args))
+        return joined(lambda left, other: function(name, (left, other), line), elements(args[0]))
     wanted = 2 if name in ("atan2", "mod", "rem", "div", "min", "max") else 1
     if len(args) != wanted:
         raise Unfit(f"{name} has {wanted} argument{'s' if wanted > 1 else ''}, not {len(args)}")
+    if name in ("mod", "rem", "div") and args[-1].kind == "number" and args[-1].args[0] == 0:
+        raise Unfit(f"{name} by 0 has no value")
     known = _FUNCTIONS[name]
 
     def made(one: tuple[Expr, ...]) -> Expr:

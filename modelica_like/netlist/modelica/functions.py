@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+from modelica_like.errors import ModelicaTextError
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Given, Instance, refused
-from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Statement
+from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
 
 if TYPE_CHECKING:
     from modelica_like.netlist.modelica.resolve import Resolver
@@ -34,14 +35,9 @@ def _line(args: tuple[Expr, ...], line: int) -> Expr:
     )
 
 
-def elements(items: Expr) -> list[Expr]:
-    """Return the elements of an array of any dimensions, row by row."""
-    return [one for item in items.args for one in elements(item)] if items.kind == "array" else [items]
-
-
 def _product(args: tuple[Expr, ...], line: int) -> Expr:
     product = fold.number(1, line)
-    for argument in elements(args[0]):
+    for argument in fold.elements(args[0]):
         product = fold.operation("*", (product, argument), line)
     return product
 
@@ -56,7 +52,7 @@ def _identity(args: tuple[Expr, ...], line: int) -> Expr:
 
 
 def _scalar(args: tuple[Expr, ...], _: int) -> Expr:
-    inside = elements(args[0])
+    inside = fold.elements(args[0])
     if len(inside) != 1:
         raise fold.Unfit(f"scalar(…) needs an array of one element, not of {len(inside)}")
     return inside[0]
@@ -70,14 +66,14 @@ def _transposed(args: tuple[Expr, ...], line: int) -> Expr:
 
 
 OF_ARRAYS: dict[str, tuple[int, Callable[[tuple[Expr, ...], int], Expr]]] = {
-    "sum": (1, lambda args, line: fold.total(elements(args[0]), line)),
+    "sum": (1, lambda args, line: fold.total(fold.elements(args[0]), line)),
     "product": (1, _product),
     "fill": (-2, lambda args, line: _filled(args[0], args[1:], line)),
     "zeros": (-1, lambda args, line: _filled(fold.number(0, line), args, line)),
     "ones": (-1, lambda args, line: _filled(fold.number(1, line), args, line)),
     "identity": (1, _identity),
     "linspace": (3, _line),
-    "vector": (1, lambda args, line: Expr("array", tuple(elements(args[0])), line)),
+    "vector": (1, lambda args, line: Expr("array", tuple(fold.elements(args[0])), line)),
     "scalar": (1, _scalar),
     "transpose": (1, _transposed),
 }
@@ -99,13 +95,21 @@ def of_arrays(name: str, args: tuple[Expr, ...], line: int) -> Expr:
     return compute(args, line)
 
 
-def size(items: Expr, dimension: int, line: int) -> Expr:
-    """Return the size of an array in one dimension, or in all as an array."""
+def size(items: Expr, dimension: float | None, line: int) -> Expr:
+    """Return the size of an array in one dimension, or in all as an array.
+
+    Raises:
+        Unfit: there is no such dimension.
+    """
     numbers: list[Expr] = []
     while items.kind == "array":
         numbers.append(fold.number(len(items.args), line))
         items = items.args[0] if items.args else fold.number(0)
-    return numbers[dimension - 1] if 0 < dimension <= len(numbers) else Expr("array", tuple(numbers), line)
+    if dimension is None:
+        return Expr("array", tuple(numbers), line)
+    if not 1 <= dimension <= len(numbers) or dimension != int(dimension):
+        raise fold.Unfit(f"size(…) has no dimension {dimension:g}: the array has {len(numbers)}")
+    return numbers[int(dimension) - 1]
 
 
 def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named: Mapping[str, Expr]) -> Expr:
@@ -140,8 +144,9 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
 class _Call:
     def __init__(self, resolver: Resolver, text: ClassText) -> None:
         self.resolver, self.text = resolver, text
-        members = Instance(resolver.classes, text, Given()).members
-        self.declared = {name: member.declaration for name, member in members.items()}
+        inside = Instance(resolver.classes, text, Given())
+        self.algorithm, self.members = inside.algorithm, inside.members
+        self.declared = {name: member.declaration for name, member in inside.members.items()}
         self.local: dict[str, Expr] = {}
 
     def result(self, given: tuple[Expr, ...], named: Mapping[str, Expr], line: int) -> Expr:
@@ -149,28 +154,66 @@ class _Call:
         outputs = [name for name, d in self.declared.items() if "output" in d.prefixes]
         if len(outputs) != 1:
             raise refused(f"{self.text.name}, a function with {len(outputs)} results,", self.text, self.text.line)
-        self.local.update(zip(inputs, given, strict=False))
-        self.local.update(named)
-        if len(given) > len(inputs) or any(name not in inputs for name in named):
+        positional = dict(zip(inputs, given, strict=False))
+        if len(given) > len(inputs) or any(name not in inputs or name in positional for name in named):
             raise refused(f"these arguments of {self.text.name}", self.resolver.text, line)
-        for name, variable in self.declared.items():
-            if name not in self.local:
-                self.local[name] = self._start(name, variable, line)
-        self.run(self.text.algorithm)
-        return self.local[outputs[0]]
+        taken = {**positional, **named}
+        # A function of numbers is applied to each element of an array.
+        scalar = [name for name in taken if not self.declared[name].dimensions and taken[name].kind == "array"]
+        if not scalar:
+            return self._one(taken, outputs[0], line)
 
-    def _start(self, name: str, declaration: Declaration, line: int) -> Expr:
-        value = declaration.modification.value
-        if value is not None:
-            return self.here()(value)
+        def of(one: tuple[Expr, ...]) -> Expr:
+            return _Call(self.resolver, self.text)._one(
+                {**taken, **dict(zip(scalar, one, strict=True))}, outputs[0], line
+            )
+
+        return fold.each(self.text.name, tuple(taken[name] for name in scalar), line, of)
+
+    def _one(self, taken: dict[str, Expr], output: str, line: int) -> Expr:
+        self.local.update(taken)
+        for name in taken:
+            self._check(name)
+        for name in self.declared:
+            if name not in self.local:
+                self.local[name] = self._start(name, line)
+        own = self.text
+        for statement, text in self.algorithm:
+            self.text = text
+            self.run([statement])
+        self.text = own
+        self._check(output)
+        return self.local[output]
+
+    def _check(self, name: str) -> None:
+        """Refuse a value whose sizes or type are not those declared, as far as they are known."""
+        value, declared = self.local[name], self.declared[name]
+        label = f"{name} of {self.text.name}"
+        for dimension in declared.dimensions:
+            size = self.here()(dimension) if dimension.kind != "all" else dimension
+            if value.kind != "array":
+                raise fold.Unfit(f"{label} is an array")
+            if size.kind == "number" and size.args[0] != len(value.args):
+                raise fold.Unfit(f"{label} has {size.args[0]:g} elements, not {len(value.args)}")
+            value = value.args[0] if value.args else fold.number(0)
+        wrong = {"Real": ("boolean", "string"), "Integer": ("boolean", "string"), "Boolean": ("number", "string")}
+        for item in fold.elements(self.local[name]):
+            broken = declared.type == "Integer" and item.kind == "number" and item.args[0] != int(item.args[0])
+            if broken or item.kind in wrong.get(declared.type, ()):
+                raise fold.Unfit(f"{label} is of type {declared.type}: {item.args[0]} does not fit")
+
+    def _start(self, name: str, line: int) -> Expr:
+        declaration, entry = self.declared[name], self.members[name].given
+        if entry.value is not None:
+            return self.here(entry.scope[1] if entry.scope else self.members[name].text)(entry.value)
         if "input" in declaration.prefixes:
             raise refused(f"{self.text.name} without its argument {name}", self.resolver.text, line)
         shape = tuple(self.here()(dimension) for dimension in declaration.dimensions if dimension.kind != "all")
         return _filled(fold.number(0, line), shape, line)
 
-    def here(self) -> Resolver:
+    def here(self, text: ClassText | None = None) -> Resolver:
         kind = type(self.resolver)
-        return kind(None, self.text, self.local, classes=self.resolver.classes, depth=self.resolver.depth + 1)
+        return kind(None, text or self.text, self.local, classes=self.resolver.classes, depth=self.resolver.depth + 1)
 
     def run(self, statements: list[Statement]) -> None:
         for statement in statements:
@@ -182,21 +225,53 @@ class _Call:
             elif statement.kind == "for":
                 self.loop(list(statement.parts[0]), statement.parts[1])
             elif statement.kind == "while":
-                while self.here()(statement.parts[0]) == Expr("boolean", (True,), statement.parts[0].line):
+                while self.known_to_hold(statement):
                     self.resolver.classes.spend(5, self.text, statement.line)
                     self.run(statement.parts[1])
-            elif statement.kind != "call" or statement.parts[0].args[0] not in (
-                "assert",
-                "Modelica.Utilities.Streams.print",
-            ):
+            elif statement.kind == "call" and statement.parts[0].args[0] == "assert":
+                self.insist(statement)
+            elif statement.kind != "call" or statement.parts[0].args[0] != "Modelica.Utilities.Streams.print":
                 raise refused(f"'{statement.kind}' in a function", self.text, statement.line)
 
+    def known_to_hold(self, loop: Statement) -> bool:
+        """Whether a loop goes on; that must be known when the text is read."""
+        holds = self.here()(loop.parts[0])
+        if holds.kind != "boolean":
+            raise refused("a 'while' whose end only a run knows", self.text, loop.line)
+        return holds.args[0]
+
+    def insist(self, statement: Statement) -> None:
+        """Refuse what an assertion excludes; what only a run knows is not checked."""
+        given = statement.parts[0].args[1]
+        if given and self.here()(given[0]) == Expr("boolean", (False,), given[0].line):
+            said = given[1].args[0] if len(given) > 1 and given[1].kind == "string" else "no reason is given"
+            raise fold.Unfit(f"{self.text.name} refuses its arguments: {said}")
+
     def assign(self, target: Expr, value: Expr) -> None:
-        if target.kind != "name" or len(target.args) != 1 or target.args[0][0] not in self.local:
+        if target.kind != "name" or len(target.args) != 1 or target.args[0][0] not in self.declared:
             raise refused("this target of an assignment", self.text, target.line)
         name, subscripts = target.args[0]
-        places = [int(self.here().number(subscript)) - 1 for subscript in subscripts]
+        if "input" in self.declared[name].prefixes:
+            raise ModelicaTextError(f"{name} is an input and cannot be assigned.", where=self.text.place(target.line))
+        places, whole = list[int](), self.local[name]
+        for dimension, subscript in enumerate(subscripts):
+            open_size = [one.kind for one in self.declared[name].dimensions[dimension : dimension + 1]] == ["all"]
+            places.append(self.place(whole, subscript, open_size=open_size))
+            whole = whole.args[places[-1]] if places[-1] < len(whole.args) else fold.number(0)
         self.local[name] = _replaced(self.local[name], places, value)
+
+    def place(self, whole: Expr, subscript: Expr, *, open_size: bool) -> int:
+        """Return the place of an element, from 0; an array of open size may grow."""
+        if subscript.kind in ("all", "range", "array"):
+            raise refused("an assignment to several elements of an array", self.text, subscript.line)
+        if whole.kind != "array":
+            raise ModelicaTextError("What is no array has no subscript.", where=self.text.place(subscript.line))
+        position, size = self.here().number(subscript), len(whole.args)
+        if position != int(position) or position < 1 or (position > size and not open_size):
+            raise ModelicaTextError(
+                f"The index {position:g} is not one of 1 to {size}.", where=self.text.place(subscript.line)
+            )
+        return int(position) - 1
 
     def branch(self, branches: list[tuple[Expr | None, list[Statement]]], line: int) -> None:
         """Run the branch that is taken; where that is not known, all of them."""
@@ -216,12 +291,13 @@ class _Call:
         self.branch(branches[1:], line)
         for name, other in self.local.items():
             if taken[name] != other:
-                self.local[name] = _either(holds, taken[name], other, line)
+                self.local[name] = fold.choice([holds, taken[name]], other, line)
 
     def loop(self, iterators: list[tuple[str, Expr | None]], statements: list[Statement]) -> None:
         (name, over), rest = iterators[0], iterators[1:]
         if over is None:
             raise refused("an iterator without a range", self.text, self.text.line)
+        hidden = self.local.get(name)
         for value in self.here().array(over):
             self.local[name] = value
             if rest:
@@ -229,6 +305,8 @@ class _Call:
             else:
                 self.run(statements)
         self.local.pop(name, None)
+        if hidden is not None:  # a variable of the same name
+            self.local[name] = hidden
 
 
 def _replaced(whole: Expr, places: list[int], value: Expr) -> Expr:
@@ -239,13 +317,3 @@ def _replaced(whole: Expr, places: list[int], value: Expr) -> Expr:
         items.append(fold.number(0))
     items[places[0]] = _replaced(items[places[0]], places[1:], value)
     return Expr("array", tuple(items), whole.line)
-
-
-def _either(condition: Expr, expression: Expr, other: Expr, line: int) -> Expr:
-    if expression.kind == "array" and other.kind == "array":
-        return Expr(
-            "array",
-            tuple(_either(condition, a, b, line) for a, b in zip(expression.args, other.args, strict=True)),
-            line,
-        )
-    return Expr("if", (condition, expression, other), line)

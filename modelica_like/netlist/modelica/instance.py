@@ -99,6 +99,7 @@ class Instance:
         self.members: dict[str, Member] = {}
         self.equations: list[tuple[Statement, ClassText]] = []
         self.initial_equations: list[tuple[Statement, ClassText]] = []
+        self.algorithm: list[tuple[Statement, ClassText]] = []
         self.folded: set[str] = set()
         self._replaced = {name: entry for name, entry in given.inner.items() if isinstance(entry.redeclared, ClassText)}
         self._collect(text, given, 0)
@@ -138,6 +139,7 @@ class Instance:
                 self._declare(element, text, outer)
         self.equations += [(equation, text) for equation in text.equations]
         self.initial_equations += [(equation, text) for equation in text.initial_equations]
+        self.algorithm += [(statement, text) for statement in text.algorithm]
 
     def _extend(self, one: Extends, text: ClassText, outer: Given, depth: int) -> None:
         base = self.find(one.base, text)

@@ -75,14 +75,16 @@ class Resolver:
         if kind == "for":
             return self._built(args[0], list(args[1]))
         if kind == "if":
-            kept: list[Expr] = []
+            kept, otherwise = list[Expr](), args[-1]
             for condition, value in zip(args[:-1:2], args[1::2], strict=True):
                 choice = self(condition)
                 if choice.kind != "boolean":
                     kept += [choice, self(value)]
                 elif choice.args[0]:
-                    return Expr("if", (*kept, self(value)), line) if kept else self(value)
-            return Expr("if", (*kept, self(args[-1])), line) if kept else self(args[-1])
+                    otherwise = value
+                    break
+            last = self(otherwise)
+            return self._told(lambda: fold.choice(kept, last, line), line) if kept else last
         if kind == "range":
             numbers = [self.number(argument) for argument in args]
             start, step, stop = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
@@ -187,7 +189,12 @@ class Resolver:
         chosen = inside(expression)
         if chosen.kind == "array":
             return chosen
-        position = inside.number(chosen)
+        if chosen.kind != "number":
+            raise ModelicaTextError(
+                "A subscript must be a number that constants and parameters determine.",
+                where=self.text.place(expression.line),
+            )
+        position = chosen.args[0]
         if position != int(position) or not 1 <= position <= size:
             what = f"The index {position:g} is {'outside' if position == int(position) else 'no whole number from'}"
             raise ModelicaTextError(f"{what} 1 to {size}.", where=self.text.place(expression.line))
@@ -310,6 +317,8 @@ class Resolver:
             count = f"{least} to {most}" if most > least else str(least)
             what = f"{short}(…) has {count} argument{'s' if most != 1 else ''}, not {len(given)}."
             raise ModelicaTextError(what, where=self.text.place(line))
+        if named and short in {*_ARGUMENTS, *KEPT, *functions.OF_ARRAYS, *ELEMENTARY}:
+            raise ModelicaTextError(f"{short}(…) has no argument '{named[0][0]}'.", where=self.text.place(line))
         if short == "homotopy":
             others = dict(named)
             return self._homotopy([*given, *(others[key] for key in ("actual", "simplified") if key in others)], line)
@@ -321,7 +330,8 @@ class Resolver:
             return self._told(lambda: fold.each(short, values, line, lambda one: fold.call(short, one, line)), line)
         if short == "size":
             items = self._sized(given[0])
-            return functions.size(items, int(self.number(given[1])) if len(given) > 1 else 0, line)
+            dimension = self.number(given[1]) if len(given) > 1 else None
+            return self._told(lambda: functions.size(items, dimension, line), line)
         values = tuple(self(argument) for argument in given)
         if short in functions.OF_ARRAYS:
             return self._told(lambda: functions.of_arrays(short, values, line), line)

@@ -289,7 +289,7 @@ class Statements:
                 raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
             values = self._changes(body, text, local)
             calls = (s.parts[0] for s in body if s.kind == "call" and s.parts[0].args[0] == "reinit")
-            states = {resolver(call.args[1][0]).args[0][0] for call in calls}
+            states = {one.args[0][0] for call in calls for one in fold.elements(resolver(call.args[1][0]))}
             assigned |= {name for name in values if name not in states and not _is_ending(name)}
             branches.append((conditions, values))
         for name in assigned & self.assigned:
@@ -309,8 +309,11 @@ class Statements:
                     raise refused("a 'when' with an equation that is not solved for a variable", text, statement.line)
                 values[target.args[0][0]] = _condition(value) if target.kind == "condition" else value
             elif call is not None and call.args[0] == "reinit" and len(call.args[1]) == 2:
-                target, value = (resolver(side) for side in call.args[1])
-                values[target.args[0][0]] = value
+                targets, given = (fold.elements(resolver(side)) for side in call.args[1])
+                if len(targets) != len(given) or any(target.kind != "name" for target in targets):
+                    what = "reinit(…) needs states, and as many values."
+                    raise ModelicaTextError(what, where=text.place(statement.line))
+                values |= {target.args[0][0]: value for target, value in zip(targets, given, strict=True)}
             elif call is not None and call.args[0] == "terminate":
                 values[TERMINATE] = Expr("string", (_words(call.args[1][0]),), statement.line)
             elif call is not None and call.args[0] == "assert":

@@ -223,7 +223,7 @@ def chain(signs: list[str], terms: list[Expr]) -> Expr:
     The tree of a long chain of products is as deep as it is long; sums, `and` and `or` are joined two by two.
     """
     result = terms[0]
-    if len(terms) <= CHAIN or signs[0] not in ("+", "-", "or", "and"):
+    if len(terms) <= CHAIN or not (set(signs) <= {"+", "-"} or signs[0] in ("or", "and")):
         for sign, term in zip(signs, terms[1:], strict=True):
             result = Expr(sign, (result, term), result.line)
         return result

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 from modelica_like.errors import ModelicaTextError, Source
+from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Instance, refused
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.members import part_of, sizes, unknown_name
@@ -64,24 +66,53 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
     member = instance.members.get(name)
     if member is None:
         raise unknown_name(f"{instance.text.name} has no '{name}'.", instance.text, end.line)
-    shape = sizes(instance, member)
-    indices = [f"[{int(subscript.args[0])}]" for subscript in subscripts if subscript.kind == "number"]
-    if shape and not indices:
-        indices = [f"[{k}]" for k in range(1, shape[0] + 1)]
-    heads = [f"{name}{index}" for index in indices or [""]]
+    indices = _indices(subscripts, sizes(instance, member), instance, end.line)
+    heads = [f"{name}{index}" for index in indices]
     if basic_type(instance, member) is not None or not rest:
         return heads
-    inner = ".".join(n + "".join(f"[{int(k.args[0])}]" for k in subs) for n, subs in rest)
-    part = part_of(instance, member, int(indices[0][1:-1]) if indices else 0)
+    inner = _inside(rest, instance, end.line)
+    part = part_of(instance, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0)
     if isinstance(part, Known):
-        return [f"{head}.{part.here(inner)}" for head in heads]
+        return [f"{head}.{part.here(one)}" for head in heads for one in inner]
     if not isinstance(part, Instance):
-        return [f"{head}.{inner}" for head in heads]
+        return [f"{head}.{one}" for head in heads for one in inner]
     if len(rest) > 1:
         raise refused("a connection with the inside of a component", instance.text, end.line)
-    last, index = end.args[-1]
+    last, subscripts = end.args[-1]
     outer = part.members.get(last)
-    shape = sizes(part, outer) if outer is not None and not index else ()
-    if len(heads) == 1 and shape:
-        return [f"{heads[0]}.{inner}[{k}]" for k in range(1, shape[0] + 1)]
-    return [f"{head}.{inner}" for head in heads]
+    if outer is not None and (subscripts or len(heads) == 1):
+        inner = [f"{last}{index}" for index in _indices(subscripts, sizes(part, outer), instance, end.line)]
+    return [f"{head}.{one}" for head in heads for one in inner]
+
+
+def _inside(parts: tuple[tuple[str, tuple[Expr, ...]], ...], instance: Instance, line: int) -> list[str]:
+    """Return the paths below a part, one for each of the elements that subscripts choose."""
+    names = [[f"{name}{index}" for index in _indices(subs, (), instance, line)] for name, subs in parts]
+    return [".".join(path) for path in product(*names)]
+
+
+def _indices(subscripts: tuple[Expr, ...], shape: tuple[int, ...], instance: Instance, line: int) -> list[str]:
+    """Return the elements that subscripts choose, such as `[2][1]`; without any those of the first dimension.
+
+    Args:
+        subscripts: resolved.
+        shape: sizes of the dimensions, as far as they are known.
+        instance: for the place of an error.
+        line: likewise.
+    """
+    if not subscripts:
+        return [f"[{k}]" for k in range(1, shape[0] + 1)] if shape else [""]
+    chosen: list[list[int]] = []
+    for dimension, subscript in enumerate(subscripts):
+        size = shape[dimension] if dimension < len(shape) else None
+        if subscript.kind == "all" and size is not None:
+            chosen.append(list(range(1, size + 1)))
+            continue
+        places = [one.args[0] if one.kind == "number" else 0.5 for one in fold.elements(subscript)]
+        for place in places:
+            if place != int(place) or place < 1 or (size is not None and place > size):
+                known = f"1 to {size}" if size is not None else "the whole numbers from 1"
+                what = f"A subscript of this end is not one of {known}."
+                raise ModelicaTextError(what, where=instance.text.place(line))
+        chosen.append([int(place) for place in places])
+    return ["".join(f"[{k}]" for k in places) for places in product(*chosen)]
