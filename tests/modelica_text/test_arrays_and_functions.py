@@ -107,6 +107,11 @@ REFUSED = {
     "sum(if time > 0.5 then {1, 2} else {3, 4, 5})": "The values of an 'if' have different sizes",
     "mod(time, 0)": "mod by 0 has no value",
     "sin(time, foo = 3)": "sin(…) has no argument 'foo'",
+    "(x > 1)*2": "A condition is no number: write `if … then 1 else 0`",
+    "abs(x > 1)": "abs needs numbers, and a condition is none",
+    "if x > 1 and 1 then 1 else 2": "'and' joins conditions, and a number is none",
+    "if 1 then 1 else 2": "The condition of this 'if' is a number",
+    "x > 1": "y is Real, and a condition is no number",
     "v[x]": "A subscript must be a number that constants and parameters determine",
 }
 
@@ -116,6 +121,20 @@ def test_what_is_refused(formula: str, tmp_path: Path) -> None:
     with pytest.raises(ModelicaTextError) as caught:
         at_one(tmp_path, formula)
     assert str(caught.value) == f"{REFUSED[formula]}.\n  in m.mo:7 `y = {formula};`"
+
+
+@pytest.mark.parametrize(
+    ("declaration", "equation", "what"),
+    [
+        ("Boolean b;", "b = 3;", "b is Boolean, and a number is no condition."),
+        ("Integer n;", "n = 2.5;", "n is Integer, and 2.5 is no whole number."),
+    ],
+)
+def test_types_that_do_not_fit(declaration: str, equation: str, what: str, tmp_path: Path) -> None:
+    (tmp_path / "a.mo").write_text(f"model A\n  {declaration}\nequation\n  {equation}\nend A;\n", encoding="utf-8")
+    with pytest.raises(ModelicaTextError) as caught:
+        load(tmp_path / "a.mo")
+    assert caught.value.what == what
 
 
 WRONG = {

@@ -84,6 +84,10 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
     if any(argument.kind == "array" for argument in args):
         return _of_arrays(kind, args, line)
     kind = kind.removeprefix(".")
+    if kind in ("neg", *_BINARY) and any(map(is_condition, args)):
+        raise Unfit("A condition is no number: write `if … then 1 else 0`")
+    if kind in ("not", "and", "or") and any(map(is_number, args)):
+        raise Unfit(f"'{kind}' joins conditions, and a number is none")
     if kind == "neg":
         return number(-args[0].args[0], line) if args[0].kind == "number" else Expr("neg", args, line)
     if kind == "not":
@@ -103,6 +107,16 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
     if kind == "+" and all(argument.kind == "string" for argument in args):
         return Expr("string", (args[0].args[0] + args[1].args[0],), line)
     return Expr(kind, args, line)
+
+
+def is_condition(expression: Expr) -> bool:
+    """Whether a resolved expression is Boolean for sure; a name of a part may be."""
+    return expression.kind in ("boolean", "condition", "not", "and", "or", *_RELATIONS)
+
+
+def is_number(expression: Expr) -> bool:
+    """Whether a resolved expression is a number for sure."""
+    return expression.kind in ("number", "neg", *_BINARY)
 
 
 def _of_arrays(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
@@ -232,6 +246,8 @@ def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
     known = _FUNCTIONS[name]
 
     def made(one: tuple[Expr, ...]) -> Expr:
+        if any(map(is_condition, one)):
+            raise Unfit(f"{name} needs numbers, and a condition is none")
         return _computed(known, one, line) if _all_known(one) else call(name, one, line)
 
     return each(name, args, line, made)

@@ -78,6 +78,9 @@ class Resolver:
             kept, otherwise = list[Expr](), args[-1]
             for condition, value in zip(args[:-1:2], args[1::2], strict=True):
                 choice = self(condition)
+                if fold.is_number(choice):
+                    what = "The condition of this 'if' is a number."
+                    raise ModelicaTextError(what, where=self.text.place(line))
                 if choice.kind != "boolean":
                     kept += [choice, self(value)]
                 elif choice.args[0]:

@@ -255,6 +255,9 @@ class Statements:
             for argument, other in zip(left.args, right.args, strict=True):
                 self._equate(argument, other, text, line)
         elif left.kind == "condition":
+            if fold.is_number(right):
+                what = f"{left.args[0][0]} is Boolean, and a number is no condition."
+                raise ModelicaTextError(what, where=text.place(line))
             right = _condition(right)
             member = self.instance.members.get(left.args[0][0].partition("[")[0])
             if member is None:
@@ -272,7 +275,20 @@ class Statements:
         else:
             if left.kind == "number" and right.kind == "name":
                 left, right = right, left
+            self._check_type(left, right, text, line)
             self.equations.append((left, right, text.place(line)))
+
+    def _check_type(self, left: Expr, right: Expr, text: ClassText, line: int) -> None:
+        """Refuse a condition or a fraction as the value of an own number."""
+        name = left.args[0][0] if left.kind == "name" and len(left.args) == 1 else ""
+        member = self.instance.members.get(name.partition("[")[0])
+        basic = basic_type(self.instance, member) if member is not None else None
+        if basic is None:
+            return
+        fraction = basic.kind == "Integer" and right.kind == "number" and right.args[0] != int(right.args[0])
+        if fraction or fold.is_condition(right):
+            given = f"{right.args[0]:g} is no whole number" if fraction else "a condition is no number"
+            raise ModelicaTextError(f"{name} is {basic.kind}, and {given}.", where=text.place(line))
 
     # -- events ------------------------------------------------------------------------------------------------------
 
