@@ -215,6 +215,10 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "experiment(StartTime = 1): a model that is read runs from 0 s.\n  in a.mo:1 `model A`\n"
         "Leave StartTime out, and call simulate(…, t0=…) in Python.",
     ),
+    "a sample without an interval": (
+        model("Real x;", "when sample(0, 0) then x = time; end when;"),
+        "sample(…) needs an interval above 0, not 0.\n  in a.mo:5 `when sample(0, 0) then x = time; end when;`",
+    ),
     "a text beside a number": (
         model("Real x;", 'x = (if "x" > 1 then 1 else 0);'),
         'A text and a number cannot be compared.\n  in a.mo:5 `x = (if "x" > 1 then 1 else 0);`',

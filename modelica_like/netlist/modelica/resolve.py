@@ -330,6 +330,10 @@ class Resolver:
             return fold.kept("noEvent", (value,), line)
         if short in KEPT:
             values = tuple(self(one) for one in given)
+            interval = values[-1] if (short, len(values)) in (("sample", 2), ("Clock", 1)) else fold.number(1)
+            if interval.kind == "number" and not interval.args[0] > 0:
+                what = f"{short}(…) needs an interval above 0, not {interval.args[0]:g}."
+                raise ModelicaTextError(what, where=self.text.place(line))
             return self._told(lambda: fold.each(short, values, line, lambda one: fold.call(short, one, line)), line)
         if short == "size":
             items = self._sized(given[0])
