@@ -63,6 +63,7 @@ static const double NODE_PLACES[READ_NODES] = {0, 0.17267316464601143, 0.5, 0.82
 #define BENT 3e-5       /* of the largest amount: difference to Simpson's rule; the error is its square, at most 1e-9 */
 #define TWISTED 0.03    /* of the largest amount: part of third degree, which both rules do not see */
 #define LEAST_PART 1e-4 /* part of a step; kinks are less precise only within */
+#define MOST_EDGES 200  /* of a step: more are rounding beside an edge on which it stays */
 #define QUARTIC_LOOKS 16 /* at the quartic, for its extremes */
 #define BESIDE 1e-3
 #define GOLDEN 0.6180339887498949
@@ -209,6 +210,18 @@ static void read_along(Batch *b, double t, double end) {
     }
 }
 
+/* From edge to edge: a polynomial has no kinks. The instants at an edge are looked at on both of its sides. */
+static void read_windows(Batch *b, double begin, double end) {
+    double t = begin;
+    for (int windows = 0; windows < MOST_EDGES && t < end; windows++) {
+        double behind, edge = edge_ahead(b->c, t, &behind);
+        if (!(edge < end && behind > t)) break;
+        read_along(b, t, edge);
+        t = behind;
+    }
+    if (t < end) read_along(b, t, end);
+}
+
 static void read_piece(Batch *b) {
     const NativeBatch *a = b->asked;
     double begin = b->c->piece->begin, end = b->c->piece->end;
@@ -217,7 +230,7 @@ static void read_piece(Batch *b) {
         if (one->kind == READ_AT && one->moment >= begin && one->moment < end)
             b->values[k] = variables_at(b, one->moment, 0)[one->place];
     }
-    if (b->sizes != NULL) read_along(b, begin, end);
+    if (b->sizes != NULL) read_windows(b, begin, end);
 }
 
 static double after_step(Instance *c) {

@@ -18,6 +18,7 @@ from modelica_like.analyse.sweeps.sweep import sweep
 from modelica_like.errors import ExportError
 from modelica_like.language import Assembly
 from modelica_like.native.batch import Batch
+from modelica_like.netlist import loads
 from modelica_like.runs.readings import read_output
 from tests.analyse.test_impacts import engaged
 
@@ -191,3 +192,28 @@ def test_the_last_digits_of_the_time_are_read():
     run = simulate(model, solver="idas", readings=names)
     for name, tolerance in zip(names, (1e-6, 1e-5), strict=True):
         assert float(table[name][0]) == pytest.approx(run.readings[name], rel=tolerance)
+
+
+def test_readings_are_taken_from_kink_to_kink():
+    """A curve over an angle that turns steadily: 10 per rad up to 1 rad, then down by 6 per rad."""
+    drive = loads("""
+[parts]
+shaft = { is = "ConstantSpeed", w_fixed = 2, phi = 0 }
+wheel = { is = "Inertia", J = 1 }
+angle = { is = "AngleSensor" }
+curve = { is = "Table1D", table = [[0, 0], [1, 10], [2, 4]] }
+[series]
+line = ["shaft", "wheel", "angle"]
+[connect]
+angle = ["angle.phi", "curve.u"]
+[simulate]
+until = "0.9 s"
+""")
+    speeds = np.linspace(1.5, 2.2, 60)
+    names = ["max(curve.y)", "integral(curve.y)", "first(curve.y > 9.999)"]
+    table = sweep(drive, {"shaft.w_fixed": [*speeds]}, names)
+    peak, integral, first = (np.asarray(table[name], float) for name in names)
+    np.testing.assert_allclose(peak, 10.0, rtol=1e-12)
+    after = 0.9 - 1 / speeds
+    np.testing.assert_allclose(integral, 5 / speeds + 10 * after - 3 * speeds * after**2, rtol=1e-11)
+    np.testing.assert_allclose(first, 0.9999 / speeds, rtol=1e-11)
