@@ -165,7 +165,8 @@ typedef enum { KEPT_FAILED, KEPT_LED, KEPT_SETTLING, N_KEPT_STARTS } KeptStart; 
 
 /* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns; `wanting` transitions fire at the
  * end of the piece. */
-#define SMOOTH_NUMBERS(A) A(x, n), A(p, m->n_p), A(u, m->n_u), A(u_rate, m->n_u), A(d, n_d), A(start_value, starts)
+#define SMOOTH_NUMBERS(A) \
+    A(x, n), A(p, m->n_p), A(u, m->n_u), A(u_rate, m->n_u), A(d, n_d), A(mode_value, n_d), A(start_value, starts)
 #define STATE_MARKS(A) A(mode_given, n_d), A(start_given, starts), A(wanting, m->n_transitions)
 
 typedef struct Instance {
@@ -262,6 +263,7 @@ Result start_solve(Instance *c);
 void choose_loose(Instance *c, const unsigned char *loose);
 #define MODE_ROUNDS 5 /* in which modes and start values settle */
 void begin_start(Instance *c);
+const double *discrete_starts(Instance *c);
 Result apply_fixed(Instance *c);
 void apply_defaults(Instance *c);
 int choose_start_modes(Instance *c, const double *begun, int declared);

@@ -14,6 +14,14 @@ void start_values(Instance *c) {
         if (c->start_given[k]) c->start_values[k] = c->start_value[k];
 }
 
+/* The same of modes and discrete values, as work that the next evaluation of guards overwrites. */
+const double *discrete_starts(Instance *c) {
+    evaluate_now(c, &c->model->tapes.discrete_starts, c->guards);
+    for (int k = 0; k < c->model->n_d; k++)
+        if (c->mode_given[k]) c->guards[k] = c->mode_value[k];
+    return c->guards;
+}
+
 Result apply_fixed(Instance *c) {
     const Model *m = c->model;
     unsigned char *known = memset(c->known, 0, (size_t)m->n_x);
@@ -113,9 +121,9 @@ static Result check_dependent(Instance *c) {
 /* Equations of discrete variables, whose values before the start are their start values. */
 static void start_equations(Instance *c) {
     const Model *m = c->model;
-    double *values = c->reset_values, *starts = c->guards;
+    double *values = c->reset_values;
     if (m->n_updates == 0) return;
-    evaluate_now(c, &m->tapes.discrete_starts, starts);
+    const double *starts = discrete_starts(c);
     for (int k = 0; k < m->n_updates; k++)
         if (m->updates[k].at_start >= 0) c->d[m->updates[k].at_start] = starts[m->updates[k].at_start];
     evaluate_now(c, &m->tapes.updates, values);
@@ -140,11 +148,11 @@ void choose_loose(Instance *c, const unsigned char *loose) {
     double *d = c->respond_d;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memset(c->decided, 1, (size_t)m->n_d);
-    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
+    const double *starts = discrete_starts(c);
     for (int k = 0; k < m->n_holds; k++) {
         int mode = m->holds[k].mode;
         if (!loose[k]) continue;
-        c->d[mode] = c->guards[mode];
+        c->d[mode] = starts[mode];
         c->decided[mode] = 0;
     }
     choose_modes(c);
@@ -166,9 +174,9 @@ int choose_start_modes(Instance *c, const double *begun, int declared) {
     choose_modes(c);
     if (declared) memcpy(c->decided, c->mode_given, (size_t)m->n_d);
     for (int k = 0; k < m->n_holds && declared; k++) c->decided[m->holds[k].mode] = 1;
-    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
+    const double *starts = discrete_starts(c);
     for (int k = 0; k < m->n_start_modes; k++)
-        if (!c->decided[m->start_modes[k].mode]) c->d[m->start_modes[k].mode] = c->guards[m->start_modes[k].mode];
+        if (!c->decided[m->start_modes[k].mode]) c->d[m->start_modes[k].mode] = starts[m->start_modes[k].mode];
     if (begun) variables_now(c);
     for (int k = 0; k < m->n_holds && begun; k++) {
         const Held *one = &m->holds[k];
@@ -201,9 +209,7 @@ void begin_start(Instance *c) {
     const Model *m = c->model;
     memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
-    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
-    for (int k = 0; k < m->n_d; k++)
-        if (!c->mode_given[k]) c->d[k] = c->guards[k];
+    memcpy(c->d, discrete_starts(c), m->n_d * sizeof(double));
     if (m->settings->homotopy >= 0) c->d[m->settings->homotopy] = 0;
     share(c);
     start_values(c);

@@ -127,7 +127,7 @@ Result check_tables(Instance *c) {
 static Result set_start(Instance *c, const Variable *v, double value) {
     if (!before_start(&c->state)) return fail(c, START_TOO_LATE, v->reference);
     if (v->kind == KIND_DISCRETE) {
-        c->d[v->index] = value;
+        c->d[v->index] = c->mode_value[v->index] = value; /* read before the start; used by every start */
         c->mode_given[v->index] = 1;
     } else if (v->start >= 0 && v->start < c->model->n_starts) {
         c->start_value[v->start] = value;

@@ -9,7 +9,25 @@ from fmpy.fmi1 import FMICallException
 
 from components import Fixed, Inertia, Spring, Torque
 from modelica_like import simulate
-from modelica_like.language import Component, Equations, Input, connect, series, signal_in
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Input,
+    Mode,
+    Parameter,
+    Variable,
+    connect,
+    der,
+    discrete,
+    param,
+    pre,
+    series,
+    signal_in,
+    var,
+    when,
+)
 
 CLUTCHES = "msl/rotational/CoupledClutches.toml"
 DRIVES = [
@@ -97,6 +115,56 @@ def test_start_values_are_honoured(exported):
     assert case.states(fmu) == pytest.approx([reference.final[name] for name in names], rel=1e-7, abs=1e-7)
     fast = case.started(until=1.0, **other)
     assert fast.getReal([case.ref("J1.w")]) == [5.0]
+
+
+class Counts(Component):
+    """Counts and doubles at its own times."""
+
+    x: Variable = var("s", "time since the start", default=0.0)
+    n: Discrete = discrete("1", "count", start=2.0)
+    d: Discrete = discrete("1", "doubled", start=4.0)
+    t_count: Parameter = param("s", default=0.5)
+    t_double: Parameter = param("s", default=0.7)
+    lamp = Mode("off", "red", "green")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 1.0
+
+    def events(self) -> Events:
+        yield when(self.x > self.t_count, {self.n: pre(self.n) + 1})
+        yield when(self.x > self.t_double, {self.d: 2 * pre(self.d)})
+        yield self.lamp.go("off", "red", when=self.x > self.t_count)
+
+
+COUNTS = Counts()
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("kind", ["cs", "me"])
+@pytest.mark.parametrize("early", [True, False])
+def test_start_values_of_discrete_variables_are_honoured(exported, version, kind, early):
+    case = exported(COUNTS, version)
+    fmu, given, of_reals = case.instance(kind), {"n": 10.0, "d": 7.0}, [case.ref("n"), case.ref("d")]
+    reals, set_reals = (fmu.getReal, fmu.setReal) if version == "2.0" else (fmu.getFloat64, fmu.setFloat64)
+    if early:
+        set_reals(of_reals, [*given.values()])
+    case.initialize(fmu, until=1.0, **({} if early else given))
+    assert list(reals(of_reals)) == [10.0, 7.0]
+    if kind == "cs":
+        fmu.doStep(0.0, 1.0)
+        assert list(reals(of_reals)) == [10 + 1, 2 * 7]
+    fmu.reset()
+    case.initialize(fmu, until=1.0)
+    assert list(reals(of_reals)) == [2.0, 4.0]
+
+
+def test_modes_that_were_given_are_those_of_the_start(exported):
+    case = exported(COUNTS, "3.0")
+    fmu = case.instance()
+    fmu.setInt64([case.ref("lamp")], [2])
+    case.initialize(fmu, until=1.0)
+    fmu.doStep(0.0, 1.0)
+    assert list(fmu.getInt64([case.ref("lamp")])) == [2]
 
 
 def logged(case, categories, until, **instantiate):

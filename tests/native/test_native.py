@@ -23,15 +23,19 @@ from modelica_like.fmi.build import native_platform
 from modelica_like.language import (
     Assembly,
     Component,
+    Discrete,
     Equations,
     Events,
     Mode,
     Parameter,
     Variable,
     der,
+    discrete,
     param,
+    pre,
     sin,
     var,
+    when,
 )
 from modelica_like.native import buffers, model
 from modelica_like.native.library import Run, declared
@@ -287,6 +291,28 @@ def test_start_values_and_parameters_at_the_reset():
     assert handle.outputs[1] == pytest.approx(simulate(other, 0.02, solver="native").final["J2.w"], rel=1e-7)
     handle.reset()
     assert handle.get("J1.J") == drive.p[drive.parameter_position["J1.J"]]
+
+
+class Counts(Component):
+    """Counts once."""
+
+    x: Variable = var("s", "time since the start", default=0.0)
+    t_count: Parameter = param("s", default=0.5)
+    n: Discrete = discrete("1", "count", start=2.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 1.0
+
+    def events(self) -> Events:
+        yield when(self.x > self.t_count, {self.n: pre(self.n) + 1})
+
+
+def test_start_values_of_discrete_variables_at_the_reset():
+    handle = build(Counts()).native(outputs=["n"])
+    for given, expected in (({"n": 10}, 10 + 1), ({"n": 2}, 2 + 1), ({}, 2 + 1)):
+        handle.reset(given)
+        handle.step(1.0)
+        assert handle.outputs == [expected]
 
 
 def test_threads_share_a_model():
