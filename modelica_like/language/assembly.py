@@ -178,11 +178,13 @@ def declare(of: Assembly, name: str, field: Field) -> None:
 
     Raises:
         DuplicateName: the name is in use.
+        ValueOutOfRange: the nominal value of the field is not positive and finite.
     """
     own = inside(of)
     if name in of.fields or name in own.parts or name in own.connectors:
         raise DuplicateName(f"{of.label}: '{name}' is already in use.")
     field.owner, field.name = of.label, name
+    field.check()
     own.own_fields = {**own.own_fields, name: field}
 
 

@@ -37,6 +37,8 @@ class Declared:
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         cls._declared = Declarations(fields=of_kind(cls, Field))
+        for one in cls._declared.fields.values():
+            one.check()
         former = (vars(base).get("renamed", {}) for base in reversed(cls.__mro__))
         cls.renamed = {name: instead for names in former for name, instead in names.items()}
 
@@ -73,6 +75,7 @@ class Declared:
         for key in (f"{name}[{k}]" for k in range(1, size + 1)):
             kept[key] = copy(field)
             kept[key].owner, kept[key].name = type(self).__name__, key
+            kept[key].check()
         self._inside.own_fields = kept
 
     def array(self, name: str) -> list[Symbol]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, overload
 from modelica_like.errors import LanguageError, UnitError, ValueOutOfRange
 from modelica_like.language.expr import Expr, symbol_of
 from modelica_like.language.formula import Arithmetic, Formula, as_formula, parse_formula
+from modelica_like.language.places import caller
 from modelica_like.language.units import ANY, Unit, coherent, parse_unit, read_quantity, to_si
 
 _CALCULATES = re.compile(r"\s[-+*/]\s")
@@ -75,6 +76,22 @@ class Field:
     def __set_name__(self, owner: type, name: str) -> None:
         self.owner = owner.__name__
         self.name = name
+
+    def check(self) -> None:
+        """Check the nominal value, by which tolerances and steps of Newton's method are scaled.
+
+        Raises:
+            ValueOutOfRange: it is not positive and finite.
+        """
+        given: Any = self.nominal
+        number = isinstance(given, int | float)
+        if not number or not 0 < given < math.inf:
+            shown = f"{given:g}" if number else repr(given)
+            raise ValueOutOfRange(
+                f"The nominal value of {self.label} must be a positive, finite number, not {shown}.", where=caller(),
+                why="It is the order of magnitude of a variable, in SI units, which tells how exact a run must be.",
+                advice="Give a typical magnitude, or leave it out: it is 1 then.",
+            )  # fmt: skip
 
     @property
     def unit(self) -> Unit:

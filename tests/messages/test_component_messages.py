@@ -263,6 +263,27 @@ Named declares 'start', which every component has already.
 Choose another name.""",
 )
 case(
+    errors.ValueOutOfRange,
+    "a nominal value that is not positive",
+    lambda: type("Scaled", (Component,), {"w": var("rad/s", "speed", nominal=-1.0)}),  # scaled
+    """\
+The nominal value of Scaled.w must be a positive, finite number, not -1.
+  in test_component_messages.py:{scaled} `type("Scaled", (Component,), {"w": var("rad/s", "speed", nominal=-1.0)})`
+It is the order of magnitude of a variable, in SI units, which tells how exact a run must be.
+Give a typical magnitude, or leave it out: it is 1 then.""",
+)
+case(
+    errors.ValueOutOfRange,
+    "a nominal value that is no number",
+    lambda: Assembly("drive").declare_array("w", 2, var("rad/s", "speed", nominal="10 rpm")),  # scaled in rpm
+    """\
+The nominal value of Assembly.w[1] must be a positive, finite number, not '10 rpm'.
+  in test_component_messages.py:{scaled in rpm} \
+`Assembly("drive").declare_array("w", 2, var("rad/s", "speed", nominal="10 rpm"))`
+It is the order of magnitude of a variable, in SI units, which tells how exact a run must be.
+Give a typical magnitude, or leave it out: it is 1 then.""",
+)
+case(
     errors.LanguageError,
     "a mode holds what is no variable",
     lambda: flatten(Nothing()),

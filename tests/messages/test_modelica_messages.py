@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from modelica_like import load
-from modelica_like.errors import ModelicaLikeError, ModelicaTextError, UnknownName
+from modelica_like.errors import ModelicaLikeError, ModelicaTextError, UnknownName, ValueOutOfRange
 
 R = "Modelica.Mechanics.Rotational.Components"
 
@@ -280,6 +280,29 @@ def test_every_refusal_has_its_sentence(case: str, tmp_path: Path, check_message
     (tmp_path / "a.mo").write_text(text)
     kind = (ModelicaTextError, UnknownName)[case in NAMES]
     check_message(kind, lambda: load(tmp_path / "a.mo"), message)
+
+
+@pytest.mark.parametrize(
+    ("declaration", "of", "number"),
+    [
+        ("Real y(nominal = -1);", "A.y", "-1"),
+        ("parameter Real m = 2; Real y(nominal = 0*m);", "A.y", "0"),
+        ("parameter Real y(nominal = -3) = 1;", "A.y", "-3"),
+        ("discrete Real y(start = 1, nominal = -3);", "A.y", "-3"),
+        ("Real y[2](nominal = {1, -2});", "A.y[2]", "-2"),
+        ("B y;", "B.i", "-5"),
+    ],
+)
+def test_nominal_values_are_positive(declaration: str, of: str, number: str, tmp_path: Path, check_message) -> None:
+    before = "connector B Real v; flow Real i(nominal = -5); end B;"
+    (tmp_path / "a.mo").write_text(model(declaration, before=before))
+    told = (
+        f"The nominal value of {of} must be a positive, finite number, not {number}.\n"
+        f"  in a.mo:3 `{declaration}`\n"
+        "It is the order of magnitude of a variable, in SI units, which tells how exact a run must be.\n"
+        "Give a typical magnitude, or leave it out: it is 1 then."
+    )
+    check_message(ValueOutOfRange, lambda: load(tmp_path / "a.mo"), told)
 
 
 def test_several_errors_are_told_together(tmp_path: Path) -> None:

@@ -177,6 +177,7 @@ class _Builder:
         outside = given.scope is not None and given.scope[0] is not self.instance
         if given.value is not None and not outside:
             parameter.default = self._value(given, self.instance, "")
+        parameter.nominal = self.nominal(basic)
         declare(self.component, name, parameter)
         if given.value is not None and outside:
             self.component.give(name, self._value(given, self.instance.owner, ""))
@@ -217,9 +218,9 @@ class _Builder:
         elif "output" in basic.prefixes and signal:
             declared = signal_out(self.unit(basic), description)
         else:
-            nominal = self._number(basic.given.inner.get("nominal"))
             select: Any = _STATE_SELECT.get(self._known(basic.given.inner.get("stateSelect")), "default")
-            declared = var(self.unit(basic), description, state=select, nominal=nominal or 1.0)
+            declared = var(self.unit(basic), description, state=select)
+        declared.nominal = self.nominal(basic)
         if path in self.statements.outputs:
             memory = boolean(description)
             declare(self.component, f"{path}{MEMORY}", memory)
@@ -268,6 +269,11 @@ class _Builder:
     def _number(self, given: Given | None) -> float | None:
         value = self._known(given)
         return value if isinstance(value, float) and abs(value) < 1e50 else None
+
+    def nominal(self, basic: Basic) -> float:
+        """Return the nominal value, or 1."""
+        value = self._known(basic.given.inner.get("nominal"))
+        return value if isinstance(value, float) else 1.0
 
     def unit(self, basic: Basic) -> str:
         """Return the unit; one that is not coherent is left out, because Modelica converts nothing."""
@@ -344,7 +350,8 @@ def _connector(instance: Instance) -> WrittenConnector:
         builder = _Builder(instance, Notes())
         unit = builder.unit(basic)
         quantity = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
-        quantity.owner, quantity.name = instance.text.name, name
+        quantity.owner, quantity.name, quantity.nominal = instance.text.name, name, builder.nominal(basic)
+        quantity.check()
         inside(connector).own_fields = {**inside(connector).own_fields, name: quantity}
     connector.kind = instance.text.path
     return connector
