@@ -32,7 +32,7 @@ from modelica_like.flatten.model import (
 from modelica_like.flatten.parameters import Parameters
 from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
-from modelica_like.language.component import Component
+from modelica_like.language.component import Component, scopes_of
 from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.discrete import HOMOTOPY, INITIAL, TERMINAL
 from modelica_like.language.expr import TIME, flagged_motion
@@ -197,9 +197,9 @@ class _Flattener:
     def _start(self, component: Component, name: str, path: str) -> Any:
         """Return a start value, which the owner gives in terms of its names, or the class by default."""
         given, field = inside(component).starts.get(name), component.fields[name]
-        value, scope = (field.read(field.default), None) if given is None else (given, inside(component).owner)
+        value = field.read(field.default) if given is None else given
         with component.at_its_place(name):
-            return self.parameters.evaluate(value, scope or component, path)
+            return self.parameters.evaluate(value, scopes_of(component, value, given=given is not None), path)
 
     def _hide(self, owner: int, name: str, path: str, hidden: Hidden, start: Any = 0.0) -> int:
         """Declare a discrete value that no user has declared."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, cast
 
@@ -13,7 +14,7 @@ from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.dimensions import Dimensions, check_expression
 from modelica_like.flatten.model import FlatParameter
 from modelica_like.flatten.template import column
-from modelica_like.language.component import Component
+from modelica_like.language.component import Component, scope_for, scopes_of
 from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id
 from modelica_like.language.fields import Input, Parameter, Value
@@ -86,13 +87,8 @@ class Parameters:
                 f"Parameters depend on each other in a circle: {circle}.", advice="Give one of them a number."
             )
         self._open.append(path)
-        # A value given in an assembly uses the assembly's names, a default those of the component itself.
-        scope = (
-            inside(component).owner
-            if name in inside(component).values and isinstance(inside(component).owner, Component)
-            else component
-        )
-        expression = self.evaluate(value, scope, path)
+        scopes = scopes_of(component, value, given=name in inside(component).values)
+        expression = self.evaluate(value, scopes, path)
         self._open.pop()
         field = component.fields[name]
         unit = coherent(value.unit)
@@ -100,12 +96,12 @@ class Parameters:
         self._formulas.append(expression)
         return expression
 
-    def evaluate(self, value: Value, scope: Any, label: str) -> Any:
+    def evaluate(self, value: Value, scopes: Sequence[Component], label: str) -> Any:
         """Return the number or the expression of a value.
 
         Args:
             value: what was given.
-            scope: the component whose names a formula uses.
+            scopes: the components whose names a formula uses; the first that knows a name counts.
             label: name for messages.
 
         Raises:
@@ -116,7 +112,7 @@ class Parameters:
         """
         if value.formula is None:
             return value.number
-        expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scope, path, label), self._quantity))
+        expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scopes, path, label), self._quantity))
         quantities = [symbol for symbol in ca.symvar(expression) if leaf_id(symbol) in self._quantities]
         result = ca.substitute(
             expression, column(quantities), column(self._quantities[leaf_id(quantity)][1] for quantity in quantities)
@@ -124,7 +120,7 @@ class Parameters:
         if result.is_constant() and not math.isfinite(float(result)):
             raise ValueOutOfRange(f"{label} must be a finite number, not {float(result):g}.")
         self._unit = None
-        if getattr(scope, "units_checked", True):
+        if scopes[0].units_checked:
             self._unit = check_expression(expression, value.unit, self._dimensions, f"{label} = {value.formula}")
         return result
 
@@ -142,9 +138,9 @@ class Parameters:
         key = leaf_id(leaf)
         return self._quantities[key][2] if key in self._quantities else self.flat[self._by_leaf[key]].unit
 
-    def _look_up(self, scope: Component, path: str, label: str) -> Any:
+    def _look_up(self, scopes: Sequence[Component], path: str, label: str) -> Any:
         owner_path, _, name = path.rpartition(".")
-        owner = scope.find(owner_path)
+        owner = scope_for(scopes, path).find(owner_path)
         field = owner.fields.get(name)
         if not isinstance(field, Parameter | Input):
             names = [key for key, f in owner.fields.items() if isinstance(f, Parameter)]

@@ -43,9 +43,10 @@ class Value:
     Attributes:
         given: as written by the user.
         number: value in SI units, or None if it follows from a formula.
-        formula: of parameters of the owner's assembly, or None.
+        formula: of parameters of an owner, or None.
         unit: declared unit; for a declared unit `*` the unit of the given quantity.
         fixed: False for a guessed start value.
+        levels: how far above the component the formula stands: its names are parameters there; 1 is the owner.
     """
 
     given: Any
@@ -53,6 +54,7 @@ class Value:
     formula: Formula | None
     unit: Unit
     fixed: bool = True
+    levels: int = 1
 
 
 class Field:

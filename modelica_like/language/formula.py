@@ -80,6 +80,14 @@ class Formula(Arithmetic):
             if isinstance(operand, Formula):
                 yield from operand.names()
 
+    def renamed(self, rename: Callable[[str], str]) -> Formula:
+        """Return the formula with other paths of its parameters."""
+        if self.operation == "name":
+            return Formula("name", (rename(self._name()),))
+        return Formula(
+            self.operation, tuple(one.renamed(rename) if isinstance(one, Formula) else one for one in self.operands)
+        )
+
     def evaluate(self, lookup: Callable[[str], Any], quantity: Callable[[str], Any] | None = None) -> Any:
         """Compute the value.
 

@@ -18,6 +18,7 @@ from modelica_like.errors import (
     raise_together_or_one,
 )
 from modelica_like.language import Assembly, Component, Variable, guess
+from modelica_like.language.component import give_by_path
 from modelica_like.language.fields import Discrete
 from modelica_like.language.inside import declarations, inside
 from modelica_like.netlist.document import Document, check_part, parse, read_text
@@ -150,7 +151,7 @@ class _Task:
             self._each("start", self.document.start, self._start)
             self._each("guess", self.document.guess, lambda path, value: self._start(path, guess(value)))
             self._each("expose", self.document.expose, partial(Assembly.expose, self.assembly))
-        for section in ("parameters", "start", "connect", "series", "expose"):
+        for section in ("parameters", "start", "guess", "connect", "series", "expose"):
             for name in getattr(self.document, section):
                 Assembly.place(self.assembly, f"{section}.{name}", self.document.lines.source(section, name))
         for end in self.document.free:
@@ -190,7 +191,7 @@ class _Task:
             for key in inside(first).starts.keys() & entry.keys():
                 Assembly.place(self.assembly, f"parts.{name}.{key}", self.document.lines.source("parts", name, key))
 
-    def _part(self, name: str, table: Mapping[str, Any]) -> Component:
+    def _part(self, name: str, table: Mapping[str, Any], levels: int = 1) -> Component:
         values = {key: value for key, value in table.items() if key not in ("is", "count")}
         kind, folder, number = table["is"], Path(self.document.lines.file).parent, table.get("count", 1)
         if kind == FMU_PART:
@@ -207,7 +208,7 @@ class _Task:
             part = new_component(find_type(kind, folder), values)
             self.loader.count(number * sum(1 for _ in part.walk()))
         for key, value in values.items():
-            self._give(part, key, value, f"{name}.{key}")
+            self._give(part, key, value, f"{name}.{key}", levels)
         return part
 
     def _copied(self, part: Component, number: int) -> Component:
@@ -215,15 +216,18 @@ class _Task:
         self.loader.count(number * sum(1 for _ in part.walk()))
         return part.copy()
 
-    def _give(self, part: Component, key: str, value: Any, label: str) -> None:
-        """Set a value, a replaceable part (a table with `is`), or values inside a part (a table without)."""
+    def _give(self, part: Component, key: str, value: Any, label: str, levels: int = 1) -> None:
+        """Set a value, a replaceable part (a table with `is`), or values inside a part (a table without).
+
+        Names in formulas are those of this netlist, `levels` above the part.
+        """
         if not isinstance(value, dict):
-            part.set(key, value)
+            give_by_path(part, key, value, above=levels)
         elif "is" in value:
-            part.give(key, self._part(label, check_part(f"parts.{label}", value)))
+            part.give(key, self._part(label, check_part(f"parts.{label}", value), levels + 1))
         else:
             for inner, inner_value in value.items():
-                self._give(part.find(key), inner, inner_value, f"{label}.{inner}")
+                self._give(part.find(key), inner, inner_value, f"{label}.{inner}", levels + 1)
 
     def _start(self, path: str, value: Any) -> None:
         owner_path, _, name = path.rpartition(".")
@@ -233,7 +237,7 @@ class _Task:
             raise UnknownName(
                 f"{path} is a parameter, not a variable.", advice="Give its value where the part is declared."
             )
-        owner.give(name, value)
+        give_by_path(self.assembly, path, value)
 
 
 def is_modelica(path: str | Path) -> bool:

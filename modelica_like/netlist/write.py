@@ -12,6 +12,7 @@ from tomlkit.items import Item
 
 from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component
+from modelica_like.language.component import scope_for, scopes_of
 from modelica_like.language.fields import Field, Parameter, Value
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import declarations, inside
@@ -108,14 +109,14 @@ class _Writer:
     def changes(self, path: str, part: Component, reference: Component) -> dict[str, Any]:
         """Return the values that differ from those of `reference`; start values go to their sections."""
         table = {
-            name: plain(value.given)
+            name: _given_text(path, part, value)
             for name, value in inside(part).values.items()
             if value != inside(reference).values.get(name)
         }
         for name, value in inside(part).starts.items():
             if value != inside(reference).starts.get(name):
                 section = self.start if value.fixed else self.guess
-                section[f"{path}.{name}"] = plain(value.given)
+                section[f"{path}.{name}"] = _given_text(path, part, value)
         for name in part.modes:
             if part.start_mode(name) != reference.start_mode(name):
                 self.start[f"{path}.{name}"] = part.start_mode(name)
@@ -133,6 +134,19 @@ def _given(component: Component, name: str) -> Value:
     if value is None:
         raise NetlistError(f"{component.label}.{name} has no value.")
     return value
+
+
+def _given_text(path: str, part: Component, value: Value) -> Any:
+    """Return a value of a part; names of a formula are written as the netlist knows them, which is above the part."""
+    steps, scopes = path.split("."), scopes_of(part, value, given=True)
+    if value.formula is None or value.levels >= len(steps):
+        return plain(value.given)
+
+    def seen(name: str) -> str:
+        levels = value.levels if scope_for(scopes, name) is scopes[0] else 1
+        return ".".join([*steps[: len(steps) - levels], name])
+
+    return str(value.formula.renamed(seen))
 
 
 def plain(value: Any) -> Any:

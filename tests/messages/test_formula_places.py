@@ -1,5 +1,7 @@
 """What is wrong with a formula of a netlist is told with its line."""
 
+from pathlib import Path
+
 import pytest
 
 from modelica_like import build
@@ -45,6 +47,26 @@ def test_a_formula_has_its_line(wrong: dict[str, str], message: str) -> None:
     with pytest.raises(ModelicaLikeError) as caught:
         build(loads(HEAD.format(**{**RIGHT, **wrong}), file="bench.toml"))
     assert sorted(str(caught.value).split("\n\n")) == sorted(message.split("\n\n"))
+
+
+BOX = '[parameters]\ni = 3\n[parts]\na = { is = "Inertia", J = "i * 1 kg.m2" }\n'
+
+
+@pytest.mark.parametrize(
+    ("part", "start", "of", "place"),
+    [
+        ("", "c * 1 rad/s", "q.a.w", '7 `"q.a.w" = "c * 1 rad/s"`'),
+        (', i = "c"', "0", "q.i", '5 `q = { is = "./box.toml", i = "c" }`'),
+        (', a.J = "c"', "0", "q.a.J", '5 `q = { is = "./box.toml", a.J = "c" }`'),
+    ],
+)
+def test_a_formula_for_a_value_inside_has_its_line(part: str, start: str, of: str, place: str, tmp_path: Path) -> None:
+    (tmp_path / "box.toml").write_text(BOX)
+    text = f'name = "bench"\n[parameters]\nn = 7\n[parts]\nq = {{ is = "./box.toml"{part} }}\n'
+    text += f'[start]\n"q.a.w" = "{start}"\n'
+    with pytest.raises(ModelicaLikeError) as caught:
+        build(loads(text, file=str(tmp_path / "bench.toml")))
+    assert str(caught.value) == f"{of}: bench has no parameter 'c'. It has n.\n  in bench.toml:{place}"
 
 
 def test_units_that_a_block_leaves_open_are_told_by_its_values() -> None:

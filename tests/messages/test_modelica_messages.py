@@ -6,6 +6,7 @@ import pytest
 
 from modelica_like import load
 from modelica_like.errors import ModelicaLikeError, ModelicaTextError, UnknownName, ValueOutOfRange
+from modelica_like.netlist.modelica.write import modelica_text
 
 R = "Modelica.Mechanics.Rotational.Components"
 
@@ -324,6 +325,18 @@ def test_errors_of_the_drive_point_into_the_text(tmp_path: Path) -> None:
         "  in a.mo:6 `y = x; y = 2;`\n"
         "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."
     )
+
+
+def test_a_class_does_not_know_what_is_outside(tmp_path: Path, check_message) -> None:
+    (tmp_path / "box.toml").write_text('[parameters]\ni = 3\n[parts]\na = { is = "Inertia", J = "i * 1 kg.m2" }\n')
+    (tmp_path / "drive.toml").write_text('[parameters]\nn = 7\n[parts]\nq = { is = "./box.toml", i = "2*n" }\n')
+    told = (
+        "q.i = 2.0 * n uses n, which is outside of q.\n"
+        '  in drive.toml:4 `q = { is = "./box.toml", i = "2*n" }`\n'
+        "q becomes a class, which knows its own names only.\n"
+        "Give it a number."
+    )
+    check_message(ModelicaTextError, lambda: modelica_text(load(tmp_path / "drive.toml")), told)
 
 
 def test_what_python_cannot_go_down_into(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check_message) -> None:

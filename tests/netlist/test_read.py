@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 
 from components import Clutch, IdealGear, Inertia, Mass
-from modelica_like import simulate
+from modelica_like import build, simulate
 from modelica_like.errors import CyclicAssembly, NetlistError, UnknownName, WiringErrors
+from modelica_like.flatten import flatten
 from modelica_like.language import Assembly
+from modelica_like.native.start import initialize
 from modelica_like.netlist import dumps, load, loads
 from modelica_like.show.draw.diagram import diagram
 
@@ -211,3 +213,51 @@ def test_only_connectors_and_signals_leave_an_assembly(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text('[parts]\na = { is = "Inertia", J = 1 }\n[expose]\nx = "a.w"\n')
     with pytest.raises(UnknownName, match=r"has no connector 'a\.w'"):
         load(tmp_path / "bad.toml")
+
+
+BOX = """
+[parameters]
+J = "2 kg.m2"
+i = 3
+J_out = "J * i**2"
+[parts]
+a = { is = "Inertia", J = "J" }
+b = { is = "Inertia", J = "J_out" }
+[series]
+x = ["a", "b"]
+[expose]
+flange_a = "a.flange_a"
+"""
+BENCH = """
+[parameters]
+i = 7
+[parts]
+t = { is = "Torque", tau = 0 }
+q = { is = "./box.toml", i = "i - 2", a.J = "i * 1 kg.m2", b = { J = "i * J" } }
+[series]
+x = ["t", "q"]
+[start]
+"q.a.w" = "i * 1 rad/s"
+"q.b.phi" = "J_out * 1 rad / J"
+"""
+
+
+def test_names_are_those_of_the_file_where_a_formula_stands(tmp_path: Path) -> None:
+    (tmp_path / "box.toml").write_text(BOX)
+    drive = loads(BENCH, file=str(tmp_path / "bench.toml"))
+    found = {parameter.path: parameter.value for parameter in flatten(drive).derived}
+    # i is 7 in the bench and 5 in the box; only the box has J = 2 kg.m2 and J_out = 2*5**2 kg.m2.
+    assert found["q.i"] == 5.0
+    assert found["q.a.J"] == 7.0
+    assert found["q.b.J"] == 7.0 * 2.0
+    model = build(drive)
+    assert dict(zip(model.states, initialize(model).x, strict=True)) == {"t.phi": 2 * 5**2 / 2, "q.a.w": 7.0}
+
+
+def test_a_path_that_is_set_names_what_it_begins_at(tmp_path: Path) -> None:
+    (tmp_path / "box.toml").write_text(BOX)
+    drive = loads(BENCH, file=str(tmp_path / "bench.toml"))
+    drive.set("q.a.J", "2 * i * 1 kg.m2")
+    drive.find("q").set("b.J", "2 * i * 1 kg.m2")
+    found = {parameter.path: parameter.value for parameter in flatten(drive).derived}
+    assert (found["q.a.J"], found["q.b.J"]) == (2 * 7.0, 2 * 5.0)

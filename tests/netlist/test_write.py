@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from components import Clutch, ConstantSpeed, Flange, IdealGear, Inertia, Spring, SpringDamper, Table
 from modelica_like.errors import NetlistError
+from modelica_like.flatten import flatten
 from modelica_like.language import (
     Assembly,
     Component,
@@ -183,6 +184,21 @@ def test_netlists_inside_are_named_by_file(tmp_path: Path) -> None:
     save(outer, tmp_path / "sub" / "outer.toml")
     assert 'b = {is = "../box.toml", k = 3, shaft = {J = 4}}' in (tmp_path / "sub" / "outer.toml").read_text()
     assert_same(load(tmp_path / "sub" / "outer.toml"), outer)
+
+
+def test_formulas_keep_the_names_they_use(tmp_path: Path) -> None:
+    box = '[parameters]\ni = 3\nJ = "2 kg.m2"\n[parts]\na = { is = "Inertia", J = "J" }\n'
+    (tmp_path / "box.toml").write_text(box)
+    text = '[parameters]\ni = 7\n[parts]\nq = { is = "./box.toml", a.J = "i * J" }\n[start]\n"q.a.w" = "i * 1 rad/s"\n'
+    drive = loads(text, file=str(tmp_path / "bench.toml"))
+    written = dumps(drive, folder=tmp_path)
+    assert 'a = {J = "i * J"}' in written
+    assert '"q.a.w" = "i * 1 rad/s"' in written
+    drive.find("q").set("a.J", "i * J")  # the i of the box
+    written = dumps(drive, folder=tmp_path)
+    assert 'a = {J = "q.i * q.J"}' in written
+    read = loads(written, file=str(tmp_path / "bench.toml"))
+    assert {p.path: p.value for p in flatten(read).derived}["q.a.J"] == 3 * 2.0
 
 
 def test_what_no_netlist_can_hold_is_told() -> None:

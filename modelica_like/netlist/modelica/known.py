@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from modelica_like.errors import Source, UnknownName, did_you_mean
 from modelica_like.language import Component, Parameter, Variable, guess
+from modelica_like.language.component import give_by_path
 from modelica_like.language.fields import Input, Output
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold
@@ -240,9 +241,9 @@ class _Part:
             node = Resolver(*start.scope, numeric=outside)(start.value)
             value = self._value(node)
         if fixed:
-            part.set(here, value)
+            give_by_path(part, here, value, above=1)
         elif value != 0.0:
-            part.set(here, guess(value))
+            give_by_path(part, here, guess(value), above=1)
 
     def _unknown(self, name: str, given: Given) -> None:
         fixed, start = given.inner.get("fixed"), given.inner.get("start")

@@ -9,6 +9,7 @@ from typing import Any
 
 from modelica_like.errors import ModelicaTextError
 from modelica_like.language import Assembly, Component, Connector, Input, Output, Parameter
+from modelica_like.language.component import scope_for, scopes_of
 from modelica_like.language.fields import Value
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import declarations, inside
@@ -110,6 +111,7 @@ class _Writer:
     def _part(self, owner: Assembly, path: str, part: Component, joined: set[str]) -> tuple[str, dict[str, str]]:
         """Return the class of a part and the arguments of its modification."""
         if isinstance(part, Assembly):
+            _refuse_names_from_outside(part)
             name = _class_name(part)
             text = self.model(part, name)
             while self.made.get(name, text) != text:
@@ -309,6 +311,22 @@ class _Arguments:
             f"{self.path}.{name} = {value} has no counterpart in {self.known.path}.",
             where=self.owner.source_of(f"parts.{self.path.partition('[')[0]}"),
         )
+
+
+def _refuse_names_from_outside(assembly: Assembly) -> None:
+    """Refuse formulas inside an assembly that use parameters outside, which its class does not know."""
+    within = [*assembly.walk()]
+    for part in within:
+        for key, value in (*inside(part).values.items(), *inside(part).starts.items()):
+            scopes = scopes_of(part, value, given=True)
+            names = () if value.formula is None else value.formula.names()
+            outer = next((name for name in names if not any(scope_for(scopes, name) is one for one in within)), None)
+            if outer is not None:
+                raise ModelicaTextError(
+                    f"{part.path}.{key} = {value.formula} uses {outer}, which is outside of {assembly.path}.",
+                    where=part.place_of(key), why=f"{assembly.path} becomes a class, which knows its own names only.",
+                    advice="Give it a number.",
+                )  # fmt: skip
 
 
 def formula_text(formula: Formula, owner: Component, outer: int = 0) -> str:
