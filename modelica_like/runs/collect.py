@@ -10,7 +10,7 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import MissingValue
 from modelica_like.runs.polynomials import SAME, Curves
-from modelica_like.runs.readings import Output, Part, read_number
+from modelica_like.runs.readings import Output, Part, joined, leaves, read_number
 from modelica_like.runs.recorded import RecordedSolution
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Trajectories
@@ -49,8 +49,8 @@ class Collector:
     """
 
     def __init__(self, model: CompiledDae, outputs: Sequence[Output], atol: float) -> None:
-        self._model, self.outputs = model, list(outputs)
-        self._parts = [output.parts(model) for output in outputs]
+        self._model, self.outputs, self._leaves = model, list(outputs), leaves(outputs)
+        self._parts = [leaf.parts(model) for leaf in self._leaves]
         self._every = [part for parts in self._parts for part in parts]
         self._along = [k for k, part in enumerate(self._every) if part.kind not in ("change", "impact")]
         self._between = [k for k in self._along if self._every[k].kind in ("integral", "max", "first")]
@@ -110,15 +110,13 @@ class Collector:
                 self._values[k] = self._change(record, part)
         span, first = float(segments[-1].times[-1] - segments[0].times[0]), 0
         numbers: list[Number] = []
-        for output, parts in zip(self.outputs, self._parts, strict=True):
+        for leaf, parts in zip(self._leaves, self._parts, strict=True):
             values, times = (x[first : first + len(parts)] for x in (self._values, self._times))
-            best = int(np.argmax(values)) if output.kind == "peak" else 0
-            number = Number(output.combined(values, span))
-            number.name, number.unit, number.time = output.name, str(output.unit), float(times[best])
-            number.sign = -1 if best else 1
-            numbers.append(number)
+            best = int(np.argmax(values)) if leaf.kind == "peak" else 0
+            numbers.append(_number(leaf, float(leaf.combined(values, span)), float(times[best]), -1 if best else 1))
             first += len(parts)
-        return numbers
+        pairs = zip(self.outputs, joined(self.outputs, numbers), strict=True)
+        return [_number(output, value[0]) if output.operands else value for output, value in pairs]
 
     def _read_ends(self, segments: Sequence[Segment]) -> None:
         places = [(segment, k) for segment in segments for k in (0, -1)]
@@ -147,6 +145,12 @@ class Collector:
             and (after < 0 or event.after == names[after])
         ]
         return times[number - 1] if len(times) >= number else np.nan
+
+
+def _number(output: Output, value: float, time: float = np.nan, sign: int = 1) -> Number:
+    number = Number(value)
+    number.name, number.unit, number.time, number.sign = output.name, str(output.unit), time, sign
+    return number
 
 
 def collector(model: CompiledDae, names: Sequence[str], atol: float) -> Collector:

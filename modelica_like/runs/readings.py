@@ -22,8 +22,11 @@ _CONDITION = re.compile(r"(.+?)(<=?|>=?)(.+)")
 _CHANGE = re.compile(
     r"\s*(?P<mode>[^:\s]+)\s*(?::\s*(?P<before>\w+)\s*)?(?:→|->)\s*(?P<after>\w+)\s*(?:,\s*(?P<number>\d+))?\s*$"
 )
-_ENERGY = {"loss_energy": 1, "source_energy": 2}
-_POWERS = {"stored_energy": 0, "loss_power": 1, "source_power": 2}
+_ENERGY = ("loss_energy", "source_energy")
+"""Integrals of powers over the whole run."""
+_TERMS = {"stored_energy": 0, "loss_power": 1, "source_power": 2}
+"""Columns of the energies, which have values over time."""
+_HELD = ("lock_time", "unlock_time")
 _SECOND, _JOULE, _WATT = parse_unit("s"), parse_unit("J"), parse_unit("W")
 
 
@@ -68,11 +71,13 @@ class Output:
         name: as given.
         unit: its unit.
         kind: `end`, `at`, `max`, `min`, `peak` (largest amount), `integral`, `mean`, `rms`, `first` (when a condition
-            is true for the first time), `duration` (how long a mode lasts in all), `time` (of a mode change) or
-            `series`.
+            is true for the first time), `duration` (how long a mode lasts in all), `time` (of a mode change),
+            `series`, or `formula` of other outputs.
         path: the variable, the formula, or the mode.
         moment: time of `at` in s.
         change: which mode change: names before (may be empty) and after, and its number among those.
+        struck: whether the integral of a loss contains the energy lost in impacts.
+        operands: of a formula, by their names in it; else empty.
     """
 
     name: str
@@ -81,6 +86,8 @@ class Output:
     path: str
     moment: float = 0.0
     change: tuple[str, str, int] = ("", "", 1)
+    struck: bool = False
+    operands: tuple[Output, ...] = ()
 
     def is_change(self, event: Event) -> bool:
         """Return whether an event is such a mode change."""
@@ -88,8 +95,7 @@ class Output:
         return event.mode == self.path and before in ("", event.before) and after in ("", event.after)
 
     def parts(self, model: CompiledDae) -> list[Part]:
-        """Return what it consists of."""
-        owner, _, last = self.path.rpartition(".")
+        """Return what it consists of, unless it is a formula."""
         if self.kind in _SIGNED:
             return [Part("max", self.path, form) for form in _SIGNED[self.kind]]  # type: ignore[arg-type]
         if self.kind in ("time", "duration"):
@@ -100,8 +106,7 @@ class Output:
             return [Part("change", self.path, change=(before, after, self.change[2]))]
         if self.kind in ("integral", "mean", "rms"):
             parts = [Part("integral", self.path, "square" if self.kind == "rms" else "plain")]
-            struck = self.kind == "integral" and last == "loss_energy"
-            return [*parts, Part("impact", owner)] if struck else parts
+            return [*parts, Part("impact", self.path.rpartition(".")[0])] if self.struck else parts
         return [Part(self.kind, self.path, moment=self.moment)]  # type: ignore[arg-type]
 
     def combined(self, parts: Vector, span: Any) -> Vector:
@@ -116,6 +121,32 @@ class Output:
                 return mean if self.kind == "mean" else np.sqrt(mean)
             case _:
                 return np.sum(parts, axis=-1)
+
+    def formula(self) -> ca.Function:
+        """Return a formula as a function of the column of its operands: its value, and the row of its derivatives."""
+        names = [operand.name for operand in self.operands]
+        column, formula = ca.SX.sym("operands", len(names)), formula_of(self.path)
+        assert formula is not None
+        quantity: Callable[[str], Any] = lambda text: ca.SX(si_value(text))  # noqa: E731
+        value = formula.evaluate(lambda name: column[names.index(name)], quantity)
+        return ca.Function("formula", [column], [value, ca.densify(ca.jacobian(value, column))])
+
+
+def leaves(outputs: Sequence[Output]) -> list[Output]:
+    """Return outputs with the operands of formulas in their place."""
+    return [leaf for output in outputs for leaf in output.operands or (output,)]
+
+
+def by_output(outputs: Sequence[Output], values: Sequence[Any]) -> list[list[Any]]:
+    """Return what there is of leaves in a list per output."""
+    left = iter(values)
+    return [[next(left) for _ in output.operands or (output,)] for output in outputs]
+
+
+def joined(outputs: Sequence[Output], numbers: Sequence[Any]) -> list[Any]:
+    """Return the numbers of outputs from those of their leaves: floats, or of shape (runs,); those of formulas are."""
+    pairs = zip(outputs, by_output(outputs, numbers), strict=True)
+    return [np.ravel(one.formula()(np.array(of))[0].full()) if one.operands else of[0] for one, of in pairs]
 
 
 def listed(names: str | Sequence[str], what: str) -> list[str]:
@@ -202,17 +233,49 @@ def _condition(model: CompiledDae, name: str, inside: str) -> str:
 
 
 def _plain(model: CompiledDae, name: str) -> Output:
-    owner, _, last = name.rpartition(".")
-    if name in model.position:
+    """Return a number of the whole run, a value at its end, or a formula of these."""
+    whole = _of_whole_run(model, name)
+    if whole is not None:
+        return whole
+    formula = None if _is_variable(model, name) else formula_of(name)
+    names = [] if formula is None else list(dict.fromkeys(formula.names()))
+    if formula is None or not any(_of_whole_run(model, path) for path in names):
         return Output(name, expression_of(model, name)[1], "end", name)
+    operands = tuple(_plain(model, path) for path in names)
+    unit = unit_of(formula, {operand.name: str(operand.unit) for operand in operands}, model.name)
+    return Output(name, parse_unit(unit), "formula", name, operands=operands)
+
+
+def _is_variable(model: CompiledDae, name: str) -> bool:
+    """Whether this has a value at every instant by its own name."""
+    return name == "time" or any(
+        name in positions for positions in (model.position, model.parameter_position, model.discrete_position)
+    )
+
+
+def _of_whole_run(model: CompiledDae, name: str) -> Output | None:
+    """Return an energy or the time of a change of a component; None if this is something else."""
+    owner, _, last = name.rpartition(".")
+    if _is_variable(model, name):
+        return None
     if last in _ENERGY and owner in model.components:
-        return Output(name, _JOULE, "integral", name)
-    if last in ("lock_time", "unlock_time"):
-        holding = _holding_mode(model, owner)
-        if holding is not None:
-            mode, held = holding
-            return Output(name, _SECOND, "time", mode, change=("", held, 1) if last == "lock_time" else (held, "", 1))
-    return Output(name, expression_of(model, name)[1], "end", name)
+        return Output(name, _JOULE, "integral", f"{name.removesuffix('energy')}power", struck=last == "loss_energy")
+    holding = _holding_mode(model, owner) if last in _HELD else None
+    if holding is None:
+        return None
+    mode, held = holding
+    return Output(name, _SECOND, "time", mode, change=("", held, 1) if last == "lock_time" else (held, "", 1))
+
+
+def _without_values(name: str) -> ValueOutOfRange:
+    """Return the error about values over time of what is a number of the whole run."""
+    advice = f"Ask for {name} itself, or for a formula of such numbers, e.g. 2*{name}."
+    if name.endswith(_ENERGY):
+        power = f"{name.removesuffix('energy')}power"
+        advice = (
+            f"Over time there is {power}: ask for integral({power}) or max({power}), or for {name} of a shorter run."
+        )
+    return ValueOutOfRange(f"{name} is one number of a whole run: it has no values over time.", advice=advice)
 
 
 def _holding_mode(model: CompiledDae, owner: str) -> tuple[str, str] | None:
@@ -255,6 +318,7 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
 
     Raises:
         UnknownName: there is no such variable.
+        ValueOutOfRange: it is a number of a whole run.
         NetlistError, UnitError: it is no formula, or its units do not fit together.
     """
     arguments = model.arguments.values()
@@ -274,15 +338,18 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
         quantity: Callable[[str], Any] = lambda text: ca.SX(si_value(text))  # noqa: E731
         return lambda: formula.evaluate(lambda name: parts[name][0](), quantity), parse_unit(unit)
     owner, _, last = path.rpartition(".")
-    columns = _POWERS | _ENERGY
-    if last in columns and owner in model.components:
+    if last in _TERMS and owner in model.components:
         # The model itself means all its components together.
         rows = [model.components.index(owner)] if owner else list(range(len(model.components)))
-        unit = _JOULE if last in (*_ENERGY, "stored_energy") else _WATT
-        return lambda: ca.sum1(model.energy(*arguments)[rows, columns[last]]), unit
-    words = [*model.position, *(f"{component}.{last}" for component in model.components if last in columns)]
+        unit = _JOULE if last == "stored_energy" else _WATT
+        return lambda: ca.sum1(model.energy(*arguments)[rows, _TERMS[last]]), unit
+    if _of_whole_run(model, path) is not None:
+        raise _without_values(path)
+    energies = (*_TERMS, *_ENERGY)
+    words = [*model.position, *(f"{component}.{last}" for component in model.components if last in energies)]
     if owner in model.components:
-        words += [f"{owner}.{word}" for word in (*columns, "lock_time", "unlock_time")]
+        held = _HELD if _holding_mode(model, owner) is not None else ()
+        words += [f"{owner}.{word}" for word in (*energies, *held)]
     raise UnknownName(
         f"{model.name} has no variable '{path}'{did_you_mean(path, words) or '.'}",
         advice="Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(…), at(…, time), first(… > …), "
@@ -293,6 +360,6 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
 
 def quadratures(model: CompiledDae, outputs: Sequence[Output]) -> tuple[Any, str]:
     """Return all integrands of outputs as one SX column, and a name for them."""
-    parts = [part for output in outputs for part in output.parts(model) if part.kind == "integral"]
+    parts = [part for leaf in leaves(outputs) for part in leaf.parts(model) if part.kind == "integral"]
     column = ca.vertcat(*(part.expression(model) for part in parts)) if parts else ca.SX(0, 1)
     return column, ";".join(f"{part.text} {part.form} {part.change}" for part in parts)

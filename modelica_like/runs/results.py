@@ -16,7 +16,7 @@ from modelica_like.errors import MissingValue, UnitError
 from modelica_like.language.units import ONE, Unit, parse_unit
 from modelica_like.runs.collect import Collector, Number, collector, dense_of
 from modelica_like.runs.polynomials import Curves, Fitted
-from modelica_like.runs.readings import expression_of, read_output
+from modelica_like.runs.readings import Output, by_output, expression_of, leaves, read_output
 from modelica_like.runs.recorded import RecordedModel, RecordedSolution
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import ENERGY_TERMS, Trajectories
@@ -147,15 +147,26 @@ def read_results(run: RecordedSolution, names: Sequence[str]) -> tuple[list[Numb
     """
     model: Any = _Columns(run.model)
     outputs, dense = [read_output(model, name) for name in names], OfResults(run)
-    sized = [replace(output, kind="peak") if output.kind not in _TIMES else replace(output, kind="end", path="time")
-             for output in outputs]  # fmt: skip
-    readings = Collector(model, [*outputs, *sized], _NOISE)
+    parts = leaves(outputs)
+    sized = [replace(part, kind="peak") if part.kind not in _TIMES else replace(part, kind="end", path="time")
+             for part in parts]  # fmt: skip
+    readings = Collector(model, [*outputs, *parts, *sized], _NOISE)
     readings.feed(dense)
     record: Any = SimpleNamespace(segments=dense.stretches, events=run.events, impacts=())
     numbers, span = readings.finish(record), float(run.time[-1] - run.time[0])
-    sizes = [span if output.kind in _TIMES else abs(size) * (span if output.kind == "integral" else 1.0)
-             for output, size in zip(outputs, numbers[len(outputs):], strict=True)]  # fmt: skip
-    return numbers[: len(outputs)], np.array(sizes)
+    values, largest = (numbers[len(outputs) + k * len(parts) :][: len(parts)] for k in (0, 1))
+    sizes = [span if part.kind in _TIMES else abs(size) * (span if part.kind == "integral" else 1.0)
+             for part, size in zip(parts, largest, strict=True)]  # fmt: skip
+    return numbers[: len(outputs)], _sizes(outputs, values, sizes)
+
+
+def _sizes(outputs: Sequence[Output], values: Sequence[float], sizes: Sequence[float]) -> Vector:
+    """Sizes of outputs from the values and sizes of their leaves: that of a formula is the sum of what these do."""
+    result: list[float] = []
+    for output, some, of in zip(outputs, by_output(outputs, values), by_output(outputs, sizes), strict=True):
+        slopes = np.abs(output.formula()(np.array(some))[1].full()[0]) if output.operands else np.ones(1)
+        result.append(float(slopes @ np.array(of)))
+    return np.nan_to_num(np.array(result))
 
 
 def read_after(run: Trajectories, names: Sequence[str]) -> list[Number]:

@@ -63,6 +63,15 @@ Compare two values: first(motor.w > 100 rad/s), first(a.tau < b.tau)."""),
     "no function": (NetlistError, lambda: read_output(build(DRIVE), "max(median(clutch.tau))"), """\
 'median(clutch.tau)' is neither a quantity nor a formula; there is no function 'median'; did you mean 'min'.
 A quantity is a number with a unit ("8.5 kg.cm2"), a formula is arithmetic of parameters ("2*J")."""),
+    "an energy over time": (ValueOutOfRange, lambda: read_output(build(DRIVE), "at(2*clutch.loss_energy, 0.1 s)"), """\
+clutch.loss_energy is one number of a whole run: it has no values over time.
+Over time there is clutch.loss_power: ask for integral(clutch.loss_power) or max(clutch.loss_power), or for clutch.loss_energy of a shorter run."""),
+    "a time of a change over time": (ValueOutOfRange, lambda: read_output(build(DRIVE), "first(time > 2*clutch.lock_time)"), """\
+clutch.lock_time is one number of a whole run: it has no values over time.
+Ask for clutch.lock_time itself, or for a formula of such numbers, e.g. 2*clutch.lock_time."""),
+    "a time of a change that a part does not have": (UnknownName, lambda: read_output(build(DRIVE), "2*table.lock_time"), """\
+machine_table_direct has no variable 'table.lock_time'; did you mean 'table.loss_power'?
+Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(…), at(…, time), first(… > …), duration(mode: name), series(…), time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time."""),
     "a mode": (UnknownName, lambda: read_output(build(DRIVE), "duration(clutch.mode: sliding)"), """\
 clutch.mode has no mode 'sliding'. It has free, stuck, start_forward, start_backward, forward, backward."""),
     "a load": (UnknownName, lambda: load_of(run(), "clutch.tau", "peek"), """\

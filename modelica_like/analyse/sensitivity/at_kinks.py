@@ -20,7 +20,7 @@ from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ModelicaLikeError, NoGradient
 from modelica_like.options import Options
-from modelica_like.runs.readings import Output, expression_of
+from modelica_like.runs.readings import Output, expression_of, leaves
 from modelica_like.runs.solution import Solution
 from modelica_like.simulation import quick_run
 from modelica_like.solve.initialize import Point
@@ -134,7 +134,7 @@ def _in_other_modes(chain: Replay, position: int) -> Iterator[Point]:
 
 
 def _texts(outputs: Sequence[Output]) -> list[str]:
-    return [output.path for output in outputs if output.kind not in ("time", "duration")]
+    return [output.path for output in leaves(outputs) if output.kind not in ("time", "duration")]
 
 
 def _equations(model: CompiledDae, texts: Sequence[str]) -> Any:

@@ -14,6 +14,7 @@ from modelica_like.analyse.replay.steps import Tolerances
 from modelica_like.analyse.sensitivity.at_instants import at_instants
 from modelica_like.analyse.sensitivity.at_kinks import Candidate, Sides, kinks, natural_size
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
+from modelica_like.analyse.sensitivity.of_formulas import formula_kinks, formulas
 from modelica_like.analyse.sensitivity.replayed import read_off, value_at
 from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.analyse.sensitivity.result import Sensitivities as Sensitivities
@@ -21,7 +22,7 @@ from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, NoGradient, UnknownName, did_you_mean
 from modelica_like.options import Options
-from modelica_like.runs.readings import Output, is_series, listed, quadratures, read_output
+from modelica_like.runs.readings import Output, is_series, leaves, listed, quadratures, read_output
 from modelica_like.runs.solution import Solution
 from modelica_like.simulation import Model, quick_run
 from modelica_like.solve.initialize import StartKind
@@ -116,14 +117,16 @@ def _differentiate(
     plain = [output for output in outputs if output.kind != "series"]
     series = [output for output in outputs if output.kind == "series"]
     nodes = [*chain.nodes] if series else []
-    readings = read_off(solution, chain, plain)
+    parts = leaves(plain)
+    of_parts = read_off(solution, chain, parts)
+    readings = formulas(plain, of_parts)
     # The same name has the same number everywhere, though the replay is more precise.
     values = solution.read(*(output.name for output in plain))
     for output, value in zip(plain, values, strict=True):
         if not np.isfinite(value):
             raise NoGradient(f"{output.name} is {value:g}: what is not finite has no derivative.")
     over_time = [value_at(chain, output.path, node) for output in series for node in nodes]
-    on_edge = [*edges(chain, readings), *at_instants(chain, readings, plain)]
+    on_edge = [*edges(chain, of_parts), *at_instants(chain, of_parts, parts), *formula_kinks(plain, of_parts)]
     at_kink = kinks(chain, outputs)
     total = [*readings, *over_time, *(edge.reading for edge in (*on_edge, *at_kink))]
     positions = [k for k, _ in chosen]

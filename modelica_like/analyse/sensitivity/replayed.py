@@ -25,7 +25,7 @@ _STILL = 1e-11
 
 
 def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> list[Reading]:
-    """Return the readings of outputs other than series, one each.
+    """Return the readings of outputs other than series and formulas, one each.
 
     Raises:
         UnknownName: a mode change does not happen.
@@ -117,16 +117,14 @@ def _function(model: CompiledDae, path: str) -> ca.Function:
 def _check_impacts(solution: Solution, outputs: Sequence[Output]) -> None:
     """Refuse energies with a part from an impact, which an integral does not contain."""
     for output in outputs:
-        owner, _, last = output.path.rpartition(".")
-        lost = output.kind == "integral" and last == "loss_energy"
-        impacts = [impact for impact in solution.impacts if owner in ("", impact.component)] if lost else []
+        owner = output.path.rpartition(".")[0]
+        impacts = [impact for impact in solution.impacts if owner in ("", impact.component)] if output.struck else []
         if impacts:
             raise NoGradient(
                 f"No gradient of {output.name}: {impacts[0].component} loses {impacts[0].energy:.6g} J in an impact at "
                 f"t = {impacts[0].time:.9g} s.",
                 why="Only losses over time are differentiated, not the energy of an impact.",
-                advice=f"Ask for integral({output.path.removesuffix('energy')}power), which leaves impacts out, or for "
-                "speeds after the impact.",
+                advice=f"Ask for integral({output.path}), which leaves impacts out, or for speeds after the impact.",
             )
 
 

@@ -14,7 +14,7 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ModelicaLikeError, ValueOutOfRange
 from modelica_like.language.units import ONE
 from modelica_like.native.batch import Batch, Reading
-from modelica_like.runs.readings import Output, Part
+from modelica_like.runs.readings import Output, Part, joined, leaves
 from modelica_like.simulation import plan
 
 
@@ -42,7 +42,7 @@ class NativeRuns:
                 raise ValueOutOfRange(f"{output.name} is not within the run, {span[0]:g} s to {end:g} s.")
         self._model, self._names, self._outputs, self._begin = model, names, outputs, span[0]
         # The last reading is the time at the end, where a component may end a run earlier.
-        parts = [*(x.parts(model) for x in outputs), [Part("end", "time")]]
+        parts = [*(x.parts(model) for x in leaves(outputs)), [Part("end", "time")]]
         extended = _with_expressions(model, [part for some in parts for part in some])
         readings = [[reading for part in some for reading in _readings(model, extended, part)] for some in parts]
         self._lasts = np.cumsum([len(some) for some in readings])
@@ -69,8 +69,10 @@ class NativeRuns:
         numbers, failed = self._batch.run(p[kept], u[kept], stop)
         values = np.full((len(points), len(self._outputs)), np.nan)
         spans = numbers[:, -1] - self._begin
-        for k, (output, some) in enumerate(zip(self._outputs, np.split(numbers, self._lasts, axis=1), strict=False)):
-            values[kept, k] = output.combined(some, spans)
+        pairs = zip(leaves(self._outputs), np.split(numbers, self._lasts, axis=1), strict=False)
+        of_leaves = [leaf.combined(some, spans) for leaf, some in pairs]
+        for k, number in enumerate(joined(self._outputs, of_leaves)):
+            values[kept, k] = number
         values[kept[failed]] = np.nan
         return values, refused, kept[failed].tolist()
 
