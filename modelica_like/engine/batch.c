@@ -13,6 +13,7 @@ typedef enum {
     READ_MAX,
     READ_INTEGRAL,
     READ_FIRST,  /* when it is above zero for the first time; nan: never */
+    READ_REACH,  /* when it is not below zero for the first time; nan: never */
     READ_CHANGE, /* time of a mode change; nan: it does not happen */
     READ_IMPACT  /* energy that impacts on a motion that is held take */
 } ReadingKind;
@@ -69,16 +70,20 @@ static const double NODE_PLACES[READ_NODES] = {0, 0.17267316464601143, 0.5, 0.82
 #define GOLDEN 0.6180339887498949
 #define GOLDEN_TRIALS 40 /* golden section: the time is as precise as the value allows */
 
+static int is_condition(const Reading *one) { return one->kind == READ_FIRST || one->kind == READ_REACH; }
+
+static int is_met(const Reading *one, double value) { return one->kind == READ_REACH ? value >= 0 : value > 0; }
+
 static int reads_along(const Reading *one) {
-    return one->kind == READ_MAX || one->kind == READ_INTEGRAL || one->kind == READ_FIRST;
+    return one->kind == READ_MAX || one->kind == READ_INTEGRAL || is_condition(one);
 }
 
 static void take_reading(Batch *b, int64_t k, double t, double value) {
-    int kind = b->asked->readings[k].kind;
+    const Reading *one = &b->asked->readings[k];
     double *found = &b->values[k];
     b->sizes[k] = fmax(b->sizes[k], fabs(value));
-    if (kind == READ_MAX && !(value <= *found)) *found = value;
-    if (kind == READ_FIRST && isnan(*found) && value > 0) *found = t;
+    if (one->kind == READ_MAX && !(value <= *found)) *found = value;
+    if (is_condition(one) && isnan(*found) && is_met(one, value)) *found = t;
 }
 
 /* Both sides of an event count. */
@@ -146,11 +151,12 @@ static void climb(Batch *b, int64_t k, double low, double high) {
     }
 }
 
-/* The first time above zero, between one that is not and one that is. */
+/* The first time of a condition, between one at which it is not met and one at which it is. */
 static void meet_zero(Batch *b, int64_t k, double low, double high) {
-    if (!(value_at(b, k, high) > 0)) return;
+    const Reading *one = &b->asked->readings[k];
+    if (!is_met(one, value_at(b, k, high))) return;
     for (double middle = 0.5 * (low + high); low < middle && middle < high; middle = 0.5 * (low + high)) {
-        if (value_at(b, k, middle) > 0) high = middle;
+        if (is_met(one, value_at(b, k, middle))) high = middle;
         else low = middle;
     }
     b->values[k] = high;
@@ -167,10 +173,11 @@ static int is_top(const double *v, int i, double before, double now, double afte
 static void search_stretch(Batch *b, int64_t k, double begin, double h) {
     const double *v = b->nodes + k * READ_NODES, width = h / QUARTIC_LOOKS;
     double before = -INFINITY, now = v[0];
-    int first = b->asked->readings[k].kind == READ_FIRST, last = QUARTIC_LOOKS;
+    const Reading *one = &b->asked->readings[k];
+    int first = is_condition(one), last = QUARTIC_LOOKS;
     for (int i = 0; i <= last; i++) {
         double after = i < last ? quartic(v, (i + 1.) / last) : -INFINITY;
-        if (first && i > 0 && isnan(b->values[k]) && now > 0)
+        if (first && i > 0 && isnan(b->values[k]) && is_met(one, now))
             meet_zero(b, k, begin + width * (i - 1), i < last ? begin + width * i : begin + h);
         if (!first && now >= b->values[k] - BENT * b->sizes[k] && is_top(v, i, before, now, after))
             climb(b, k, begin + width * fmax(i - 1, 0), i < last - 1 ? begin + width * (i + 1) : begin + h);

@@ -16,8 +16,8 @@ from modelica_like.native.model import NativeModel
 from modelica_like.options import Options
 from modelica_like.solve.initialize import StartKind
 
-Kind = Literal["end", "at", "max", "integral", "first", "change", "impact"]
-_KINDS: tuple[Kind, ...] = ("end", "at", "max", "integral", "first", "change", "impact")
+Kind = Literal["end", "at", "max", "integral", "first", "reach", "change", "impact"]
+_KINDS: tuple[Kind, ...] = ("end", "at", "max", "integral", "first", "reach", "change", "impact")
 _RECORD = np.dtype(
     [*((name, np.int32) for name in ("kind", "place", "before", "after", "number", "unused")), ("moment", float)]
 )
@@ -28,8 +28,8 @@ class Reading:
     """A number to read off a run.
 
     Attributes:
-        kind: value at the end or at a moment, largest value, integral, first time above zero, time of a mode change,
-            energy in J lost in impacts.
+        kind: value at the end or at a moment, largest value, integral, first time above zero, first time not below it,
+            time of a mode change, energy in J lost in impacts.
         place: position of the variable, of the mode, or of the held motion.
         change: numbers of the modes before and after (-1: any), and which of several such changes.
         moment: in s.

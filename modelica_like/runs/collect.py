@@ -10,7 +10,7 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import MissingValue
 from modelica_like.runs.polynomials import SAME, Curves
-from modelica_like.runs.readings import Output, Part, joined, leaves, read_number
+from modelica_like.runs.readings import CONDITIONS, Output, Part, joined, leaves, met, read_number
 from modelica_like.runs.recorded import RecordedSolution
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Trajectories
@@ -53,7 +53,7 @@ class Collector:
         self._parts = [leaf.parts(model) for leaf in self._leaves]
         self._every = [part for parts in self._parts for part in parts]
         self._along = [k for k, part in enumerate(self._every) if part.kind not in ("change", "impact")]
-        self._between = [k for k in self._along if self._every[k].kind in ("integral", "max", "first")]
+        self._between = [k for k in self._along if self._every[k].kind in ("integral", "max", *CONDITIONS)]
         self._curves, self._fits = (self._curves_of(numbers, atol) for numbers in (self._along, self._between))
         self._values = np.array([0.0 if part.kind in ("integral", "impact") else np.nan for part in self._every])
         self._times = np.full(len(self._every), np.nan)
@@ -90,7 +90,7 @@ class Collector:
             elif part.kind == "max":
                 self._take(k, *fitted.largest(row))
             elif np.isnan(self._values[k]):
-                self._values[k] = fitted.first(row)
+                self._values[k] = fitted.first(row, reached=part.kind == "reach")
 
     def _take(self, k: int, value: float, time: float) -> None:
         previous = self._values[k]
@@ -131,8 +131,8 @@ class Collector:
             elif part.kind == "max":
                 best = int(np.argmax(values[row]))
                 self._take(k, float(values[row, best]), float(times[best]))
-            elif part.kind == "first" and (values[row] > 0).any():
-                self._values[k] = np.fmin(self._values[k], times[int(np.argmax(values[row] > 0))])
+            elif part.kind in CONDITIONS and (true := met(part.kind, values[row])).any():
+                self._values[k] = np.fmin(self._values[k], times[int(np.argmax(true))])
 
     def _change(self, record: Recorder | Solution, part: Part) -> float:
         before, after, number = part.change

@@ -145,16 +145,17 @@ class Fitted:
         """Return the last time at which an expression is above zero; nan if it never is."""
         return -Fitted(-self.ends[::-1], -self.begins[::-1], self.values[:, ::-1, ::-1]).first(row)
 
-    def first(self, row: int) -> float:
-        """Return the first time at which an expression is above zero; nan if it never is."""
-        above = self._grid(row) > 0
+    def first(self, row: int, *, reached: bool = False) -> float:
+        """Return the first time at which an expression is above zero, or `reached` it; nan if it never is."""
+        least = 0.0 if reached else np.nextafter(0.0, 1.0)
+        above = self._grid(row) >= least
         if not above.any():
             return np.nan
         piece = int(np.argmax(above.any(axis=1)))
         k, series = int(np.argmax(above[piece])), _TO_SERIES @ self.values[row, piece]
         low, high = _GRID[max(k - 1, 0)], _GRID[k]
         while low < (middle := 0.5 * (low + high)) < high:
-            low, high = (low, middle) if legendre.legval(middle, series) > 0 else (middle, high)
+            low, high = (low, middle) if legendre.legval(middle, series) >= least else (middle, high)
         return float(self.times(piece, high))
 
 

@@ -33,6 +33,8 @@ _SECOND, _JOULE, _WATT = parse_unit("s"), parse_unit("J"), parse_unit("W")
 _SIGNED: dict[str, tuple[str, ...]] = {"max": ("plain",), "min": ("negative",), "peak": ("plain", "negative")}
 INTEGRATED = ("integral", "mean", "rms", "duration")
 """Kinds with an integral."""
+CONDITIONS = ("first", "reach")
+"""Kinds that are the first time of a condition."""
 Form = Literal["plain", "negative", "square", "mode"]
 
 
@@ -41,15 +43,15 @@ class Part:
     """What engines read off a run: a reading follows from few kinds of parts.
 
     Attributes:
-        kind: value at the end or at a moment, largest value, integral, first time above zero, time of a mode change,
-            energy in J lost in impacts.
+        kind: value at the end or at a moment, largest value, integral, first time above zero, first time not below it,
+            time of a mode change, energy in J lost in impacts.
         text: variable, energy term or formula; the mode of a change; the component of impacts (empty: all).
         form: of its value: as it is, negative, its square, or 1 where a mode has the number `change[1]`, else 0.
         moment: in s.
         change: numbers of the modes before and after (-1: any), and which of several such changes.
     """
 
-    kind: Literal["end", "at", "max", "integral", "first", "change", "impact"]
+    kind: Literal["end", "at", "max", "integral", "first", "reach", "change", "impact"]
     text: str
     form: Form = "plain"
     moment: float = 0.0
@@ -71,8 +73,8 @@ class Output:
         name: as given.
         unit: its unit.
         kind: `end`, `at`, `max`, `min`, `peak` (largest amount), `integral`, `mean`, `rms`, `first` (when a condition
-            is true for the first time), `duration` (how long a mode lasts in all), `time` (of a mode change),
-            `series`, or `formula` of other outputs.
+            with `>` or `<` is true for the first time), `reach` (one with `>=` or `<=`), `duration` (how long a mode
+            lasts in all), `time` (of a mode change), `series`, or `formula` of other outputs.
         path: the variable, the formula, or the mode.
         moment: time of `at` in s.
         change: which mode change: names before (may be empty) and after, and its number among those.
@@ -144,7 +146,7 @@ def by_output(outputs: Sequence[Output], values: Sequence[Any]) -> list[list[Any
 
 
 def joined(outputs: Sequence[Output], numbers: Sequence[Any]) -> list[Any]:
-    """Return the numbers of outputs from those of their leaves: floats, or of shape (runs,); those of formulas are."""
+    """Return the numbers of outputs from those of their leaves, which are floats or have the shape (runs,)."""
     pairs = zip(outputs, by_output(outputs, numbers), strict=True)
     return [np.ravel(one.formula()(np.array(of))[0].full()) if one.operands else of[0] for one, of in pairs]
 
@@ -202,7 +204,7 @@ def read_output(model: CompiledDae, name: str) -> Output:
         _check_mode(model, mode, state)
         return Output(name, _SECOND, kind, mode, change=("", state, 1))
     if kind == "first":
-        return Output(name, _SECOND, kind, _condition(model, name, inside))
+        return Output(name, _SECOND, *_condition(model, name, inside))
     path, _, moment = inside.rpartition(",") if kind == "at" else (inside, "", "")
     unit = expression_of(model, path.strip())[1]
     if kind == "integral":
@@ -218,8 +220,13 @@ def _is_formula(name: str) -> bool:
         return False
 
 
-def _condition(model: CompiledDae, name: str, inside: str) -> str:
-    """Return a formula that is positive where a condition is true."""
+def met(kind: str, value: Any) -> Any:
+    """Return whether values of the formula of a condition make it true: signals that step stay at a limit."""
+    return value >= 0 if kind == "reach" else value > 0
+
+
+def _condition(model: CompiledDae, name: str, inside: str) -> tuple[str, str]:
+    """Return the kind of a condition, and a formula that is positive, or not negative, where it is true."""
     sides = _CONDITION.fullmatch(inside)
     if sides is None:
         raise UnknownName(
@@ -229,7 +236,7 @@ def _condition(model: CompiledDae, name: str, inside: str) -> str:
     left, sign, right = (part.strip() for part in sides.groups())
     formula = f"{left} - ({right})" if sign[0] == ">" else f"{right} - ({left})"
     expression_of(model, formula)
-    return formula
+    return "reach" if sign.endswith("=") else "first", formula
 
 
 def _plain(model: CompiledDae, name: str) -> Output:

@@ -16,7 +16,7 @@ from modelica_like.errors import MissingValue, UnitError
 from modelica_like.language.units import ONE, Unit, parse_unit
 from modelica_like.runs.collect import Collector, Number, collector, dense_of
 from modelica_like.runs.polynomials import Curves, Fitted
-from modelica_like.runs.readings import Output, by_output, expression_of, leaves, read_output
+from modelica_like.runs.readings import CONDITIONS, Output, by_output, expression_of, leaves, read_output
 from modelica_like.runs.recorded import RecordedModel, RecordedSolution
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import ENERGY_TERMS, Trajectories
@@ -29,7 +29,7 @@ _ROUGH = 0.01
 """Difference of both, over the range of the results, above which what happens in between is unknown: a line is safe."""
 _TESTED = (0.25, 0.5, 0.75)
 _NOISE = 1e-12
-_TIMES = ("time", "first", "duration")
+_TIMES = ("time", *CONDITIONS, "duration")
 SETTLED = 1e-5
 """Of the largest amount (of times: of the run): what may change with twice as many results, twice in a row."""
 _LEAST, _MOST = 200, 100_000

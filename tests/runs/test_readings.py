@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from components import Clutch, Fixed, Inertia, Sine, SpringDamper, Table
+from components import Clutch, Fixed, Inertia, Pulse, PulseCounter, Ramp, Sine, SpringDamper, Step, Table, Torque
 from modelica_like import Assembly, build, load_spectrum, sensitivities, simulate, simulation_function, sweep
 from modelica_like.analyse.sizing import load_of, size
 from modelica_like.compile.compiled import CompiledDae
@@ -305,3 +305,44 @@ def test_second_derivatives_of_parameters_of_any_size(swinging: CompiledDae) -> 
     torque = c * AMPLITUDE * ca.cos(ca.sqrt(c / inertia) * 0.2)
     expected = ca.Function("e", [c, inertia], [ca.hessian(torque, ca.vertcat(c, inertia))[0]])(2e3, 5.0)
     assert np.array(found) == pytest.approx(np.array(expected), rel=1e-5)
+
+
+@pytest.fixture(scope="module")
+def stepping() -> CompiledDae:
+    """A step of 3 at 0.5 s, a pulse of 4 from the start on, its counter, a ramp that stays at 2, and a sine."""
+    parts = {"step": Step(height=3.0, start_time=0.5), "pulse": Pulse(amplitude=4.0, width=0.25, period=0.2),
+             "counter": PulseCounter(u_high=0.5), "ramp": Ramp(height=2.0, duration=0.32, start_time=0.1),
+             "sine": Sine(amplitude=2.0, f=1.0), "torque": Torque(),
+             "mass": Inertia(J=1.0, phi=0.0, w=0.0)}  # fmt: skip
+    connect = {"pulses": ["pulse.y", "counter.u"], "drive": ["sine.y", "torque.tau"]}
+    return build(Assembly("stepping", parts=parts, series={"shaft": ["torque", "mass"]}, connect=connect))
+
+
+FIRST = {
+    "first(step.y >= 3)": 0.5, "first(step.y > 3)": math.nan, "first(3 <= step.y)": 0.5,
+    "first(step.y >= 3.5)": math.nan, "first(pulse.y <= 4)": 0.0, "first(pulse.y < 4)": 0.05,
+    "first(counter.y >= 3)": 0.4, "first(counter.y > 3)": 0.6, "first(mass.w >= 0 rad/s)": 0.0,
+    "first(ramp.y >= 2)": 0.42, "first(ramp.y >= 1)": 0.26, "first(ramp.y > 1)": 0.26, "first(sine.y >= 1)": 1 / 12,
+    "first(sine.y > 1)": 1 / 12, "first(sine.y >= 0)": 0.0, "first(sine.y <= -1)": 7 / 12,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_condition_with_equality_is_true_where_a_signal_stays(stepping: CompiledDae, solver: Any) -> None:
+    before = simulate(stepping, 0.95, points=7, solver=solver, readings=[*FIRST]).readings
+    after = simulate(stepping, 0.95, solver=solver).read(*FIRST)
+    found = sweep(stepping, {"step.height": [3.0]}, [*FIRST], until=0.95, solver=solver)
+    assert not found.attrs.get("differences")
+    for number, (name, value) in zip(after, FIRST.items(), strict=True):
+        for one in (number, before[name], float(found[name][0])):
+            assert one == pytest.approx(value, abs=1e-9, nan_ok=True), name
+
+
+def test_derivatives_of_conditions_with_equality(stepping: CompiledDae) -> None:
+    """Jumps move with their events; A sin(w t) = 1 moves by -sin/(A w cos), whoever has met it before."""
+    names = ["first(step.y >= 3)", "first(counter.y >= 3)", "first(sine.y >= 1)", "first(sine.y > 1)"]
+    made = sensitivities(stepping, names, ["step.start_time", "pulse.period", "sine.amplitude"], until=0.95)
+    expected = np.zeros((4, 3))
+    expected[0, 0], expected[1, 1] = 1.0, 2.0
+    expected[2:, 2] = -math.tan(math.pi / 6) / (2 * 2 * math.pi)
+    np.testing.assert_allclose(made.derivatives, expected, atol=1e-9)

@@ -14,7 +14,7 @@ from modelica_like.analyse.replay.step import Step, shortened
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange
-from modelica_like.runs.readings import INTEGRATED, Output, expression_of
+from modelica_like.runs.readings import CONDITIONS, INTEGRATED, Output, expression_of, met
 from modelica_like.runs.solution import Solution
 from modelica_like.solve.initialize import Point
 from modelica_like.solve.initialize.slopes import Slopes, slopes
@@ -40,7 +40,7 @@ def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> l
             integrals += 1
         elif output.kind == "time":
             readings.append(_event_time(solution, replay, output))
-        elif output.kind == "first":
+        elif output.kind in CONDITIONS:
             readings.append(_first(replay, output))
         elif output.kind in ("max", "min", "peak"):
             signs = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}[output.kind]
@@ -72,21 +72,22 @@ def _integrated(replay: Replay, output: Output, number: int, span: float) -> Rea
 
 
 def _first(replay: Replay, output: Output) -> Reading:
-    """Read when a value is above zero for the first time: in a step, or at a jump."""
+    """Read when a condition is true for the first time: in a step, or at a jump."""
     value: Callable[[Point], float] = lambda point: float(along(replay, output.path, [point])[0])  # noqa: E731
-    if value(replay.nodes[0]) > 0.0:
+    if met(output.kind, value(replay.nodes[0])):
         return Reading(replay.nodes[0].t)
     for k, move in enumerate(replay.moves):
         if isinstance(move, Jump):
-            if value(replay.nodes[k + 1]) > 0.0:
+            if met(output.kind, value(replay.nodes[k + 1])):
                 return _at_jump(move)
             continue
         points = [move.before, *move.inside(), move.after]
         values = [(point.t - move.before.t, value(point)) for point in points]
         for low, high in pairwise(values):
-            if high[1] > 0.0 >= low[1]:
+            if met(output.kind, high[1]) and not met(output.kind, low[1]):
                 step = shortened(move, value, low, high, _STILL)
-                node = replay.split(k, step) if step is not None else move.after
+                # Without a length it is where the step begins, as where another condition has split it.
+                node = replay.at(move.before.t + low[0]) if step is None else replay.split(k, step)
                 part = _slopes(replay, output.path, node)
                 return Reading(node.t, ((node, -part.by[0] / float(part.rate[0])),))
     raise UnknownName(f"'{output.name}' does not happen in this run.")
