@@ -14,7 +14,16 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import NetlistError, UnitError, did_you_mean
-from modelica_like.language.units import ONE, Unit, coherent, parse_unit, plain_digits, read_quantity, same_dimension
+from modelica_like.language.units import (
+    ANY,
+    ONE,
+    Unit,
+    coherent,
+    parse_unit,
+    plain_digits,
+    read_quantity,
+    same_dimension,
+)
 
 _MAX_LENGTH = 2000
 _MAX_DEPTH = 150
@@ -127,6 +136,8 @@ class Formula(Arithmetic):
             raise UnitError(f"'{self}' mixes {units[0]} and {units[1]}.")
         if kind in ("*", "/"):
             return units[0] * units[1] if kind == "*" else units[0] / units[1]
+        if kind == "**" and units[0] == ANY:
+            return ANY
         if kind == "**" and not same_dimension(units[0], ONE):
             return units[0] ** operands[1]._exponent(self)
         if kind == "sqrt":

@@ -12,7 +12,7 @@ import numpy as np
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import NetlistError, UnitError, UnknownName, did_you_mean
 from modelica_like.language.formula import Formula, parse_formula
-from modelica_like.language.units import ONE, Unit, parse_unit, read_quantity, same_dimension
+from modelica_like.language.units import ANY, ONE, Unit, parse_unit, read_quantity, same_dimension
 from modelica_like.runs.display import QUANTITIES, Display
 from modelica_like.runs.trajectories import ENERGY_TERMS, Trajectories, fitting
 
@@ -136,7 +136,7 @@ def formula_of(word: str) -> Formula | None:
 
 
 def unit_of(formula: Formula, units: dict[str, str], model: str) -> str:
-    """Return the unit of a formula, by the units of its names.
+    """Return the unit of a formula, by the units of its names; `*` if it is not known.
 
     Raises:
         UnknownName: it names something else.
@@ -149,7 +149,8 @@ def unit_of(formula: Formula, units: dict[str, str], model: str) -> str:
         return parse_unit(units[name])
 
     formula_unit = formula.unit(unit)
-    if str(formula_unit) in QUANTITIES:
+    # What is not known fits every quantity.
+    if str(formula_unit) in QUANTITIES or formula_unit == ANY:
         return str(formula_unit)
     return next(
         (q for q in QUANTITIES if q not in _KEPT and same_dimension(parse_unit(q), formula_unit)),

@@ -20,6 +20,7 @@ from modelica_like.analyse.sizing import load_of, size
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient
 from modelica_like.runs.display import Display
+from modelica_like.runs.signals import read_signals
 from modelica_like.show.report.run import values_table
 
 ROOT = Path(__file__).parents[2]
@@ -346,3 +347,11 @@ def test_derivatives_of_conditions_with_equality(stepping: CompiledDae) -> None:
     expected[0, 0], expected[1, 1] = 1.0, 2.0
     expected[2:, 2] = -math.tan(math.pi / 6) / (2 * 2 * math.pi)
     np.testing.assert_allclose(made.derivatives, expected, atol=1e-9)
+
+
+def test_a_formula_of_a_signal_without_a_unit_has_none(stepping: CompiledDae) -> None:
+    names = ["step.y", "2*step.y", "step.y**2", "step.y*mass.w", "max(2*step.y)", "2*mass.w", "mass.w*torque.tau"]
+    run = simulate(stepping, 0.95)
+    assert [number.unit for number in run.read(*names)] == ["*", "*", "*", "*", "*", "rad/s", "W"]
+    assert [signal.unit for signal in read_signals(stepping, names[:4])] == ["*"] * 4
+    assert float(sweep(stepping, {"step.height": [3.0]}, ["2*step.y"], until=0.95)["2*step.y"][0]) == 6.0
