@@ -265,6 +265,33 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("Real x;", "homotopy(actual = x) = 1;"),
         "homotopy(…) has 2 arguments, actual and simplified, not 1.\n  in a.mo:5 `homotopy(actual = x) = 1;`",
     ),
+    "a modification of nothing": (
+        model("B b(kk = 3);", before="model B parameter Real k = 1; end B;"),
+        "B has no 'kk'; did you mean 'k'?\n  in a.mo:3 `B b(kk = 3);`",
+    ),
+    "a modification of nothing in a base": (
+        model("extends B(kk = 3); parameter Real kk = 1;", before="model B parameter Real k = 1; end B;"),
+        "B has no 'kk'; did you mean 'k'?\n  in a.mo:3 `extends B(kk = 3); parameter Real kk = 1;`",
+    ),
+    "two values": (
+        model("B b(k = 1, k = 2);", before="model B parameter Real k; end B;"),
+        "One modification gives k two values.\n  in a.mo:3 `B b(k = 1, k = 2);`\nRemove one of them.",
+    ),
+    "a final parameter": (
+        model("B b(k = 3);", before="model B final parameter Real k = 1; end B;"),
+        "k is final: it cannot be changed from outside.\n"
+        "  in a.mo:3 `B b(k = 3);`\n  in a.mo:1 `model B final parameter Real k = 1; end B;`",
+    ),
+    "a final modification": (
+        model("C c(b.k = 3);", before="model C B b(final k = 1); end C; model B parameter Real k; end B;"),
+        "b.k is final: it cannot be changed from outside.\n  in a.mo:3 `C c(b.k = 3);`\n"
+        "  in a.mo:1 `model C B b(final k = 1); end C; model B parameter Real k; end B;`",
+    ),
+    "more values than elements": (
+        model(f"{R}.Inertia a[2](J = {{1, 2, 3}});"),
+        f"An array of 2 elements is given 3 values.\n  in a.mo:3 `{R}.Inertia a[2](J = {{1, 2, 3}});`\n"
+        "Write 'each' where all elements take the same.",
+    ),
     "no value": (
         model("Real x;", "x = log(-1);"),
         "A formula of -1 has no value.\n  in a.mo:5 `x = log(-1);`",
@@ -272,7 +299,10 @@ MESSAGES: dict[str, tuple[str, str]] = {
 }
 
 
-NAMES = ("unknown parameter", "unknown name", "unknown variable of a part", "unknown end")
+NAMES = (
+    "unknown parameter", "unknown name", "unknown variable of a part", "unknown end", "a modification of nothing",
+    "a modification of nothing in a base",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("case", MESSAGES)

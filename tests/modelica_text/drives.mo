@@ -68,7 +68,7 @@ package Drives "Texts that use every construct that is read"
     Rotational.Sources.Torque torque(useSupport = true) annotation(Placement(visible = true));
     Rotational.Components.Inertia motor(J = J, phi(fixed = true, start = 0), w(displayUnit = "rpm", fixed = true, start = 1));
     SpringDamper shaft[stages](each c = 1e3, d = {0.5, 0.25});
-    Inertia load[stages](each final J = 1, phi(each fixed = true), each w(fixed = true, start = 1));
+    Inertia load[stages](each J = 1, phi(each final fixed = true), each w(fixed = true, start = 1));
     Rotational.Components.Damper damper(d = 3) if damped;
     Rotational.Components.Brake brake(fn_max = 20, mu_pos = [0, 0.5; 1, 0.25]) if not damped;
     Fixed fixed;

@@ -439,3 +439,68 @@ def test_functions_of_arrays_see_all_elements(formula: str, value: float, tmp_pa
     file = tmp_path / "a.mo"
     file.write_text(f"model A\n  Real x(start = 0, fixed = true);\nequation\n  der(x) = {formula};\nend A;\n", "utf-8")
     assert simulate(load(file), 1.0).final["x"] == pytest.approx(value, rel=1e-9)
+
+
+OWN = """
+model C parameter Real k = 1; output Real y = k; end C;
+model B parameter Real k = 3; output Real y = 2*k; end B;
+model E extends C; end E;
+model R parameter Real v[3] = {1, 1, 1}; output Real y = sum(v); end R;
+"""
+
+
+def final_x(text_file: Any, declarations: str, slope: str, classes: str = "") -> float:
+    """Return x(1) of a model with der(x) = slope."""
+    body = f"{declarations}\n  Real x(start = 0, fixed = true);\nequation\n  der(x) = {slope};"
+    file = text_file(f"{OWN}{classes}\nmodel A\n{body}\nend A;\n")
+    return simulate(load(file), 1.0, rtol=1e-9).final["x"]
+
+
+@pytest.mark.parametrize(
+    ("held", "outside", "value"),
+    [
+        ("replaceable C c constrainedby C(k = 9);", "", 9), ("replaceable C c(k = 5) constrainedby C(k = 9);", "", 5),
+        ("replaceable C c constrainedby C(k = 9);", "redeclare B c", 18),
+        ("replaceable C c constrainedby C(k = 9);", "redeclare B c(k = 4)", 8),
+        ("replaceable C c(k = 5) constrainedby C(k = 9);", "redeclare B c", 18),
+        ("replaceable C c(k = 5);", "redeclare B c", 10), ("replaceable C c(k = 5);", "redeclare final B c(k = 4)", 8),
+        ("replaceable model X = C constrainedby C(k = 9); X c;", "", 9),
+        ("replaceable model X = C constrainedby C(k = 9); X c;", "redeclare model X = B", 18),
+        ("replaceable model X = C constrainedby C(k = 9); X c;", "redeclare model X = B(k = 7)", 14),
+        ("replaceable model X = C constrainedby C(k = 9); X c(k = 2);", "redeclare model X = B", 4),
+    ],
+)  # fmt: skip
+def test_what_takes_a_place_has_the_modifications_of_its_constraint(
+    text_file: Any, held: str, outside: str, value: float
+) -> None:
+    classes = f"model H\n{held}\nend H;"
+    assert final_x(text_file, f"H h({outside});", "h.c.y", classes) == pytest.approx(value, rel=1e-8)
+
+
+def test_a_redeclaration_outside_wins_over_one_of_a_base(text_file: Any) -> None:
+    classes = "model H replaceable model X = C; X c; end H; model G extends H(redeclare model X = C(k = 4)); end G;"
+    assert final_x(text_file, "G g(redeclare model X = B(k = 7));", "g.c.y", classes) == pytest.approx(14, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("declared", "value"),
+    [("each v = {1, 2, 3}", 12), ("v = {{1, 2, 3}, {4, 5, 6}}", 21)],
+)
+def test_arrays_in_arrays_of_parts_are_taken_apart_by_the_outer_one(
+    text_file: Any, declared: str, value: float
+) -> None:
+    assert final_x(text_file, f"R r[2]({declared});", "r[1].y + r[2].y") == pytest.approx(value, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    "declarations",
+    [
+        "C c(kk = 3);", "E e(kk = 3);", "C c(k = 1, k = 2);", "R r[2](v = {{1, 2, 3}});",
+        "C c[2](k = {1, 2, 3});", "Real z[2](start = {1, 2, 3}) = {1, 1};", "H h(final c.k = 3); F f(h.c.k = 4);",
+    ],
+)  # fmt: skip
+def test_modifications_that_mean_nothing_are_refused(text_file: Any, declarations: str) -> None:
+    classes = "model H C c; end H; model F H h(final c.k = 3); end F;"
+    with pytest.raises(ModelicaLikeError) as caught:
+        final_x(text_file, declarations, "1", classes)
+    assert "a.mo:8" in str(caught.value)

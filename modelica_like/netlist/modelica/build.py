@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from modelica_like.errors import ModelicaLikeError, ModelicaTextError, Source, UnitError, raise_together_or_one
@@ -129,7 +129,7 @@ class _Builder:
             setattr(self.component, name, self._part(name, member, part, member.given))
             return
         parts = [
-            self._part(f"{name}[{k}]", member, part_of(self.instance, member, k), element(member.given, k))
+            self._part(f"{name}[{k}]", member, part_of(self.instance, member, k), element(member.given, k, shape[0]))
             for k in range(1, shape[0] + 1)
         ]
         if parts and isinstance(parts[0], Connector):
@@ -162,9 +162,10 @@ class _Builder:
             if basic.kind == "Real" and not declared.dimensions:
                 self._parameter(name, member, basic)
             return
-        for path, index in _elements(name, sizes(self.instance, member)):
-            given = element(basic.given, index) if index else basic.given
-            self._variable(path, name, member, Basic(basic.kind, given, basic.prefixes))
+        shape = sizes(self.instance, member)
+        for path, index in _elements(name, shape):
+            given = element(basic.given, index, shape[0]) if index else basic.given
+            self._variable(path, name, member, replace(basic, given=given))
 
     def _parameter(self, name: str, member: Member, basic: Basic) -> None:
         given = member.given

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from modelica_like.errors import ModelicaTextError
+from modelica_like.errors import ModelicaTextError, UnknownName, did_you_mean
 from modelica_like.netlist.modelica.classes import Classes, Found
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.tree import (
@@ -29,6 +29,8 @@ class Given:
         scope: instance and class text in which the value's names are looked up.
         inner: modifications of members.
         redeclared: the new declaration or class.
+        final: nothing further outside may change it.
+        text: class in whose text it stands.
     """
 
     value: Expr | None = None
@@ -37,32 +39,60 @@ class Given:
     redeclared: Declaration | ClassText | None = None
     line: int = 0
     each: bool = False
+    final: bool = False
+    text: ClassText | None = None
 
-    def over(self, weaker: Given) -> Given:
-        """Return both; this one wins."""
+    def over(self, weaker: Given, name: str = "") -> Given:
+        """Return both; this one wins.
+
+        Args:
+            weaker: the modification that stands further inside.
+            name: of what both modify, for messages.
+
+        Raises:
+            ModelicaTextError: the weaker one is final.
+        """
+        if weaker.final and (self.value is not None or self.inner or self.redeclared):
+            places = [one.text.place(one.line) for one in (self, weaker) if one.text is not None]
+            raise ModelicaTextError(f"{name} is final: it cannot be changed from outside.", where=places)
         inner = dict(weaker.inner)
-        for name, entry in self.inner.items():
-            inner[name] = entry.over(inner[name]) if name in inner else entry
-        mine = self.value is not None
+        for key, entry in self.inner.items():
+            inner[key] = entry.over(inner[key], f"{name}.{key}".lstrip(".")) if key in inner else entry
+        mine = self.value is not None or self.redeclared is not None
         return Given(
-            self.value if mine else weaker.value, self.scope if mine else weaker.scope, inner,
+            self.value or weaker.value, self.scope if mine else weaker.scope, inner,
             self.redeclared or weaker.redeclared, self.line or weaker.line, self.each if mine else weaker.each,
+            self.final or weaker.final, self.text or weaker.text,
         )  # fmt: skip
+
+    def clash(self, other: Given, name: str) -> str:
+        """Return the name that both of two entries of one modification give a value, empty if there is none."""
+        if (self.value and other.value) or (self.redeclared and other.redeclared):
+            return name
+        common = (self.inner[key].clash(other.inner[key], f"{name}.{key}") for key in self.inner if key in other.inner)
+        return next(filter(None, common), "")
 
 
 def given(modification: Modification, scope: tuple[Instance, ClassText], line: int) -> Given:
     """Return a modification with its scope."""
-    entry = Given(modification.value, scope if modification.value is not None else None, {}, None, line)
+    entry = Given(modification.value, scope if modification.value is not None else None, {}, None, line, text=scope[1])
     for argument in modification.arguments:
         inner = given(argument.modification, scope, argument.line)
-        inner.each = argument.each
+        inner.each, inner.final = argument.each, argument.final
         if argument.redeclared is not None:
             inner.redeclared = argument.redeclared
             inner.scope = scope
         for name in reversed(argument.name.split(".")[1:]):
-            inner = Given(inner={name: inner}, line=argument.line)
+            inner = Given(inner={name: inner}, line=argument.line, text=scope[1])
         name = argument.name.split(".")[0]
-        entry.inner[name] = inner.over(entry.inner[name]) if name in entry.inner else inner
+        before = entry.inner.get(name)
+        twice = inner.clash(before, name) if before is not None else ""
+        if twice:
+            where = scope[1].place(argument.line)
+            raise ModelicaTextError(
+                f"One modification gives {twice} two values.", where=where, advice="Remove one of them."
+            )
+        entry.inner[name] = replace(inner.over(replace(before, final=False)), final=before.final) if before else inner
     return entry
 
 
@@ -73,12 +103,14 @@ class Member:
     Attributes:
         text: class whose names the declaration uses.
         given: its modifications, all levels merged.
+        constraint: modification of a constraining class is among them.
     """
 
     declaration: Declaration
     text: ClassText
     given: Given
     part: Instance | list[Instance] | None = None
+    constraint: bool = False
 
 
 class Instance:
@@ -102,7 +134,7 @@ class Instance:
         self.algorithm: list[tuple[Statement, ClassText]] = []
         self.folded: set[str] = set()
         self._replaced = {name: entry for name, entry in given.inner.items() if isinstance(entry.redeclared, ClassText)}
-        self._collect(text, given, 0)
+        self._demand(given, self._collect(text, given, 0), text)
 
     @property
     def path(self) -> str:
@@ -121,62 +153,78 @@ class Instance:
             return new
         return self.classes.find(name, text)
 
-    def _collect(self, text: ClassText, outer: Given, depth: int) -> None:
+    def constraint(self, name: str, text: ClassText) -> Given:
+        """Return the modification behind the `constrainedby` of a class, which a class in its place takes, too."""
+        declared = self.classes.find(name, text)
+        if not isinstance(declared, ClassText) or declared.constrained is None:
+            return Given()
+        return given(declared.constrained, (self, declared.owner or declared), declared.line)
+
+    def _demand(self, entries: Given, names: set[str], text: ClassText) -> None:
+        """Refuse modifications of what a class does not have."""
+        for name, entry in entries.inner.items():
+            if name not in names:
+                what = f"{text.name} has no '{name}'{did_you_mean(name, names) or '.'}"
+                raise UnknownName(what, where=(entry.text or text).place(entry.line))
+
+    def _collect(self, text: ClassText, outer: Given, depth: int) -> set[str]:
+        """Collect the members of a class and its bases; return the names it has for modifications."""
         if depth > _DEEPEST:
             raise ModelicaTextError(f"{text.path} extends itself.", where=text.place(text.line))
         for what, line in text.unsupported:
             raise refused(what, text, line)
+        names = set(text.classes)
         if text.short is not None:
-            self._extend(text.short, text.owner or text, outer, depth)
+            names |= self._extend(text.short, text.owner or text, outer, depth)
         declared: dict[str, Declaration] = {}
         for element in text.elements:
             if isinstance(element, Declaration) and declared.setdefault(element.name, element) is not element:
                 places = [text.place(line) for line in (declared[element.name].line, element.line)]
                 raise ModelicaTextError(f"{element.name} is declared twice in {text.name}.", where=places)
             if isinstance(element, Extends):
-                self._extend(element, text, outer, depth)
+                names |= self._extend(element, text, outer, depth)
             elif not isinstance(element, Import):
                 self._declare(element, text, outer)
         self.equations += [(equation, text) for equation in text.equations]
         self.initial_equations += [(equation, text) for equation in text.initial_equations]
         self.algorithm += [(statement, text) for statement in text.algorithm]
+        return names | declared.keys()
 
-    def _extend(self, one: Extends, text: ClassText, outer: Given, depth: int) -> None:
+    def _extend(self, one: Extends, text: ClassText, outer: Given, depth: int) -> set[str]:
         base = self.find(one.base, text)
         if isinstance(base, ClassText):
             inner = given(one.modification, (self, text), one.line)
-            self._replaced |= {k: v for k, v in inner.inner.items() if isinstance(v.redeclared, ClassText)}
-            self._collect(base, outer.over(inner), depth + 1)
-        elif isinstance(base, Known):
+            redeclared = {k: v for k, v in inner.inner.items() if isinstance(v.redeclared, ClassText)}
+            self._replaced = redeclared | self._replaced
+            names = self._collect(base, outer.over(inner), depth + 1)
+            self._demand(inner, names, base)
+            return names
+        if isinstance(base, Known):
             what = f"{text.name} extends {base.path}, for which a component of its own stands here"
             raise refused(what, text, one.line, "Write it as a part, and connect its ends.")
-        elif ".Icons." not in f".{one.base}" and not one.base.endswith(".Icon"):
+        if ".Icons." not in f".{one.base}" and not one.base.endswith(".Icon"):
             raise unknown_class(one.base, text, one.line)
+        return set()
 
     def _declare(self, declaration: Declaration, text: ClassText, outer: Given) -> None:
         for word in ("inner", "outer", "stream"):
             if word in declaration.prefixes:
                 raise refused(f"'{word}' before {declaration.name}", text, declaration.line)
-        entry = given(declaration.modification, (self, text), declaration.line)
-        from_outside = outer.inner.get(declaration.name)
-        if from_outside is not None:
-            entry = from_outside.over(entry)
-        if isinstance(entry.redeclared, Declaration):
-            new = entry.redeclared
-            scope = from_outside.scope if from_outside and from_outside.scope else (self, text)
-            entry = given(new.modification, scope, new.line).over(entry)
-            entry.redeclared = None
+        own = given(declaration.modification, (self, text), declaration.line)
+        own.final = "final" in declaration.prefixes
+        bound = declaration.constrained
+        constraint = Given() if bound is None else given(bound, (self, text), declaration.line)
+        outside = outer.inner.get(declaration.name, Given())
+        entry = outside.over(own.over(constraint, declaration.name), declaration.name)
+        new = outside.redeclared
+        if isinstance(new, Declaration):
+            # Modifications of the declaration hold for what takes its place, unless `constrainedby` has others.
+            kept = own if bound is None else constraint
+            scope = outside.scope or (self, text)
+            rest = replace(outside, redeclared=None, final=False)
+            entry = given(new.modification, scope, new.line).over(rest.over(kept), declaration.name)
             prefixes = declaration.prefixes | new.prefixes
-            declaration = Declaration(
-                prefixes,
-                new.type,
-                declaration.name,
-                declaration.dimensions,
-                declaration.modification,
-                declaration.condition,
-                declaration.description,
-                new.line,
-            )
+            declaration = replace(declaration, prefixes=prefixes, type=new.type, line=new.line)
             text = scope[1]
         self.members.setdefault(declaration.name, Member(declaration, text, entry))
 

@@ -130,15 +130,19 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
     inner = owner.find(declared.type, member.text)
     if inner is None:
         raise unknown_class(declared.type, member.text, declared.line)
+    constraint = Given() if member.constraint else owner.constraint(declared.type, member.text)
+    member.constraint = True
     while isinstance(inner, ClassText) and inner.short is not None and not inner.prefixes:
         # `model A = B(k = 1)`: the part is a B, and the modification one of the part.
         scope = inner.owner or inner
         base = owner.find(inner.short.base, scope)
         if base is None:
             raise unknown_class(inner.short.base, scope, inner.line)
-        member.given = member.given.over(given(inner.short.modification, (owner, scope), inner.line))
+        short = given(inner.short.modification, (owner, scope), inner.line)
+        member.given = member.given.over(short, declared.name)
         member.declaration = declared = replace(declared, type=inner.short.base)
         member.text, inner = scope, base
+    member.given = member.given.over(constraint, declared.name)
     if not isinstance(inner, ClassText):
         return inner
     if member.part is None:
@@ -151,7 +155,7 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
             member.part = _instance(owner, member, inner, declared.name, member.given)
         else:
             member.part = [
-                _instance(owner, member, inner, f"{declared.name}[{k}]", element(member.given, k))
+                _instance(owner, member, inner, f"{declared.name}[{k}]", element(member.given, k, count[0]))
                 for k in range(1, count[0] + 1)
             ]
     if isinstance(member.part, list):
@@ -173,7 +177,7 @@ def _instance(owner: Instance, member: Member, text: ClassText, name: str, given
     if text.kind == "record" and value is not None and given.scope is not None and given.scope[0] is not None:
         scope, inside = given.scope
         if value.kind == "call":
-            arguments = {key: Given(x, given.scope, line=value.line) for key, x in value.args[2]}
+            arguments = {key: Given(x, given.scope, line=value.line, text=inside) for key, x in value.args[2]}
             given = Given(inner=given.inner).over(Given(inner=arguments))
         elif value.kind == "name":
             instance = record_of(scope, value)
@@ -195,13 +199,27 @@ def record_of(scope: Instance, name: Expr) -> Instance | None:
     return record if record.text.kind == "record" else None
 
 
-def element(given: Given, index: int) -> Given:
-    """Return the modification of one element of an array: arrays without `each` are taken apart."""
-    entry = Given(given.value, given.scope, {}, given.redeclared, given.line, given.each)
-    for name, one in given.inner.items():
-        entry.inner[name] = element(one, index)
-    if given.value is not None and given.scope is not None and not given.each:
+def element(given: Given, index: int, size: int = 0) -> Given:
+    """Return the modification of one element of an array: arrays without `each` are taken apart.
+
+    Args:
+        given: of the array.
+        index: of the element, from one.
+        size: of the array; 0 if it has been compared with the values before.
+
+    Raises:
+        ModelicaTextError: the values are fewer or more than the elements.
+    """
+    if given.each:
+        return replace(given, each=False)  # for this array; another one in its elements takes it apart
+    entry = replace(given, inner={name: element(one, index, size) for name, one in given.inner.items()})
+    if given.value is not None and given.scope is not None:
         value = resolve.Resolver(*given.scope, numeric=False)(given.value)
+        if value.kind == "array" and size not in (0, len(value.args)):
+            what = f"An array of {size} elements is given {len(value.args)} value{'s' if len(value.args) != 1 else ''}."
+            raise ModelicaTextError(
+                what, where=given.scope[1].place(given.line), advice="Write 'each' where all elements take the same."
+            )
         if value.kind == "array" and index <= len(value.args):
             entry.value = value.args[index - 1]
     return entry

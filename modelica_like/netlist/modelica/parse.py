@@ -184,15 +184,18 @@ class _Parser(Expressions):
     def _element_class(self, owner: ClassText | None) -> ClassText:
         self.take("redeclare")
         inner = self.class_text(owner)
-        self._constrained()
+        inner.constrained = self._constrained()
         return inner
 
-    def _constrained(self) -> None:
-        if self.take("constrainedby"):
-            self.dotted()
-            self.modification()
-            self.strings()
-            self.annotation(None)
+    def _constrained(self) -> Modification | None:
+        """Return the modification of a constraining type, which holds for all that takes the place."""
+        if not self.take("constrainedby"):
+            return None
+        self.dotted()
+        modification = self.modification()
+        self.strings()
+        self.annotation(None)
+        return modification
 
     def _import(self) -> Import:
         alias = ""
@@ -228,7 +231,9 @@ class _Parser(Expressions):
         declarations = [self._declared(frozenset(prefixes), type_name, common)]
         while not single and self.take(","):
             declarations.append(self._declared(frozenset(prefixes), type_name, common))
-        self._constrained()
+        constrained = self._constrained()
+        for declared in declarations:
+            declared.constrained = constrained
         return declarations
 
     def _declared(self, prefixes: frozenset[str], type_name: str, common: tuple[Expr, ...]) -> Declaration:
@@ -256,16 +261,17 @@ class _Parser(Expressions):
         return modification
 
     def _argument(self) -> Argument:
-        line, redeclare, each = self.line, False, False
+        line, redeclare, each, final = self.line, False, False, False
         while word := self.take("each", "final", "redeclare", "replaceable"):
             each, redeclare = each or word == "each", redeclare or word in ("redeclare", "replaceable")
+            final = final or word == "final"
         if not redeclare:
             name = self.dotted()
-            argument = Argument(name, self.modification(), line, each)
+            argument = Argument(name, self.modification(), line, each, None, final)
             self.strings()
             return argument
         redeclared = self._element_class(None) if self.is_class() else self.declarations(single=True)[0]
-        return Argument(redeclared.name, Modification(), line, each, redeclared)
+        return Argument(redeclared.name, Modification(), line, each, redeclared, final)
 
     def annotation(self, class_text: ClassText | None) -> None:
         """Skip an annotation; that of a class may say how long to simulate."""

@@ -76,6 +76,7 @@ class Argument:
     line: int
     each: bool = False
     redeclared: Declaration | ClassText | None = None
+    final: bool = False
 
 
 @dataclass(slots=True)
@@ -105,6 +106,7 @@ class Declaration:
         type: dotted name of its class.
         dimensions: of an array; empty for a scalar.
         condition: whether it exists.
+        constrained: modification behind `constrainedby`; it holds for what is redeclared, too.
     """
 
     prefixes: frozenset[str]
@@ -115,6 +117,7 @@ class Declaration:
     condition: Expr | None
     description: str
     line: int
+    constrained: Modification | None = None
 
 
 @dataclass(slots=True)
@@ -141,6 +144,7 @@ class ClassText:
         literals: of an enumeration.
         prefixes: of a short definition, `connector In = input Real`.
         short: base and modification of a short definition, `model A = B(k = 1)`.
+        constrained: modification behind `constrainedby`.
         experiment: numbers of the annotation `experiment`, such as `StopTime`.
         file: it was read from.
         owner: enclosing class; at the outermost level None.
@@ -159,6 +163,7 @@ class ClassText:
     literals: tuple[str, ...] = ()
     prefixes: frozenset[str] = frozenset()
     short: Extends | None = None
+    constrained: Modification | None = None
     elements: list[Import | Extends | Declaration] = field(default_factory=list)
     classes: dict[str, ClassText] = field(default_factory=dict)
     equations: list[Statement] = field(default_factory=list)

@@ -18,11 +18,13 @@ class Basic:
         kind: `Real`, `Integer`, `Boolean`, `String`, `StateSelect` or `enumeration`.
         given: attributes such as `unit` and `start`.
         prefixes: of the declaration and its types.
+        enumeration: name of its class.
     """
 
     kind: str
     given: Given
     prefixes: frozenset[str]
+    enumeration: str = ""
 
 
 def basic_type(instance: Instance, member: Member) -> Basic | None:
@@ -41,11 +43,11 @@ def basic_type(instance: Instance, member: Member) -> Basic | None:
         raise unknown_class(declaration.type, member.text, declaration.line)
     while isinstance(base, ClassText):
         if base.literals:
-            return Basic("enumeration", attributes, prefixes)
+            return Basic("enumeration", attributes, prefixes, base.name)
         if base.short is None:
             return None
         scope = base.owner or base
-        attributes = attributes.over(given(base.short.modification, (instance, scope), base.line))
+        attributes = attributes.over(given(base.short.modification, (instance, scope), base.line), declaration.name)
         prefixes = prefixes | base.prefixes
         base = instance.classes.find(base.short.base, scope)
     plain = isinstance(base, str) and base in (*SCALARS, "StateSelect")
