@@ -19,6 +19,10 @@ def model(declarations: str = "", equations: str = "", before: str = "") -> str:
 CONNECTED = "connector U = input Boolean; connector Y = output Boolean; block C U u; end C;"
 ENDLESS = "while true loop y := 1; end while"
 GROWING = "function f input Real u; output Real y; algorithm y := u; for i in 1:60 loop y := y*y + y; end for; end f;"
+TYPES = (
+    "type M = enumeration(a, b); type N = enumeration(a, b); model B parameter Real k = 1; end B; "
+    "record P parameter Real u = 1; parameter Real v = 1; end P;"
+)
 MESSAGES: dict[str, tuple[str, str]] = {
     "no end": ("model A\n  Real x;\n", "model A of line 1 has no 'end A;'.\n  in a.mo:3"),
     "wrong end": ("model A\n  Real x;\nend B;\n", "model A of line 1 ends with 'end B'.\n  in a.mo:3 `end B;`"),
@@ -54,9 +58,42 @@ MESSAGES: dict[str, tuple[str, str]] = {
     "inner": (model("inner Real x;"), "'inner' before x: that is not supported here.\n  in a.mo:3 `inner Real x;`"),
     "a displayUnit that is no text": (
         model(f"{R}.Inertia a(w(displayUnit = true));"),
-        "A displayUnit of a.w that is no text: that is not supported here.\n"
-        f"  in a.mo:3 `{R}.Inertia a(w(displayUnit = true));`",
+        f"a.w.displayUnit is a String, and true is none.\n  in a.mo:3 `{R}.Inertia a(w(displayUnit = true));`",
     ),
+    "a displayUnit that is a variable": (
+        model(f"Real x = 1; {R}.Inertia a(w(displayUnit = x));"),
+        "A displayUnit of a.w that is no text: that is not supported here.\n"
+        f"  in a.mo:3 `Real x = 1; {R}.Inertia a(w(displayUnit = x));`",
+    ),
+    **{
+        f"declared: {text}": (
+            model(text, before=TYPES),
+            f"{what.rstrip('?')}{'?' if what.endswith('?') else '.'}\n  in a.mo:3 `{text}`",
+        )
+        for text, what in {
+            "Real z(strat = 3) = 1;": "z, a Real, has no 'strat'; did you mean 'start'?",
+            "B b(k.x = 1);": "k, a Real, has no 'x'",
+            "Real z(start(x = 1)) = 1;": "z.start has no 'x'",
+            "Real z(stateSelect = StateSelect.allways);": "StateSelect has no 'allways'; did you mean 'always'?",
+            f"{R}.Inertia a(w(fixd = true));": "a.w has no 'fixd'; did you mean 'fixed'?",
+            "Modelica.Mechanics.Rotational.Interfaces.Flange_a f(ph(start = 1));": "f has no 'ph'; did you mean 'phi'?",
+            "Real z(fixed = 1) = 1;": "z.fixed is a Boolean, and 1 is none",
+            "Real z(unit = 3) = 1;": "z.unit is a String, and 3 is none",
+            'Real z(min = "a") = 1;': 'z.min is a Real, and "a" is none',
+            "Real z(stateSelect = 3) = 1;": "z.stateSelect is a StateSelect, and 3 is none",
+            "Integer n = if time > 1 then 2 else 2.5;": "n is an Integer, and 2.5 is none",
+            "Real z = time > 1;": "z is a Real, and a truth value is none",
+            "Boolean z = time + 1;": "z is a Boolean, and a formula of numbers is none",
+            "parameter M m = N.a;": "m is a value of M, and N.a is none",
+            "parameter Integer n(min = 1) = 0;": "n = 0 is out of range: it must be at least 1",
+            "parameter Real v[2](each max = 1) = {1, 2};": "v = 2 is out of range: it must be at most 1",
+            "parameter Real v[2, 2] = {1, 2};": "v has the size 2, 2, and its value the size 2",
+            "parameter Real v[2] = 1;": "v has the size 2, and its value is no array",
+            "parameter Real v = {1, 2};": "v is no array, and its value is one",
+            "parameter Real v[:, 2] = {{1, 2}, {3}};": "v has a value whose rows are of different lengths",
+            "P p = P(1, 2, 3);": "P(…) with more than 2 values: that is not supported here",
+        }.items()
+    },
     "stream": (
         model("C c;", before="connector C stream Real h; flow Real m; end C;"),
         "'stream' before h: that is not supported here.\n  in a.mo:1 `connector C stream Real h; flow Real m; end C;`",
@@ -309,7 +346,8 @@ NAMES = (
 def test_every_refusal_has_its_sentence(case: str, tmp_path: Path, check_message) -> None:
     text, message = MESSAGES[case]
     (tmp_path / "a.mo").write_text(text)
-    kind = (ModelicaTextError, UnknownName)[case in NAMES]
+    out_of_range = ValueOutOfRange if "is out of range" in message else ModelicaTextError
+    kind = UnknownName if case in NAMES or (case.startswith("declared") and " has no " in message) else out_of_range
     check_message(kind, lambda: load(tmp_path / "a.mo"), message)
 
 

@@ -504,3 +504,22 @@ def test_modifications_that_mean_nothing_are_refused(text_file: Any, declaration
     with pytest.raises(ModelicaLikeError) as caught:
         final_x(text_file, declarations, "1", classes)
     assert "a.mo:8" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("declarations", "slope", "value"),
+    [
+        ("parameter Integer n = 4/2;", "n", 2), ("parameter Integer n = integer(2.5);", "n", 2),
+        ("parameter Real r = 2; parameter Integer n(min = 1) = 2*integer(r);", "n", 4),
+        ("parameter M m = M.b;", "if m == M.b then 5 else 1", 5),
+        ("parameter Integer n(min = 0, max = 3) = 3;", "n", 3),
+        ("parameter Real v[:, 2] = {{1, 2}, {3, 4}};", "sum(v)", 10),
+        ("parameter Real v[0, 2] = fill(1, 0, 2);", "1", 1),
+        ("parameter Real v[2](min = {0, -2}) = {1, -1};", "v[1] - v[2]", 2),
+        ("parameter Boolean on[2] = {true, false};", "if on[1] and not on[2] then 3 else 0", 3),
+        ("P p = P(2, 3);", "p.u*p.v", 6), ("P p = P(2, v = 5);", "p.u*p.v", 10),
+    ],
+)  # fmt: skip
+def test_values_that_fit_their_types_are_read(text_file: Any, declarations: str, slope: str, value: float) -> None:
+    classes = "type M = enumeration(a, b); record P parameter Real u; parameter Real v; end P;"
+    assert final_x(text_file, declarations, slope, classes) == pytest.approx(value, rel=1e-8)

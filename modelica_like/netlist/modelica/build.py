@@ -6,7 +6,15 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from modelica_like.errors import ModelicaLikeError, ModelicaTextError, Source, UnitError, raise_together_or_one
+from modelica_like.errors import (
+    ModelicaLikeError,
+    ModelicaTextError,
+    Source,
+    UnitError,
+    UnknownName,
+    did_you_mean,
+    raise_together_or_one,
+)
 from modelica_like.language import (
     Assembly,
     Component,
@@ -25,6 +33,7 @@ from modelica_like.language.assembly import declare, end_at
 from modelica_like.language.fields import Discrete, Field, Input
 from modelica_like.language.inside import inside
 from modelica_like.language.units import parse_unit, same_dimension
+from modelica_like.netlist.modelica.attributes import check_attributes, check_declared
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
 from modelica_like.netlist.modelica.library import Known, connector_type
@@ -149,13 +158,20 @@ class _Builder:
             kind = connector_type(part)
             if kind is None:
                 raise refused(f"{part} as a component", member.text, member.declaration.line)
-            return kind(member.declaration.description, free=True)
+            connector = kind(member.declaration.description, free=True)
+            for field_name, entry in given.inner.items():
+                if field_name not in connector.fields:
+                    what = f"{name} has no '{field_name}'{did_you_mean(field_name, connector.fields) or '.'}"
+                    raise UnknownName(what, where=(entry.text or member.text).place(entry.line))
+                check_attributes(f"{name}.{field_name}", Basic("Real", entry, frozenset()), member.text)
+            return connector
         if part.text.kind == "connector":
             return _connector(part)
         return _Builder(part, self.notes).run()
 
     def _basic(self, name: str, member: Member, basic: Basic) -> None:
         declared = member.declaration
+        check_declared(self.instance, member, basic)
         if "constant" in declared.prefixes or basic.kind in ("String", "enumeration", "StateSelect"):
             return
         if "parameter" in declared.prefixes:
@@ -348,6 +364,7 @@ def _connector(instance: Instance) -> WrittenConnector:
         basic = basic_type(instance, member)
         if basic is None or basic.kind != "Real" or member.declaration.dimensions:
             raise refused(f"{name} in a connector", member.text, member.declaration.line)
+        check_attributes(name, basic, member.text)
         builder = _Builder(instance, Notes())
         unit = builder.unit(basic)
         quantity = flow(unit) if "flow" in member.declaration.prefixes else var(unit)

@@ -11,20 +11,20 @@ from modelica_like.language.component import give_by_path
 from modelica_like.language.fields import Input, Output
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.attributes import check_attributes
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
 from modelica_like.netlist.modelica.members import record_of
 from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import Expr, names_in, substituted
+from modelica_like.netlist.modelica.types import Basic
 from modelica_like.netlist.modelica.written import as_formula
 from modelica_like.netlist.read import new_component
 from modelica_like.netlist.registry import find_type
 
 if TYPE_CHECKING:
     from modelica_like.netlist.modelica.build import Notes
-
-_ATTRIBUTES = ("start", "fixed", "min", "max", "nominal", "displayUnit", "unit", "quantity", "stateSelect")
 
 
 def library_part(
@@ -80,6 +80,8 @@ class _Part:
         starts: list[tuple[str, Given]] = []
         for name, start in self.entries.items():
             here = self.known.here(name)
+            if here in self.fields:
+                check_attributes(f"{self.name}.{name}", Basic("", start, frozenset()), self.member.text)
             if name in self.known.only:
                 if start.value is not None and start.scope is not None:
                     self._equal(name, Resolver(*start.scope, numeric=True)(start.value), start.value.line)
@@ -219,10 +221,8 @@ class _Part:
         return formula
 
     def _start(self, part: Component, here: str, given: Given) -> None:
-        unknown = [key for key in given.inner if key not in _ATTRIBUTES]
-        if unknown or given.value is not None:
-            what = f"{self.name}.{here} with {unknown[0] if unknown else 'an equation'}"
-            raise refused(what, self.member.text, given.line)
+        if given.value is not None:
+            raise refused(f"{self.name}.{here} with an equation", self.member.text, given.line)
         attributes = {
             key: Resolver(*inner.scope)(inner.value)
             for key, inner in given.inner.items()

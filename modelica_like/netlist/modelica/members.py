@@ -11,7 +11,7 @@ from modelica_like.netlist.modelica import fold, resolve
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, refused, unknown_class
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.tree import ClassText, Expr
-from modelica_like.netlist.modelica.types import basic_type
+from modelica_like.netlist.modelica.types import basic_type, misfit
 
 
 def named_array(path: str, shape: tuple[int, ...], kind: str) -> Expr:
@@ -89,29 +89,56 @@ def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
         value = resolve.Resolver(*given.scope, numeric=True)(given.value)
     finally:
         owner.folded.remove(name)
-    _check_value(owner, member, value)
+    check_value(owner, member, value)
     return value
 
 
-def _check_value(owner: Instance, member: Member, value: Expr) -> None:
-    """Refuse a value that is not of the declared type, or an array of another size."""
+def check_value(owner: Instance, member: Member, value: Expr) -> None:
+    """Refuse a value that is not of the declared type, or an array of another size.
+
+    Raises:
+        ModelicaTextError: it does not fit.
+    """
     declared, basic = member.declaration, basic_type(owner, member)
-    wrong = ""
-    numbers = [leaf.args[0] for leaf in _elements(value) if leaf.kind == "number"]
-    if basic is not None and basic.kind in ("Integer", "Boolean"):
-        others = [number for number in numbers if basic.kind == "Boolean" or number != math.floor(number)]
-        kind = "an Integer" if basic.kind == "Integer" else "a Boolean"
-        wrong = f"is {kind}, and {others[0]:g} is none" if others else ""
-    # A colon takes the size of the value.
-    if value.kind == "array" and declared.dimensions and all(one.kind != "all" for one in declared.dimensions):
-        size, given_size = sizes(owner, member)[0], len(value.args)
-        wrong = f"has the size {size}, and its value the size {given_size}" if size != given_size else wrong
+    wrong = "" if basic is None else misfit(value, basic) or _other_size(owner, member, value)
     if wrong:
-        raise ModelicaTextError(f"{declared.name} {wrong}.", where=member.text.place(declared.line))
+        place = member.text.place(declared.line)
+        given = member.given.text.place(member.given.line) if member.given.text is not None else place
+        raise ModelicaTextError(f"{declared.name} {wrong}.", where=[place] if place == given else [given, place])
 
 
-def _elements(value: Expr) -> list[Expr]:
-    return [one for inner in value.args for one in _elements(inner)] if value.kind == "array" else [value]
+def _other_size(owner: Instance, member: Member, value: Expr) -> str:
+    """Return in which size a value differs from a declaration, in words; empty if it does not."""
+    dimensions = member.declaration.dimensions
+    if value.kind not in ("array", *fold.KNOWN) or (not dimensions and value.kind != "array"):
+        return ""
+    if not dimensions:
+        return "is no array, and its value is one"
+    shape = _shape(value)
+    if shape is None:
+        return "has a value whose rows are of different lengths"
+    resolver = resolve.Resolver(owner, member.text, numeric=True)
+    # A colon takes the size of the value.
+    open_sizes = [*shape, *(0 for _ in dimensions)]
+    wanted = tuple(
+        one if dimension.kind == "all" else resolver.count(dimension)
+        for dimension, one in zip(dimensions, open_sizes, strict=False)
+    )
+    if 0 in wanted and shape == wanted[: wanted.index(0) + 1]:  # nothing is in it, so further sizes are not known
+        return ""
+    if shape == wanted:
+        return ""
+    size, other = (", ".join(map(str, one)) for one in (wanted, shape))
+    return f"has the size {size}, and its value {f'the size {other}' if shape else 'is no array'}"
+
+
+def _shape(value: Expr) -> tuple[int, ...] | None:
+    """Return the size of an array in each dimension, None if its rows differ."""
+    if value.kind != "array":
+        return ()
+    inner = {_shape(one) for one in value.args}
+    row = inner.pop() if inner else ()
+    return None if inner or row is None else (len(value.args), *row)
 
 
 def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known | str:
@@ -177,7 +204,11 @@ def _instance(owner: Instance, member: Member, text: ClassText, name: str, given
     if text.kind == "record" and value is not None and given.scope is not None and given.scope[0] is not None:
         scope, inside = given.scope
         if value.kind == "call":
-            arguments = {key: Given(x, given.scope, line=value.line, text=inside) for key, x in value.args[2]}
+            names = list(Instance(owner.classes, text, Given(), owner, name).members) if value.args[1] else []
+            if len(value.args[1]) > len(names):
+                raise refused(f"{value.args[0]}(…) with more than {len(names)} values", inside, value.line)
+            values = {**dict(zip(names, value.args[1], strict=False)), **dict(value.args[2])}
+            arguments = {key: Given(one, given.scope, line=value.line, text=inside) for key, one in values.items()}
             given = Given(inner=given.inner).over(Given(inner=arguments))
         elif value.kind == "name":
             instance = record_of(scope, value)

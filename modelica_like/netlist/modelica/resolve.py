@@ -28,6 +28,7 @@ _ARGUMENTS = {
     **dict.fromkeys(("sample", "Clock", "size"), (1, 2)), "smooth": (2, 2), "reinit": (2, 2), "delay": (2, 3),
 }  # fmt: skip
 """Least and largest number of arguments."""
+_STATE_SELECT = ("never", "avoid", "default", "prefer", "always")
 _REFUSED = {
     "spatialDistribution": "spatialDistribution", "cardinality": "cardinality(…)",
     "terminal": "terminal()",
@@ -260,6 +261,10 @@ class Resolver:
         package, _, name = path.rpartition(".")
         class_text = self.find(package) if package else None
         if package.endswith("StateSelect"):
+            if name not in _STATE_SELECT:
+                raise members.unknown_name(
+                    f"{package} has no '{name}'{did_you_mean(name, _STATE_SELECT) or '.'}", self.text, line
+                )
             return Expr("literal", (name,), line)
         if isinstance(class_text, ClassText) and class_text.literals:
             if name not in class_text.literals:

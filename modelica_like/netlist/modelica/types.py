@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, unknown_class
-from modelica_like.netlist.modelica.tree import ClassText
+from modelica_like.netlist.modelica.tree import ClassText, Expr
 
 SCALARS = ("Real", "Integer", "Boolean", "String")
+_TRUTHS = ("boolean", "condition", "and", "or", "not", "<", "<=", ">", ">=", "==", "<>")
+_FIT = {
+    "Real": ("number", "+", "-", "*", "/", "^", "neg"),
+    "Integer": ("number", "+", "-", "*", "/", "^", "neg"),
+    "Boolean": _TRUTHS,
+    "String": ("string",),
+    "enumeration": ("literal",),
+    "StateSelect": ("literal",),
+}
+"""Kinds of expressions that fit a type; calls and names may be of any."""
 
 
 @dataclass(slots=True)
@@ -67,3 +79,45 @@ def is_bound_outside(instance: Instance, member: Member, basic: Basic | None) ->
         and scope[0] is not instance
         and scope[0] is instance.owner
     )
+
+
+def with_article(basic: Basic) -> str:
+    """Return the type in words."""
+    if basic.kind == "enumeration":
+        return f"a value of {basic.enumeration}"
+    return f"an {basic.kind}" if basic.kind == "Integer" else f"a {basic.kind}"
+
+
+def misfit(value: Expr, basic: Basic) -> str:
+    """Return what is wrong with the type of a value, in words; empty if it fits, or is not known before the run."""
+    for leaf in _leaves(value):
+        if leaf.kind in ("name", "call") or basic.kind not in _FIT:
+            continue
+        other = leaf.kind not in _FIT[basic.kind]
+        if basic.kind == "Integer" and leaf.kind == "number":
+            other = leaf.args[0] != math.floor(leaf.args[0])
+        if leaf.kind == "literal" and not other:
+            kind = str(leaf.args[0]).rpartition(".")[0]
+            other = kind != basic.enumeration
+        if other:
+            return f"is {with_article(basic)}, and {_words(leaf)} is none"
+    return ""
+
+
+def _leaves(value: Expr) -> Iterator[Expr]:
+    """Yield the elements of arrays, and the values of the branches of an `if`."""
+    inner = {"array": value.args, "if": (*value.args[1::2], value.args[-1])} if value.args else {}
+    if value.kind not in ("array", "if"):
+        yield value
+    for one in inner.get(value.kind, ()):
+        yield from _leaves(one)
+
+
+def _words(leaf: Expr) -> str:
+    if leaf.kind == "number":
+        return f"{leaf.args[0]:g}"
+    if leaf.kind == "boolean":
+        return str(leaf.args[0]).lower()
+    if leaf.kind in ("string", "literal"):
+        return f'"{leaf.args[0]}"' if leaf.kind == "string" else str(leaf.args[0])
+    return "a truth value" if leaf.kind in _TRUTHS else "a formula of numbers"
