@@ -20,6 +20,25 @@ CLOSE = 2e-13
 
 
 @dataclass(frozen=True)
+class Tangent:
+    """A derivative in one direction, carried over a step, and estimates of errors.
+
+    Attributes:
+        end: derivatives of (x, theta) at the end, shape (nx + ntheta,).
+        error: of those of x, shape (nx,).
+        errors: of the quadratures and of their derivatives, shape (2, nq).
+        amounts: integrals of the amounts of both over the step, shape (2, nq).
+        terms: what these would be if nothing cancelled out, shape (2, nq).
+    """
+
+    end: Vector
+    error: Vector
+    errors: Vector
+    amounts: Vector
+    terms: Vector
+
+
+@dataclass(frozen=True)
 class Step:
     """A smooth step from `before` over `h` seconds with the solved stages W."""
 
@@ -43,11 +62,13 @@ class Step:
         end, gained = fast(*self._arguments, whole[:nx].ravel("F"), whole[nx:].ravel("F"))
         return np.vstack([end.reshape(columns, -1).T, whole[nx:]]), gained.reshape(columns, -1).T
 
-    def tangent(self, whole: Vector) -> tuple[Vector, Vector]:
-        """Carry derivatives of (x, theta) in one direction, shape (nx + ntheta,), and estimate their error by x."""
-        nx = len(self.before.x)
-        end, error = self.functions.tangent(*self._arguments, self.before.z, whole[:nx], whole[nx:])
-        return np.concatenate([end, whole[nx:]]), error.copy()
+    def tangent(self, whole: Vector) -> Tangent:
+        """Carry derivatives of (x, theta) in one direction, shape (nx + ntheta,), and estimate errors."""
+        nx, nq = len(self.before.x), self.functions.nq
+        end, error, *gains = self.functions.tangent(*self._arguments, self.before.z, whole[:nx], whole[nx:])
+        # An integrand such as sqrt(abs(x)) has no slope at zero: there the estimate tells nothing.
+        errors, amounts, terms = (np.nan_to_num(gain.reshape(2, nq), posinf=0.0, neginf=0.0) for gain in gains)
+        return Tangent(np.concatenate([end, whole[nx:]]), error.copy(), errors, amounts, terms)
 
     def adjoint(self, whole: Vector, Q: Vector) -> Vector:
         """Carry derivatives by (x, theta) to the beginning; Q are those by the quadratures."""

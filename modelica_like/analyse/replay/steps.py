@@ -23,6 +23,10 @@ STAGES = 7
 ABSOLUTE = 1e-2
 _ORDERS = 0.75
 _FINEST, _COARSEST = 1e-13, 1e-3
+_LEFT = 1e-2
+"""Part of the wanted error that Newton's method may leave in states and unknowns: integrands feel it as noise."""
+_ROUNDING = 1e-13
+"""Noise of states and unknowns beside their sizes, however small the wanted error is."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,17 @@ class Tolerances:
     def norm(self, relative: Vector) -> float:
         """Estimated error of a step, relative to the states, over what is allowed."""
         return float(np.linalg.norm(relative)) / (len(relative) ** 0.5 * self.rtol**_ORDERS)
+
+    def of_integrals(self, errors: Vector, amounts: Vector, terms: Vector) -> float:
+        """Return the largest estimated error of integrals in a step over what is allowed.
+
+        Args:
+            errors: estimated.
+            amounts: integrals of the amounts so far, to which the errors are relative.
+            terms: what they would be if all terms of the integrands had one sign: their noise is relative to it.
+        """
+        allowed = self.rtol**_ORDERS * amounts + max(_LEFT * self.rtol, _ROUNDING) * terms
+        return float(np.max(np.divide(errors, allowed, out=np.zeros(errors.shape), where=allowed > 0.0), initial=0.0))
 
 
 class StepFunctions:
@@ -235,11 +250,15 @@ class StepFunctions:
     def _end(self, W: Any, z: Any) -> list[Any]:
         """Error estimate and quadratures of a step with the stages W that begins with z."""
         t, h, x, _, p, u, d = self._names
-        rates, quadratures = self._ending(t, h, x, W, p, u, d)
+        return [self._estimated(W, z)[: self.nx], ca.densify(self._ending(t, h, x, W, p, u, d)[1])]
+
+    def _estimated(self, W: Any, z: Any) -> Any:
+        """Error estimate of (x, z) of a step with the stages W that begins with z."""
+        t, h, x, _, p, u, d = self._names
         ode = self._equations(t, x, z, p, u, d)[0][: self.nx]
         matrix = self._shifted("estimate", np.array([[self.tableau.gamma]]))(t, h, x, z, p, u, d)
-        right = ca.vertcat(rates + self.tableau.gamma * h * ode, ca.MX(self.nz, 1))
-        return [_solve(matrix, right, self._node_order)[: self.nx], ca.densify(quadratures)]
+        right = self._ending(t, h, x, W, p, u, d)[0] + self.tableau.gamma * h * ode
+        return _solve(matrix, ca.vertcat(right, ca.MX(self.nz, 1)), self._node_order)
 
     def _shifted(self, name: str, *blocks: Vector) -> ca.Function:
         """I ⊗ E - h B ⊗ F for each block, of the linearised equations E y' = F y at the beginning of the step."""
@@ -292,9 +311,10 @@ class StepFunctions:
 
     @property
     def tangent(self) -> Any:
-        """Function of (t, h, x, W, p, u, d, z, S, P) of the beginning: S at the end, and the estimate of its error.
+        """Function of (t, h, x, W, p, u, d, z, S, P) of the beginning: S at the end, and estimates of errors.
 
-        S are derivatives of x and P of (p, u, d) in one direction.
+        S are derivatives of x and P of (p, u, d) in one direction. The estimates are that of S, and for the quadratures
+        and their derivatives those, their amounts and their terms (`_gains`), each of shape (nq, 2).
         """
         return self._cached("tangent", self._make_tangent)
 
@@ -310,7 +330,52 @@ class StepFunctions:
         rates = self._tangent_rates(*self._names, change, P) + self.tableau.gamma * h * first
         error = _solve(matrix, ca.vertcat(rates, ca.MX(self.nz, 1)), self._node_order)
         last = change[self.size - self.nx - self.nz : self.size - self.nz, :]
-        return ca.Function("tangent", [*self._names, z, S, P], [last, error[: self.nx, :]])
+        gains = self._estimated_gains(z, change, P, begin, error) if self.nq else [ca.MX(0, 2)] * 3
+        return ca.Function("tangent", [*self._names, z, S, P], [last, error[: self.nx, :], *gains])
+
+    def _estimated_gains(self, z: Any, change: Any, P: Any, begin: Any, error: Any) -> list[Any]:
+        """Errors, amounts and terms of the quadratures and of their derivatives: quadratures are states as others.
+
+        Args:
+            z: implicit unknowns at the beginning.
+            change: derivatives of (x, z) at the stages.
+            P: those of (p, u, d).
+            begin: those of (x, z) at the beginning.
+            error: their estimated error.
+        """
+        t, h, x, W, p, u, d = self._names
+        _, by_w, by_theta = self._parameters(t, x, z, p, u, d)
+        first = ca.horzcat(self._integrands(t, x, z, p, u, d), ca.mtimes(by_w, begin) + ca.mtimes(by_theta, P))
+        # What x and z are wrong by is taken along, or an integrand of a stiff motion would seem to be wrong.
+        taken = ca.mtimes(by_w, ca.horzcat(self._estimated(W, z), error))
+        weighted, amounts, terms = self._gains(*self._names, change, P)
+        return [ca.fabs(weighted + self.tableau.gamma * h * (first + taken)), amounts, terms]
+
+    @cached_property
+    def _gains(self) -> ca.Function:
+        """Sums over the stages for quadratures and their derivatives: weighted for the error estimate, amounts, terms.
+
+        Arguments after those of a step are tangents (x, z) at the stages and P. Terms are what the amounts would be if
+        nothing cancelled out: the noise of an integrand is that of x and z times its slopes.
+        """
+        width, change, P = self.nx + self.nz, ca.SX.sym("change", self.size), ca.SX.sym("P", self.nt)
+        (powers,), (_, q_w, q_theta) = self._at_stages(self._integrands), self._at_stages(self._parameters)
+        least = ca.vertcat(ABSOLUTE * ca.DM(self.model.equations.nominals), ca.DM.ones(self.nz))
+        values: list[Any] = []
+        terms: list[Any] = []
+        for k, (power, by_w, by_theta) in enumerate(zip(powers, q_w, q_theta, strict=True)):
+            here = slice(k * width, (k + 1) * width)
+            values.append(ca.horzcat(power, ca.mtimes(by_w, change[here]) + ca.mtimes(by_theta, P)))
+            own = ca.mtimes(ca.fabs(by_w), ca.fabs(self._symbols[3][here]) + least)
+            felt = ca.mtimes(ca.fabs(by_w), ca.fabs(change[here])) + ca.mtimes(ca.fabs(by_theta), ca.fabs(P))
+            # Directions change parameters by about their sizes: what is noise beside a value is so beside its change.
+            terms.append(ca.horzcat(own, own + felt))
+        sums = (
+            self._weighted(self.tableau.estimate, values),
+            self._weighted(self.tableau.weights, [ca.fabs(value) for value in values]),
+            self._weighted(self.tableau.weights, terms),
+        )
+        return ca.Function("gains", [*self._symbols, change, P], [ca.densify(one) for one in sums])
 
     @cached_property
     def _tangent_rates(self) -> ca.Function:

@@ -1,23 +1,27 @@
 """A derivative along the run in one direction, which tells how short steps must be.
 
 States at rest tell nothing about the motions that a change of a parameter excites: with the steps that they allow, a
-derivative by the free angle of a spring was a fifth off.
+derivative by the free angle of a spring was a fifth off. Nor do states tell how fast the integrands are that are read
+along them: with the steps of a steady speed, which have no end, an integral over an angle was anything.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.analyse.replay.start import product
-from modelica_like.analyse.replay.step import Step
+from modelica_like.analyse.replay.step import Step, Tangent
 from modelica_like.analyse.replay.steps import Tolerances
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 
 _UNFELT = 1e-6
-"""Derivatives of a state that are so much smaller than others, in nominal values, count as much as these."""
+"""Derivatives of a state that are so much smaller than others, in nominal values, count as much as these; those of an
+integral as much as such a share of it."""
 
 
 class Tangents:
@@ -31,7 +35,8 @@ class Tangents:
     def __init__(self, model: CompiledDae, tolerances: Tolerances) -> None:
         self._model, self._tolerances = model, tolerances
         self._carried: list[Vector] = []
-        self._tried: tuple[Step | None, Vector] = None, np.zeros(0)
+        self._gained: list[Any] = []
+        self._tried: tuple[Step | None, Tangent | None] = None, None
         self._largest = np.zeros(len(model.states))
 
     def begin(self, x: ca.DM, d: ca.DM) -> None:
@@ -43,25 +48,36 @@ class Tangents:
 
     def carry(self, move: Step | Jump) -> None:
         """Go on over a move."""
-        last, (tried, end) = self._carried[-1], self._tried
+        last, (tried, tangent) = self._carried[-1], self._tried
         if isinstance(move, Step):
-            end = end if move is tried else move.tangent(last)[0]
+            if tangent is None or move is not tried:
+                tangent = move.tangent(last)
+            self._add(tangent.end, np.stack([tangent.amounts, tangent.terms]))
         else:
-            end = move.forward(last[:, None])[0][:, 0]
-        self._add(end)
+            self._add(move.forward(last[:, None])[0][:, 0])
 
     def go_back(self) -> None:
         """Forget the last move."""
         self._carried.pop()
+        self._gained.pop()
 
     def error(self, step: Step) -> float:
-        """Return the estimated error in a step over what is allowed, relative to the largest derivatives so far."""
-        end, error = step.tangent(self._carried[-1])
-        self._tried = step, end
-        nominals, largest = self._model.equations.nominals, np.fmax(self._largest, np.abs(end[: len(self._largest)]))
-        scale = np.maximum(largest, _UNFELT * np.max(largest / nominals) * nominals)
-        return self._tolerances.norm(error / scale) if np.all(scale > 0.0) else 0.0
+        """Return the largest estimated error in a step over what is allowed.
 
-    def _add(self, tangent: Vector) -> None:
+        That of the derivatives is relative to the largest ones so far. That of the quadratures and of their derivatives
+        is relative to their amounts so far: what they become until the end is not known.
+        """
+        tangent = step.tangent(self._carried[-1])
+        self._tried = step, tangent
+        nominals = self._model.equations.nominals
+        largest = np.fmax(self._largest, np.abs(tangent.end[: len(self._largest)]))
+        scale = np.maximum(largest, _UNFELT * np.max(largest / nominals) * nominals)
+        of_states = self._tolerances.norm(tangent.error / scale) if np.all(scale > 0.0) else 0.0
+        amounts, terms = self._gained[-1] + np.stack([tangent.amounts, tangent.terms])
+        amounts[1] = np.maximum(amounts[1], _UNFELT * amounts[0])
+        return max(of_states, self._tolerances.of_integrals(tangent.errors, amounts, terms))
+
+    def _add(self, tangent: Vector, gained: Any = 0.0) -> None:
         self._carried.append(tangent)
+        self._gained.append((self._gained[-1] if self._gained else 0.0) + gained)
         self._largest = np.fmax(self._largest, np.abs(tangent[: len(self._largest)]))
