@@ -66,7 +66,8 @@ class Collector:
     def _curves_of(self, numbers: Sequence[int], atol: float) -> Curves:
         parts = [self._every[k] for k in numbers]
         key = tuple((part.text, part.form, part.change) for part in parts)
-        return Curves(self._model, key, lambda: [ca.SX(part.expression(self._model)) for part in parts], atol)
+        make = lambda: [ca.SX(part.expression(self._model)) for part in parts]  # noqa: E731
+        return Curves(self._model, key, make, atol, [part.text for part in parts])
 
     def feed(self, dense: Dense) -> None:
         """Read stretches that follow those before."""

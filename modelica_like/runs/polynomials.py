@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +12,8 @@ from numpy.polynomial import legendre
 
 from modelica_like.compile.buffers import Along
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.solve.dense import Dense
+from modelica_like.errors import MissingValue
+from modelica_like.solve.dense import MOST_KEPT, Dense
 
 _DEGREE = 6
 _INNER: Any = legendre.legroots(legendre.legder([0.0] * _DEGREE + [1.0]))
@@ -26,12 +28,14 @@ _FIT = 1e-9
 """Last terms of a series, relative to the largest amount in the run, below which it counts as the value."""
 _DEEPEST = 30
 _PATIENCE = 12
-"""Halvings that lower the last terms by less than a fifth, after which the value jumps: it is known where."""
+"""Halvings that lower the last terms of one half only, and by less than a fifth, after which the value jumps: it is
+known where. If those of both halves stay, the value waves faster than its pieces, and only shorter ones tell how.
+"""
 _STUBBORN = 0.8
 _NOISE, _LESS = 1e3, 3
 """Last terms, relative to what is allowed, below which they are noise after fewer such halvings."""
 _CROWD = 5000
-"""Pieces that are halved, and do not change, are noise if they are more than this and four times those of the run."""
+"""Pieces with so small last terms are noise at once if they are more than this and four times those of the run."""
 _NEWTON, _BISECTIONS = 20, 54
 """To the last digit of a place."""
 _RISE = 0.1
@@ -181,10 +185,11 @@ class Curves:
         model: the compiled model.
         expressions: SX columns in the model's arguments; `key` identifies them in the model's cache.
         noise: amount below which a value is noise.
+        names: of the expressions, for errors.
     """
 
-    def __init__(self, model: CompiledDae, key: Any, expressions: Any, noise: float) -> None:
-        self._model, self._noise = model, noise
+    def __init__(self, model: CompiledDae, key: Any, expressions: Any, noise: float, names: Sequence[str]) -> None:
+        self._model, self._noise, self._names = model, noise, names
 
         def make() -> Along:
             column = ca.densify(ca.vertcat(*expressions()))
@@ -200,32 +205,58 @@ class Curves:
         return values
 
     def fitted(self, dense: Dense) -> Fitted:
-        """Return them as polynomials; pieces are halved until each is one."""
-        count, size = len(self.sizes), max(_TOGETHER // (max(len(self.sizes), 1) * len(NODES)), 1)
+        """Return them as polynomials; pieces are halved until each is one.
+
+        Raises:
+            MissingValue: that would take more pieces than there is room for.
+        """
         begins, ends, owner = dense.begins, dense.ends, np.arange(len(dense.begins))
         before, stuck, kept = np.full(len(owner), np.inf), np.zeros(len(owner), int), []
         for depth in range(_DEEPEST + 1):
-            parts = [
-                self._values(dense, owner[k : k + size], begins[k : k + size], ends[k : k + size])
-                for k in range(0, len(owner), size)
-            ]
-            values = np.concatenate([np.zeros((count, 0, len(NODES))), *parts], axis=1)
-            tails = np.abs(values @ _TO_SERIES[-2:].T) @ [0.1, 1.0]
-            allowed = np.maximum(_FIT * self.sizes, self._noise)[:, None]
-            excess = (tails / allowed).max(axis=0, initial=0.0)
-            stuck = np.where(excess > _STUBBORN * before, stuck + 1, 0)
-            crowd = np.count_nonzero(excess > 1) > _CROWD + 4 * len(dense.begins)
-            patience = 1 if crowd else np.where(excess > _NOISE, _PATIENCE, _LESS)
-            rough = (excess > 1) & (stuck < patience) & (depth < _DEEPEST)
+            values, excesses = self._read(dense, owner, begins, ends)
+            excess = excesses.max(axis=0, initial=0.0)
+            bad, noise = excess > 1, excess <= _NOISE
+            # Where both halves of a piece are bad, the value does not just jump at a place.
+            alone = ~np.repeat(bad.reshape(-1, 2).all(axis=1), 2) if depth else True
+            stuck = np.where((excess > _STUBBORN * before) & (alone | noise), stuck + 1, 0)
+            crowd = np.count_nonzero(bad) > _CROWD + 4 * len(dense.begins)
+            patience = np.where(noise, 1 if crowd else _LESS, _PATIENCE)
+            rough = bad & (stuck < patience) & (depth < _DEEPEST)
             kept.append((begins[~rough], ends[~rough], values[:, ~rough]))
             if not rough.any():
                 break
+            if np.count_nonzero(rough) > self._room(dense):
+                raise self._too_fast(excesses, begins)
             middles = 0.5 * (begins + ends)[rough]
             begins, ends = _mixed(begins[rough], middles), _mixed(middles, ends[rough])
             owner, before, stuck = (np.repeat(x[rough], 2) for x in (owner, excess, stuck))
         begins, ends = (np.concatenate([x[k] for x in kept]) for k in (0, 1))
         order = np.argsort(begins, kind="stable")
         return Fitted(begins[order], ends[order], np.concatenate([k[2] for k in kept], axis=1)[:, order])
+
+    def _read(self, dense: Dense, owner: Any, begins: Vector, ends: Vector) -> tuple[Vector, Vector]:
+        """Return values at the nodes of pieces, and their last terms over what is allowed, shape (expressions, m)."""
+        count, size = len(self.sizes), max(_TOGETHER // (max(len(self.sizes), 1) * len(NODES)), 1)
+        parts = [
+            self._values(dense, owner[k : k + size], begins[k : k + size], ends[k : k + size])
+            for k in range(0, len(owner), size)
+        ]
+        values = np.concatenate([np.zeros((count, 0, len(NODES))), *parts], axis=1)
+        tails = np.abs(values @ _TO_SERIES[-2:].T) @ [0.1, 1.0]
+        return values, tails / np.maximum(_FIT * self.sizes, self._noise)[:, None]
+
+    def _room(self, dense: Dense) -> int:
+        """Pieces that there is room for: as many numbers as a run keeps, or four times the pieces of the run."""
+        return max(4 * len(dense.begins), MOST_KEPT // (len(self.sizes) * len(NODES)))
+
+    def _too_fast(self, excesses: Vector, begins: Vector) -> MissingValue:
+        row = int(np.argmax(np.count_nonzero(excesses > 1, axis=1)))
+        first = float(begins[int(np.argmax(excesses[row] > 1))])
+        return MissingValue(
+            f"{self._names[row]} cannot be read off {self._model.name}: from t = {first:.6g} s on it changes so "
+            f"often that {excesses.shape[1]} polynomials do not show it.",
+            advice="Read it off a shorter run, or look for noise in it.",
+        )
 
     def _values(self, dense: Dense, owner: Any, begins: Vector, ends: Vector) -> Vector:
         times = begins[:, None] + 0.5 * (1.0 + NODES) * (ends - begins)[:, None]

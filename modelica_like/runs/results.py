@@ -174,7 +174,7 @@ def read_after(run: Trajectories, names: Sequence[str]) -> list[Number]:
 
     Raises:
         UnknownName: a reading is not known.
-        MissingValue: its dense output was not kept.
+        MissingValue: its dense output was not kept, or a value waves too often for it (`Curves.fitted`).
     """
     if isinstance(run, RecordedSolution) and run.measured:
         return read_results(run, names)[0]
@@ -190,13 +190,13 @@ def along(run: Any, *texts: str) -> tuple[Fitted, str]:
 
     Raises:
         UnknownName: there is no such variable.
-        MissingValue: the dense output of the run was not kept.
+        MissingValue: the dense output of the run was not kept, or a value waves too often for it (`Curves.fitted`).
     """
     dense: Dense = OfResults(run) if run.measured else dense_of(run, texts[0])
     model: Any = _Columns(run.model) if run.measured else run.model
     noise = _NOISE if run.measured else run.options.atol
     expressions = [expression_of(model, text) for text in texts]
-    curves = Curves(model, texts, lambda: [ca.SX(make()) for make, _ in expressions], noise)
+    curves = Curves(model, texts, lambda: [ca.SX(make()) for make, _ in expressions], noise, texts)
     return curves.fitted(dense), str(expressions[0][1])
 
 

@@ -177,7 +177,7 @@ class Trajectories(Shown, ABC):
 
         Raises:
             UnknownName: a reading is not known.
-            MissingValue: its dense output was not kept, or is not known.
+            MissingValue: its dense output was not kept, is not known, or a value waves too often for it.
         """
         from modelica_like.runs.results import read_after  # which has trajectories as results
 

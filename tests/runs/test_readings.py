@@ -14,11 +14,25 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from components import Clutch, Fixed, Inertia, Pulse, PulseCounter, Ramp, Sine, SpringDamper, Step, Table, Torque
+from components import (
+    Clutch,
+    ConstantSpeed,
+    Fixed,
+    Inertia,
+    Pulse,
+    PulseCounter,
+    Ramp,
+    Sine,
+    SpringDamper,
+    Step,
+    Table,
+    Torque,
+)
 from modelica_like import Assembly, build, load_spectrum, sensitivities, simulate, simulation_function, sweep
 from modelica_like.analyse.sizing import load_of, size
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import NoGradient
+from modelica_like.errors import MissingValue, NoGradient
+from modelica_like.runs import polynomials
 from modelica_like.runs.display import Display
 from modelica_like.runs.signals import read_signals
 from modelica_like.show.report.run import values_table
@@ -355,3 +369,23 @@ def test_a_formula_of_a_signal_without_a_unit_has_none(stepping: CompiledDae) ->
     assert [number.unit for number in run.read(*names)] == ["*", "*", "*", "*", "*", "rad/s", "W"]
     assert [signal.unit for signal in read_signals(stepping, names[:4])] == ["*"] * 4
     assert float(sweep(stepping, {"step.height": [3.0]}, ["2*step.y"], until=0.95)["2*step.y"][0]) == 6.0
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_waves_along_a_long_steady_turn(solver: Any) -> None:
+    """One step has the whole turn, and 4,000 waves lie in it: sin⁴ = 3/8 - cos(2wt)/2 + cos(4wt)/8."""
+    w, end = 300.0, 90.0
+    parts = {"motor": ConstantSpeed(w_fixed=w, phi=0.0), "J": Inertia(J=1.0)}
+    run = simulate(Assembly("turning", parts=parts, series={"shaft": [*parts]}), end, solver=solver)
+    wave = "sin(J.phi/(1 rad))**4"
+    mean = 3 / 8 - math.sin(2 * w * end) / (4 * w * end) + math.sin(4 * w * end) / (32 * w * end)
+    # The angle of 27,000 rad is rounded to 4e-12.
+    assert run.read(f"mean({wave})", f"max({wave})") == pytest.approx([mean, 1.0], rel=1e-10)
+
+
+def test_what_would_take_too_many_polynomials_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    parts = {"motor": ConstantSpeed(w_fixed=300.0, phi=0.0), "J": Inertia(J=1.0)}
+    run = simulate(Assembly("turning", parts=parts, series={"shaft": [*parts]}), 90.0)
+    monkeypatch.setattr(polynomials, "MOST_KEPT", 2**16)
+    with pytest.raises(MissingValue, match=r"^sin\(J\.phi/\(1 rad\)\) cannot be read off turning: from t = 0 s on"):
+        run.read("max(sin(J.phi/(1 rad)))")
