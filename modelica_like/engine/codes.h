@@ -15,6 +15,7 @@ FAILURE(START_NOT_FOUND, "No start was found that meets all start values. Give o
 FAILURE(START_NOT_SETTLED, "The modes at the start do not settle: they and the start values keep changing each other.")
 FAILURE(NOT_STEADY, "No steady state was found at t = %g s.")
 FAILURE(MODE_NOT_STEADY, "No steady state was found at t = %g s: %T does not stay in its mode.")
+FAILURE(MEMORY_NOT_STEADY, "No steady state was found at t = %g s: what clocks set does not stay as it is.")
 FAILURE(START_SINGULAR, "The start equations are singular at t = %g s.")
 /* Equations */
 FAILURE(UNKNOWN_SINGULAR, "The Jacobian is singular at t = %g s in the equations for %Z. " STUCK_TWICE)

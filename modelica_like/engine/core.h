@@ -161,7 +161,8 @@ typedef struct { /* of something for which there may be another way */
     double values[3];
 } Refusal;
 
-typedef enum { KEPT_FAILED, KEPT_LED, KEPT_SETTLING, N_KEPT_STARTS } KeptStart; /* points to come back to */
+/* points to come back to */
+typedef enum { KEPT_FAILED, KEPT_LED, KEPT_SETTLING, KEPT_TICKS, KEPT_TICK, N_KEPT_STARTS } KeptStart;
 
 /* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns; `wanting` transitions fire at the
  * end of the piece. */
@@ -273,6 +274,7 @@ const double *keep_start(Instance *c, KeptStart which, int back);
 Result start_steady(Instance *c);
 Result find_steady(Instance *c, int fixed, int defaults);
 Result steady_near(Instance *c);
+Result check_ticks(Instance *c);
 /* holds.c */
 #define UNLIMITED 1e30
 #define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */
@@ -309,6 +311,8 @@ double next_moment(Instance *c, int idle_too);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 void drop_balanced(Instance *c, double *soon);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
+int count_clocks(const Instance *c);
+Result tick(Instance *c, double *step);
 Result update_discrete(Instance *c, int *restart, double *next);
 Result check_turned_back(Instance *c, const double *before);
 double number_or_false(double guard);

@@ -181,6 +181,41 @@ static Result update_once(Instance *c, int *changes) {
     return share_and_solve(c) && check_singular(c);
 }
 
+static int ticks(const Instance *c, const Transition *one) {
+    return one->timed && is_source(c, one) && c->d[one->mode] == one->target;
+}
+
+/* How many clocks there are in the present modes: what happens at moments again and again leads back to its mode. */
+int count_clocks(const Instance *c) {
+    int count = 0;
+    for (int k = 0; k < c->model->n_transitions; k++) count += ticks(c, &c->model->transitions[k]);
+    return count;
+}
+
+/* Lets every clock tick once, at whatever time, and nothing else happen. `step` gets the shortest time to another
+ * tick. */
+Result tick(Instance *c, double *step) {
+    const Model *m = c->model;
+    double *before = c->outputs, *after = c->guards, *values = c->reset_values, events = c->state.n_events;
+    int count = 0, changes = 1;
+    evaluate_now(c, &m->tapes.moments, before);
+    evaluate_now(c, &m->tapes.resets, values);
+    for (const Reset *one = m->resets; one < m->resets + m->n_resets; one++)
+        if (ticks(c, &m->transitions[one->transition]))
+            take_value(c, one, values[one->value] / one->factor, c->d, &count);
+    if (count > 0) move_states(c, c->targets, c->target_values, count);
+    for (int round = 0; round < ROUNDS && changes; round++)
+        if (!update_once(c, &changes)) return RESULT_ERROR;
+    c->state.n_events = events; /* none of a run */
+    evaluate_now(c, &m->tapes.moments, after);
+    *step = INFINITY;
+    for (int k = 0; k < m->n_transitions; k++) {
+        const Transition *one = &m->transitions[k];
+        if (ticks(c, one)) *step = fmin(*step, after[one->index] - before[one->index]);
+    }
+    return changes ? fail(c, NOT_SETTLED, c->state.t, ROUNDS) : share_and_solve(c);
+}
+
 /* Forgets a crowd of instants that has ended. */
 static void leave_crowd(State *s) {
     double span = s->stop_time_defined ? s->stop_time - s->start_time : 1;

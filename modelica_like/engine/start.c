@@ -235,7 +235,7 @@ static Result lead(Instance *c) {
         if (step < LEAST_SHARE) return RESULT_ERROR;
         keep_start(c, KEPT_LED, 1);
     }
-    return RESULT_OK;
+    return steady ? check_ticks(c) : RESULT_OK;
 }
 
 static Result pass_start(Instance *c) {

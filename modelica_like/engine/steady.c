@@ -23,6 +23,7 @@
 #define MOST_STEPS 1000
 #define MOST_ITERATIONS 8
 #define MOST_ROUNDS_OF_STEP 10
+#define MOST_TICKS 100 /* after which what samplers keep is taken to stay */
 #define STEP_FOUND 1e-9 /* change by Newton's method after which only the end of all counts: it is but a guess */
 
 /* Rates of moving states and residuals of implicit equations, and their slopes by these unknowns, row by row. Tells
@@ -50,6 +51,22 @@ static int steady_equations(Instance *c, double *slopes, double *values) {
     return finite;
 }
 
+/* Whether rates of moving states and residuals vanish, up to rounding. */
+static int at_rest(Instance *c) {
+    const Model *m = c->model;
+    int n = m->n_steady;
+    double *slopes = c->square, *values = c->vector;
+    steady_equations(c, slopes, values);
+    for (int k = 0; k < n; k++) {
+        double explained = LEAST_RATE;
+        for (int j = 0; j < n; j++)
+            explained += EXPLAINED * fabs(slopes[(size_t)k * n + j]) * (1 + fabs(c->x[m->steady[j]]));
+        /* Slopes that are not finite explain anything. */
+        if (!(fabs(values[k]) <= STEADY) || fabs(values[k]) > explained) return 0;
+    }
+    return 1;
+}
+
 /* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. */
 static Result solve_steady(Instance *c) {
     const Model *m = c->model;
@@ -65,15 +82,7 @@ static Result solve_steady(Instance *c) {
         }
         if (change <= 1e-13) break;
     }
-    steady_equations(c, slopes, values);
-    for (int k = 0; k < n; k++) {
-        double explained = LEAST_RATE;
-        for (int j = 0; j < n; j++)
-            explained += EXPLAINED * fabs(slopes[(size_t)k * n + j]) * (1 + fabs(c->x[m->steady[j]]));
-        /* Slopes that are not finite explain anything. */
-        if (!(fabs(values[k]) <= STEADY) || fabs(values[k]) > explained) return fail(c, NOT_STEADY, c->state.t);
-    }
-    return RESULT_OK;
+    return at_rest(c) ? RESULT_OK : fail(c, NOT_STEADY, c->state.t);
 }
 
 /* What modes hold stops, with the least change of the states. */
@@ -101,10 +110,39 @@ static Result check_modes_hold(Instance *c) {
     return RESULT_OK;
 }
 
+/* Whether states that settle are where they were before a tick; the others drift on until the next one. */
+static int stays(Instance *c, const double *before, double step) {
+    const Model *m = c->model;
+    int same = 1;
+    for (int k = 0; k < m->n_x; k++)
+        if (c->steady_places[k] >= 0) same &= fabs(c->x[k] - before[k]) <= EXPLAINED * (1 + fabs(before[k]));
+        else if (isfinite(step)) c->x[k] += step * c->rhs[k];
+    return same;
+}
+
+/* What samplers keep belongs to a steady state: it is one if clocks may tick and all stays at rest. The memory of a
+ * linear controller that moves nothing in as many ticks as it has numbers never does. The point stays as it is. */
+Result check_ticks(Instance *c) {
+    const Model *m = c->model;
+    int rounds = (int)fmin(m->n_updates + m->n_resets + 1, MOST_TICKS), rests = 1;
+    double step;
+    if (m->n_steady == 0 || count_clocks(c) == 0) return RESULT_OK;
+    keep_start(c, KEPT_TICKS, 0);
+    for (int k = 0; k < rounds && rests; k++) {
+        const double *before = keep_start(c, KEPT_TICK, 0);
+        memcpy(c->d_before, c->d, (size_t)m->n_d * sizeof(double));
+        if (!tick(c, &step)) return RESULT_ERROR;
+        rests = at_rest(c) && stays(c, before, step) && check_modes_hold(c);
+    }
+    if (!rests) return fail(c, MEMORY_NOT_STEADY, c->state.t);
+    keep_start(c, KEPT_TICKS, 1);
+    return RESULT_OK;
+}
+
 /* The steady state of the present modes near the present point. */
 Result steady_near(Instance *c) {
     stand_still(c);
-    return solve_steady(c) && check_modes_hold(c);
+    return solve_steady(c) && check_modes_hold(c) && check_ticks(c);
 }
 
 /* States and modes of a steady state, from modes whose shares are known; states have their fixed start values, or also

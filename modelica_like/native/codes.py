@@ -25,6 +25,7 @@ class Code(IntEnum):
     START_NOT_SETTLED = auto()
     NOT_STEADY = auto()
     MODE_NOT_STEADY = auto()
+    MEMORY_NOT_STEADY = auto()
     START_SINGULAR = auto()
     UNKNOWN_SINGULAR = auto()
     BLOCK_SINGULAR = auto()

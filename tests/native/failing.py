@@ -22,6 +22,7 @@ from modelica_like.language import (
     Mode,
     Parameter,
     Variable,
+    clock,
     delay,
     der,
     discrete,
@@ -236,6 +237,18 @@ def rubbing() -> Assembly:
     parts = {"torque": ConstantTorque(tau_constant=0.0), "J": Inertia(J=1.0, phi=0.0),
              "bearing": BearingFriction(tau_pos=((0, 3), (1, 3)))}  # fmt: skip
     return Assembly("rubbing", parts=parts, series={"shaft": [*parts]})
+
+
+class Sampling(Basis):
+    """At rest at x = 1 while nothing is sampled, and nowhere near it after a tick."""
+
+    last: Discrete = discrete("1", "sample of the state")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 1 - self.x - 2 * self.last
+
+    def events(self) -> Events:
+        yield when(clock(0.1), {self.last: self.x})
 
 
 def gradient(drive, of, by, do=lambda _: None):

@@ -24,6 +24,7 @@ from failing import (
     Rebound,
     Root,
     Running,
+    Sampling,
     Silent,
     Square,
     Touching,
@@ -89,6 +90,9 @@ BOTH: dict[Code, tuple[Callable[[], object], Callable[[], object]]] = {
     Code.MODE_NOT_STEADY: (
         lambda: restarted(rubbing(), {"torque.tau_constant": 5.0}, "steady"),
         by_idas(rubbing(), {"torque.tau_constant": 5.0}, start="steady"),
+    ),
+    Code.MEMORY_NOT_STEADY: (
+        lambda: build(Sampling()).native(start="steady"), by_idas(Sampling(), start="steady"),
     ),
     Code.UNKNOWN_SINGULAR: (lambda: restarted(Implicit(x=0.0), {"a": 0.0}), by_idas(Implicit(x=0.0), {"a": 0.0})),
     Code.BLOCK_SINGULAR: (lambda: restarted(Divided(x=0.0), {"a": 0.0}), by_idas(Divided(x=0.0), {"a": 0.0})),

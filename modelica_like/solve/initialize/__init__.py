@@ -28,6 +28,7 @@ from modelica_like.solve.initialize.point import solve_implicit as solve_implici
 from modelica_like.solve.initialize.singular import implicit_singular as implicit_singular
 from modelica_like.solve.initialize.singular import singular_block as singular_block
 from modelica_like.solve.initialize.slopes import variable_slopes as variable_slopes
+from modelica_like.solve.initialize.steady import memory_not_steady as memory_not_steady
 from modelica_like.solve.initialize.steady import mode_not_steady as mode_not_steady
 from modelica_like.solve.initialize.steady import not_steady as not_steady
 from modelica_like.solve.initialize.steady import unsettled as unsettled

@@ -13,6 +13,7 @@ from modelica_like.solve.initialize.kept import find_kept, solve_kept
 from modelica_like.solve.initialize.point import Point, call
 from modelica_like.solve.initialize.slopes import slopes
 
+_NAMED = 3
 _NEAR = (
     "Give guesses near the steady motion, such as guess(100) for a speed; "
     "an operating point can also start from the end of a run."
@@ -60,6 +61,34 @@ def mode_not_steady(model: CompiledDae, point: Point, transition: CompiledTransi
         f"{mode.names[int(point.d[transition.mode])]}.",
         where=transition.source,
         advice=_NEAR,
+    )
+
+
+def memory_not_steady(model: CompiledDae, point: Point, before: Vector) -> InitializationError:
+    """Return the error of a point at rest that does not stay so when clocks tick: it names what ticks change."""
+    changed = [k for k, one in enumerate(model.flat_discretes) if point.d[k] != before[k] and not one.hidden]
+    moving = [k for k in changed if k in driving(model)] or changed
+    # A number of samples changes with them.
+    kept = [k for k in moving if model.flat_discretes[k].kind == "number"] or moving
+    names = [model.flat_discretes[k].path for k in kept]
+    return InitializationError(
+        f"No steady state was found at t = {point.t:g} s: {_listed(names)} "
+        f"{'change' if len(names) > 1 else 'changes'} at the next tick, and the motion with it.",
+        advice="What samplers keep is not solved for. Begin at the end of a run in which it has settled: "
+        'steady(drive, near=simulate(drive, "10 s")), --after 10s on the command line.',
+    )
+
+
+def _listed(names: list[str]) -> str:
+    more = " …" if len(names) > _NAMED else ""
+    return f"{' and '.join(names[:_NAMED])}{more}" if names else "what clocks set"
+
+
+def driving(model: CompiledDae) -> set[int]:
+    """Positions of the discrete values on which derivatives or implicit equations depend."""
+    return model.once(
+        "driving",
+        lambda: {*np.flatnonzero(ca.which_depends(_equations(model), model.arguments["d"], 1, False)).tolist()},
     )
 
 
