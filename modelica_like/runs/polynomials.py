@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -120,6 +120,39 @@ class Fitted:
             values[:, k] = values[:, k] @ _TO_SERIES.T @ legendre.legvander(places, _DEGREE).T
             begins[k], ends[k] = low, high
         return Fitted(begins, ends, values)
+
+    def cut(self, limits: Mapping[int, Vector]) -> tuple[Fitted, Any]:
+        """Return pieces in which expressions pass no limits: cut where they do.
+
+        Args:
+            limits: by the row of an expression.
+
+        Returns:
+            The pieces, and the position of that of which each is a part, shape (pieces,).
+        """
+        passes = [self._passes(row, level) for row, levels in limits.items() for level in levels]
+        count = len(self.begins)
+        owners = np.concatenate([np.arange(count), *(pieces for pieces, _ in passes)])
+        lows = np.concatenate([np.full(count, -1.0), *(places for _, places in passes)])
+        order = np.lexsort((lows, owners))
+        owners, lows = owners[order], lows[order]
+        highs = np.where(np.diff(owners, append=count) == 0, np.append(lows[1:], 1.0), 1.0)
+        values, parts = self.values[:, owners], np.flatnonzero((lows > -1.0) | (highs < 1.0))
+        places = lows[parts, None] + 0.5 * (1.0 + NODES) * (highs - lows)[parts, None]
+        values[:, parts] = np.einsum("nij,enj->eni", legendre.legvander(places, _DEGREE) @ _TO_SERIES, values[:, parts])
+        ends = np.where(highs < 1.0, self.times(owners, highs), self.ends[owners])
+        return Fitted(self.times(owners, lows), ends, values), owners
+
+    def _passes(self, row: int, level: float) -> tuple[Any, Vector]:
+        """Pieces and places in [-1, 1] where an expression passes a value."""
+        below = self._grid(row) < level
+        pieces, k = np.nonzero(below[:, 1:] != below[:, :-1])
+        low, high, rises = _GRID[k], _GRID[k + 1], below[pieces, k]
+        for _ in range(_BISECTIONS if len(pieces) else 0):
+            middle = 0.5 * (low + high)
+            before = (self.at(row, pieces, middle) < level) == rises
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        return pieces, high
 
     def places(self, row: int, levels: Vector) -> tuple[Any, Vector]:
         """Return the pieces and the places in [-1, 1] where a rising expression has values, both as the levels.

@@ -13,6 +13,7 @@ from components import (
     ConstantTorque,
     FirstOrder,
     Inertia,
+    Ramp,
     SecondOrder,
     Sine,
     SpringDamper,
@@ -103,6 +104,30 @@ def test_the_duty_of_each_gear() -> None:
     assert found.equivalent(3.0)["gear 2"] == pytest.approx(40.0)
     assert str(found).splitlines()[1] == "  gear 1: 3 s, 30 revolutions, 7.5398 kJ, up to 80 N.m"
     assert duty(simulate(drive, 6.0), "load.tau", "shaft.w").gears == ("all",)
+
+
+def test_the_duty_of_a_ramp() -> None:
+    """1.6 N.m/s·t on 1 kg.m²: w = 0.8 t², the angle is 0.8 t³/3, the work 1.6·0.8 t⁴/4; backwards as well."""
+    limits = np.linspace(0.0, 10.0, 17)
+    for sign in (1.0, -1.0):
+        parts = {"torque": Ramp(height=16.0 * sign, duration=10.0), "load": Torque(), "J": Inertia(J=1.0, phi=0, w=0)}
+        drive = Assembly("d", parts=parts, series={"s": ["load", "J"]}, connect={"t": ["torque.y", "load.tau"]})
+        found = duty(simulate(drive, 10.0), "load.tau", "J.w")
+        np.testing.assert_allclose(found.times, [np.full(16, 0.625)], rtol=1e-7)
+        np.testing.assert_allclose(found.revolutions, [np.diff(0.8 * limits**3 / 3 / (2 * pi))], rtol=1e-7)
+        np.testing.assert_allclose(found.work, [np.diff(1.6 * 0.8 * limits**4 / 4)], rtol=1e-7)
+
+
+def test_the_duty_of_a_torque_that_turns_a_shaft_back() -> None:
+    """A torque of 4 N.m·sin t on 1 kg.m² from -4 rad/s: w = -4 cos t; less than half of it acts for 4·π/6 s.
+
+    A period has 16 rad to and fro, one half of them under less than half of the torque: 4·4·sin(π/6).
+    """
+    parts = {"torque": Sine(amplitude=4.0, f=1 / (2 * pi)), "load": Torque(), "J": Inertia(J=1.0, phi=0.0, w=-4.0)}
+    drive = Assembly("d", parts=parts, series={"s": ["load", "J"]}, connect={"t": ["torque.y", "load.tau"]})
+    found = duty(simulate(drive, 2 * pi), "load.tau", "J.w", classes=2)
+    np.testing.assert_allclose(found.times, [[4 * pi / 6, 8 * pi / 6]], rtol=1e-6)
+    np.testing.assert_allclose(found.revolutions, [[16 / 2 / (2 * pi)] * 2], rtol=1e-6)
 
 
 # -- orders ------------------------------------------------------------------------------------------------------------

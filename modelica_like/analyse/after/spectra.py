@@ -9,13 +9,16 @@ import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import ValueOutOfRange, extra_module
-from modelica_like.runs.polynomials import WEIGHTS
+from modelica_like.runs.polynomials import WEIGHTS, Fitted
 from modelica_like.runs.results import along
 from modelica_like.runs.trajectories import Trajectories
 from modelica_like.style import COLOURS, picture, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+_ON_LIMIT = 1e-9
+"""Share of a class by which rounding may leave a torque below a limit, on which it counts for the class above."""
 
 
 @dataclass(frozen=True)
@@ -179,22 +182,25 @@ def duty(run: Trajectories, torque: str, speed: str, gear: str = "", classes: in
     if classes < 1:
         raise ValueOutOfRange(f"A duty needs at least one class of torque, not {classes}.")
     curves, _ = along(run, *map(run.path, (torque, speed, *[gear][: len(gear)])))
-    weights = (WEIGHTS * (curves.ends - curves.begins)[:, None]).ravel()
-    values = curves.values.reshape(len(curves.values), -1)
-    size, turning, power = np.abs(values[0]), np.abs(values[1]), values[0] * values[1]
-    top = float(size.max(initial=0.0)) or 1.0
-    which = np.minimum((size / top * classes).astype(int), classes - 1)
-    engaged = values[2] if gear else np.zeros(len(weights))
+    turned = Fitted(curves.begins, curves.ends, -curves.values)
+    top = max(curves.largest(0)[0], turned.largest(0)[0], 0.0) or 1.0
+    limits = top * np.arange(-classes + 1, classes) / classes
+    # Within a part the torque stays in its class and the speed keeps its sign.
+    parts, owners = curves.cut({0: limits, 1: np.zeros(1)})
+    lengths, means = parts.ends - parts.begins, parts.values @ WEIGHTS
+    power = (parts.values[0] * parts.values[1]) @ WEIGHTS
+    which = np.clip(np.abs(means[0]) / top * classes + _ON_LIMIT, 0, classes - 1).astype(int)
+    engaged = curves.values[2, owners, len(WEIGHTS) // 2] if gear else np.zeros(len(owners))
     gears, row = np.unique(engaged, return_inverse=True)
 
     def sorted_by(amounts: Vector) -> Vector:
         table = np.zeros((len(gears), classes))
-        np.add.at(table, (row, which), amounts * weights)
+        np.add.at(table, (row, which), amounts * lengths)
         return table
 
     torques = top * np.arange(1, classes + 1) / classes
-    return Duty(run.path(torque), _gears(run, gear, gears), torques, sorted_by(np.ones(len(weights))),
-                sorted_by(turning / (2 * np.pi)), sorted_by(power))  # fmt: skip
+    return Duty(run.path(torque), _gears(run, gear, gears), torques, sorted_by(np.ones(len(lengths))),
+                sorted_by(np.abs(means[1]) / (2 * np.pi)), sorted_by(power))  # fmt: skip
 
 
 def _gears(run: Trajectories, gear: str, values: Vector) -> tuple[str, ...]:
