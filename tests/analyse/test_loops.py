@@ -6,8 +6,19 @@ import control
 import numpy as np
 import pytest
 
-from components import PI, Constant, Damper, Fixed, Inertia, SpeedSensor, Torque
-from modelica_like import build, open_loop
+from components import (
+    PI,
+    Constant,
+    Damper,
+    Fixed,
+    Inertia,
+    LinearSpeedDependentTorque,
+    P,
+    SpeedSensor,
+    Torque,
+    ZeroOrderHold,
+)
+from modelica_like import Assembly, build, linearize, open_loop, simulate
 from modelica_like.errors import LanguageError, UnknownName
 from modelica_like.language import Component, Equations, connect, series
 from modelica_like.netlist import loads
@@ -79,6 +90,46 @@ def test_a_loop_beyond_its_gain_margin_is_not_stable() -> None:
     for factor, stable in ((0.99 * gain, True), (1.01 * gain, False)):
         drive = loads(text.replace('"J/(4*T)/k_phi"', f'"{factor!r}*J/(4*T)/k_phi"'))
         assert open_loop(drive, "speed_loop.y").margins().stable is stable
+
+
+def sampled_drive(k: float, signal: str = "s.w", **parts: Component) -> Assembly:
+    """A controller turns 1 kg.m² by k·(10 - what it samples every 0.1 s), of its speed or of another signal."""
+    given = {
+        "ref": Constant(k=10.0), "ctl": P(k=k), "hold": ZeroOrderHold(period=0.1), "drv": Torque(),
+        "rotor": Inertia(J=1.0, phi=0.0, w=0.0), **(parts or {"s": SpeedSensor()}),
+    }  # fmt: skip
+    wires = {"r": ["ref.y", "ctl.u_s"], "q": [signal, "hold.u"], "h": ["hold.y", "ctl.u_m"], "y": ["ctl.y", "drv.tau"]}
+    ends = ["load"] if "load" in parts else ["s"]
+    return Assembly("sampled", parts=given, series={"drive": ["drv", "rotor", *ends]}, connect=wires)
+
+
+def test_a_loop_that_passes_samples_is_not_told_to_be_stable() -> None:
+    """A sample later the speed is 1 - k·0.1 times as far from the wanted one: -2 for k = 30, ever further."""
+    drive = sampled_drive(30.0)
+    w = simulate(drive, 1.0)["rotor.w"]
+    assert w[-1] == pytest.approx(10 - 10 * (-2.0) ** 10, rel=1e-9)
+    for signal in ("hold.y", "ctl.y"):
+        found = open_loop(drive, signal, at=0.45).margins()
+        assert (found.stable, found.sampled) == (None, ("hold.last",))
+        assert found.lines()[-1] == (
+            "Whether the closed loop is stable is not told: hold.last is held constant, but sampled. Simulate it."
+        )
+    notice = (
+        "No clock ticks in these small motions: hold.last is held constant, and a loop that passes samples is open."
+    )
+    linear = linearize(drive, 0.45)
+    assert linear.notices == (notice,)
+    assert str(linear).endswith(notice)
+    assert str(linear.modes()).endswith(notice)
+
+
+def test_samples_that_follow_no_motion_leave_a_loop_as_it_is() -> None:
+    """What is sampled is constant; the load closes a loop of its own, of time constant J/d = 1/2 s."""
+    parts = {"other": Constant(k=3.0), "load": LinearSpeedDependentTorque(tau_nominal=-4.0, w_nominal=2.0)}
+    drive = sampled_drive(30.0, "other.y", **parts)
+    linear = linearize(drive, 0.45)
+    assert (linear.sampled, linear.notices) == ((), ())
+    assert min(linear.eigenvalues().real) == pytest.approx(-2.0, rel=1e-12)
 
 
 def test_pictures_show_margins_and_modes() -> None:

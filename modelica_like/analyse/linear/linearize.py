@@ -14,6 +14,7 @@ from modelica_like.native.start import initialize
 from modelica_like.runs.solution import Solution
 from modelica_like.simulation import Model, build, simulate
 from modelica_like.solve.initialize import Point, StartKind
+from modelica_like.solve.initialize.memory import sampled
 from modelica_like.solve.initialize.slopes import columns_of, nodes_of, slopes
 
 Drive = Model | Solution
@@ -65,7 +66,7 @@ def linearize(
 ) -> LinearModel:  # fmt: skip
     """Linearize a drive about a point of its motion, in the modes that are active there.
 
-    Surfaces that stick move as one: a held motion is not a state.
+    Surfaces that stick move as one: a held motion is not a state. What clocks set is constant; `sampled` names it.
 
     Args:
         drive: a component, a netlist file, a compiled model, or a solution.
@@ -98,7 +99,7 @@ def linearize(
     names = tuple(model.states[k] for k in keep)
     held = tuple(name for k, name in enumerate(model.states) if k not in kept)
     units = {name: _unit(model, name) for name in (*model.states, *u_names, *y_names)}
-    return LinearModel(model, point, a, b, c, d, names, held, u_names, y_names, units, shape)
+    return LinearModel(model, point, a, b, c, d, names, held, u_names, y_names, units, shape, sampled(model, nodes))
 
 
 def _unit(model: CompiledDae, name: str) -> str:

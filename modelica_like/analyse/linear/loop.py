@@ -16,6 +16,7 @@ from modelica_like.errors import LanguageError, ValueOutOfRange
 from modelica_like.flatten import flatten
 from modelica_like.language import Component
 from modelica_like.netlist import load
+from modelica_like.solve.initialize.memory import listed
 from modelica_like.structure import reduce
 
 _ROUNDS = 60
@@ -35,21 +36,27 @@ class Margins:
         gain: pairs of a frequency in Hz where the phase is -180\u00b0, and the factor that the gain may have there.
         phase: pairs of a frequency in Hz where the gain is one, and the lag in degrees that may come there.
         distance: frequency in Hz where the response is nearest to -1, and the distance.
-        stable: whether no eigenvalue of the closed loop has a positive real part.
+        stable: whether no eigenvalue of the closed loop has a positive real part; None where samples are held constant,
+            which decide that, too.
+        sampled: names of those.
     """
 
     gain: tuple[tuple[float, float], ...]
     phase: tuple[tuple[float, float], ...]
     distance: tuple[float, float]
-    stable: bool
+    stable: bool | None
+    sampled: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """Return a line for each margin."""
         lines = [f"gain margin {20 * np.log10(factor):.3g} dB at {f:.4g} Hz" for f, factor in self.gain]
         lines += [f"phase margin {lag:.3g}\u00b0 at {f:.4g} Hz" for f, lag in self.phase]
         lines.append(f"nearest to -1 at {self.distance[0]:.4g} Hz, by {self.distance[1]:.3g}")
-        lines.append("The closed loop is stable." if self.stable else "The closed loop is not stable.")
-        return [line.replace("-", "\u2212") for line in lines]
+        lines = [line.replace("-", "\u2212") for line in lines]
+        if self.stable is None:
+            held = f"{listed(self.sampled)} {'is' if len(self.sampled) == 1 else 'are'} held constant"
+            return [*lines, f"Whether the closed loop is stable is not told: {held}, but sampled. Simulate it."]
+        return [*lines, "The closed loop is stable." if self.stable else "The closed loop is not stable."]
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
@@ -74,7 +81,8 @@ class Loop(LinearModel):
         closed = self.A - self.B @ self.C / (1 + self.D)
         values = np.linalg.eigvals(closed) if len(closed) else np.zeros(0)
         stable = bool(np.all(values.real <= _STILL * np.abs(values).max(initial=0.0)))
-        return Margins(tuple(turned), tuple(phases), (float(f[k]), float(abs(1 + gains[k]))), stable)
+        near = float(f[k]), float(abs(1 + gains[k]))
+        return Margins(tuple(turned), tuple(phases), near, None if self.sampled else stable, self.sampled)
 
 
 def _crossings(f: Any, values: Any, at: Callable[[float], float]) -> list[float]:

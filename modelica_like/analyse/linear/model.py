@@ -13,6 +13,7 @@ from modelica_like.analyse.linear.pictures import bode, mode_name, nyquist
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import extra_module
 from modelica_like.solve.initialize import Point, variable_slopes
+from modelica_like.solve.initialize.memory import listed
 from modelica_like.solve.initialize.slopes import implicit_slopes, nodes_of
 from modelica_like.style import COLOURS, picture, text_width
 from modelica_like.upper import Shown
@@ -45,6 +46,8 @@ class LinearModel(Shown):
         outputs: names of variables.
         units: coherent SI unit of every name.
         shape: deviations of all states of the model by those of `states`, shape (all states, states).
+        sampled: names of discrete values that clocks set from the motion, on which motion or outputs depend: they are
+            constant here, as if no clock ticked.
     """
 
     model: CompiledDae = field(repr=False)
@@ -59,6 +62,15 @@ class LinearModel(Shown):
     outputs: tuple[str, ...]
     units: dict[str, str] = field(repr=False)
     shape: Vector = field(repr=False)
+    sampled: tuple[str, ...] = ()
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What the linear model leaves out."""
+        if not self.sampled:
+            return ()
+        held = f"{listed(self.sampled)} {'is' if len(self.sampled) == 1 else 'are'} held constant"
+        return (f"No clock ticks in these small motions: {held}, and a loop that passes samples is open.",)
 
     @property
     def time(self) -> float:
@@ -150,7 +162,7 @@ class LinearModel(Shown):
             names = getattr(self, title)
             shown = [f"{name} [{self.units[name]}]" for name in names[:_SHOWN]]
             lines += [f"  {title}: {', '.join([*shown, '…'] if len(names) > _SHOWN else shown)}"] if names else []
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"  {notice}" for notice in self.notices)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,7 +274,7 @@ class Modes(Shown, Sequence[Mode]):
 
     def __str__(self) -> str:
         head = f"Modes of {self.linear.model.name} at t = {self.linear.time:g} s"
-        return "\n".join([head, *(f"  {k + 1}  {mode}" for k, mode in enumerate(self.modes))])
+        return "\n".join([head, *(f"  {k + 1}  {mode}" for k, mode in enumerate(self.modes)), *self.linear.notices])
 
 
 def _mode(linear: LinearModel, value: complex, right: Vector, left: Vector, energies: _Energies) -> Mode:

@@ -73,6 +73,7 @@ def modes_report(modes: Modes) -> RenderableType:
     parts: list[RenderableType] = [head, "", tables]
     if linear.held:
         parts.append(f"[dim]Held by modes that are active there: {escape(', '.join(linear.held))}.[/]")
+    parts += map(escape, linear.notices)
     return Group(*parts)
 
 

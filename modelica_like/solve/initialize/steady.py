@@ -10,10 +10,10 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.errors import InitializationError
 from modelica_like.solve.initialize.kept import find_kept, solve_kept
+from modelica_like.solve.initialize.memory import driving, listed
 from modelica_like.solve.initialize.point import Point, call
 from modelica_like.solve.initialize.slopes import slopes
 
-_NAMED = 3
 _NEAR = (
     "Give guesses near the steady motion, such as guess(100) for a speed; "
     "an operating point can also start from the end of a run."
@@ -72,23 +72,10 @@ def memory_not_steady(model: CompiledDae, point: Point, before: Vector) -> Initi
     kept = [k for k in moving if model.flat_discretes[k].kind == "number"] or moving
     names = [model.flat_discretes[k].path for k in kept]
     return InitializationError(
-        f"No steady state was found at t = {point.t:g} s: {_listed(names)} "
+        f"No steady state was found at t = {point.t:g} s: {listed(names) or 'what clocks set'} "
         f"{'change' if len(names) > 1 else 'changes'} at the next tick, and the motion with it.",
         advice="What samplers keep is not solved for. Begin at the end of a run in which it has settled: "
         'steady(drive, near=simulate(drive, "10 s")), --after 10s on the command line.',
-    )
-
-
-def _listed(names: list[str]) -> str:
-    more = " …" if len(names) > _NAMED else ""
-    return f"{' and '.join(names[:_NAMED])}{more}" if names else "what clocks set"
-
-
-def driving(model: CompiledDae) -> set[int]:
-    """Positions of the discrete values on which derivatives or implicit equations depend."""
-    return model.once(
-        "driving",
-        lambda: {*np.flatnonzero(ca.which_depends(_equations(model), model.arguments["d"], 1, False)).tolist()},
     )
 
 

@@ -1,0 +1,71 @@
+"""The memory of samplers: discrete values that clocks set from the motion, and motions that depend on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae
+
+_NAMED = 3
+
+
+def clocks(model: CompiledDae) -> dict[int, int]:
+    """Return the entries of d that count the ticks of clocks, and the numbers of their new values among the resets."""
+    ticks = (one for one in model.events.transitions if one.timed and one.target in one.sources)
+    return {reset.index: reset.value for one in ticks for reset in one.resets if reset.kind == "discrete"}
+
+
+def memory(model: CompiledDae) -> dict[int, int]:
+    """Return the entries of d that ticks set from the motion, and the rows of the updates that give their values.
+
+    What ticks set from nothing else, such as numbers of ticks and random numbers, does not follow the motion.
+    """
+    return model.once("memory", lambda: _memory(model))
+
+
+def _memory(model: CompiledDae) -> dict[int, int]:
+    if not (ticks := clocks(model)):
+        return {}
+    updates = model.events.updates
+    moving, of_d = depends(updates, "x").any(axis=1) | depends(updates, "z").any(axis=1), depends(updates, "d")
+    # The `pre` of a memory is that memory, before.
+    own = {
+        row.reset.index: k
+        for k, row in enumerate(model.events.update_rows)
+        if row.reset.kind == "discrete" and of_d[k, [*ticks]].any() and not model.flat_discretes[row.reset.index].hidden
+    }
+    found: dict[int, int] = {}
+    while more := {e: k for e, k in own.items() if e not in found and (moving[k] or of_d[k, [*found]].any())}:
+        found |= more
+    return dict(sorted(found.items()))
+
+
+def depends(function: ca.Function, name: str) -> Any:
+    """Return which results of a function of the model depend on which entries of an argument, as booleans."""
+    pattern = function.jac_sparsity(0, function.index_in(name))
+    found = np.zeros(pattern.shape, bool)
+    found[pattern.row(), pattern.get_col()] = True
+    return found
+
+
+def driving(model: CompiledDae) -> set[int]:
+    """Return the entries of d on which derivatives or implicit equations depend."""
+    functions = model.equations.ode, model.equations.alg
+    make = lambda: {k for one in functions for k in np.flatnonzero(depends(one, "d").any(axis=0)).tolist()}  # noqa: E731
+    return model.once("driving", make)
+
+
+def sampled(model: CompiledDae, nodes: Iterable[int]) -> tuple[str, ...]:
+    """Return the memory on which the motion, or one of some variables, depends, by path."""
+    read = {*np.flatnonzero(depends(model.equations.variables, "d")[[*nodes]].any(axis=0)).tolist()}
+    return tuple(model.flat_discretes[k].path for k in memory(model) if k in read | driving(model))
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return the first names as words."""
+    first = [*names]
+    return " and ".join(first[:_NAMED]) + (" …" if len(first) > _NAMED else "")
