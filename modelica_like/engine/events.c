@@ -7,6 +7,7 @@
 #define BALANCED 1e-3
 #define SAME_TIME 1e-12
 #define LATER 1e3     /* time resolutions, for the difference of a rate: what turns round in less is at rest */
+#define NEVER 1e29    /* s: a moment that does not come */
 #define CONVERGES 0.9 /* length of a crowd over the one before: rebounds come to their end, chattering does not */
 #define CROWDED 1e-6  /* of the run: in less time, CROWD further instants follow each other ever faster */
 
@@ -192,17 +193,32 @@ int count_clocks(const Instance *c) {
     return count;
 }
 
-/* Lets every clock tick once, at whatever time, and nothing else happen. `step` gets the shortest time to another
- * tick. */
+/* Marks what happens when all clocks tick, at whatever time: they, and state events that are due, but no end of a run. */
+static void find_ticking(Instance *c, const double *moments, unsigned char *wanting) {
+    const Model *m = c->model;
+    unsigned char *changed = memset(c->changed, 0, (size_t)m->n_modes);
+    if (m->n_guards > 0) evaluate_now(c, &m->tapes.guards, c->guards);
+    for (int k = 0; k < m->n_transitions; k++) {
+        const Transition *one = &m->transitions[k];
+        int due = !one->timed && !one->ends && is_source(c, one) && c->guards[one->index] > 0;
+        wanting[k] = !changed[one->mode] && (due || (ticks(c, one) && moments[one->index] < NEVER));
+        changed[one->mode] |= wanting[k];
+    }
+}
+
+/* Lets every clock tick once. `step` gets the shortest time to another tick. */
 Result tick(Instance *c, double *step) {
     const Model *m = c->model;
     double *before = c->outputs, *after = c->guards, *values = c->reset_values, events = c->state.n_events;
+    unsigned char *wanting = nothing_wanting(c);
     int count = 0, changes = 1;
     evaluate_now(c, &m->tapes.moments, before);
+    find_ticking(c, before, wanting);
     evaluate_now(c, &m->tapes.resets, values);
+    for (int k = 0; k < m->n_transitions; k++)
+        if (wanting[k]) c->d[m->transitions[k].mode] = m->transitions[k].target;
     for (const Reset *one = m->resets; one < m->resets + m->n_resets; one++)
-        if (ticks(c, &m->transitions[one->transition]))
-            take_value(c, one, values[one->value] / one->factor, c->d, &count);
+        if (wanting[one->transition]) take_value(c, one, values[one->value] / one->factor, c->d, &count);
     if (count > 0) move_states(c, c->targets, c->target_values, count);
     for (int round = 0; round < ROUNDS && changes; round++)
         if (!update_once(c, &changes)) return RESULT_ERROR;
@@ -211,7 +227,8 @@ Result tick(Instance *c, double *step) {
     *step = INFINITY;
     for (int k = 0; k < m->n_transitions; k++) {
         const Transition *one = &m->transitions[k];
-        if (ticks(c, one)) *step = fmin(*step, after[one->index] - before[one->index]);
+        double next = one->timed ? after[one->index] : INFINITY;
+        if (ticks(c, one) && next < NEVER) *step = fmin(*step, next - fmax(before[one->index], c->state.t));
     }
     return changes ? fail(c, NOT_SETTLED, c->state.t, ROUNDS) : share_and_solve(c);
 }

@@ -169,6 +169,18 @@ EXPORTED int native_steady_near(Native *n, const double *x, const double *z, con
     return code(steady_near(n->c));
 }
 
+/* Lets every clock tick once at a steady state, or tells whether it stays one when they do. */
+EXPORTED int native_tick(Native *n, const double *x, const double *z, const double *d) {
+    double step;
+    go_to(n->c, x, z, d);
+    return code(tick(n->c, &step));
+}
+
+EXPORTED int native_check_ticks(Native *n, const double *x, const double *z, const double *d) {
+    go_to(n->c, x, z, d);
+    return code(check_ticks(n->c));
+}
+
 /* What is shared at a point in its modes, and what stops that has begun to be held, as strike_here says. */
 EXPORTED void native_share(Native *n, const double *x, const double *z, const double *d) {
     go_to(n->c, x, z, d);

@@ -82,7 +82,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "get": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),
     "begin": (_CODE, [_POINTER]),
     "start": (_CODE, [_POINTER]),
-    **dict.fromkeys(("begin_at", "steady_near"), (_CODE, 4 * [_POINTER])),
+    **dict.fromkeys(("begin_at", "steady_near", "tick", "check_ticks"), (_CODE, 4 * [_POINTER])),
     "share": (None, 4 * [_POINTER]),
     "strike": (_CODE, 7 * [_POINTER]),
     "states": (_CODE, 3 * [_POINTER]),

@@ -47,6 +47,59 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
         )
     if start == "steady":
         model.refuse_delays(InitializationError, f"{model.name} cannot start in the steady state")
+    instance, code = _found(model, t0, start)
+    instance.check(code)
+    return instance.present()
+
+
+def steady_between_ticks(model: CompiledDae) -> Point:
+    """Find a steady state as `initialize` does, for what samplers keep at the start or after some ticks.
+
+    Raises:
+        InitializationError: there is none.
+    """
+    model.refuse_delays(InitializationError, f"{model.name} cannot start in the steady state")
+    instance, code = _found(model, 0.0, "steady")
+    instance.check(OK if instance.failed == Code.MEMORY_NOT_STEADY else code)
+    return instance.present()
+
+
+def steady_near(model: CompiledDae, near: Point) -> Point:
+    """Find the steady state near a point, in its modes and with what samplers keep there.
+
+    Raises:
+        InitializationError: there is none.
+    """
+    return _after(model, "steady_near", near)
+
+
+def ticked(model: CompiledDae, point: Point) -> Point:
+    """Return a steady state after every clock has ticked once.
+
+    Raises:
+        ModelicaLikeError: what clocks set does not settle.
+    """
+    return _after(model, "tick", point)
+
+
+def check_ticks(model: CompiledDae, point: Point) -> None:
+    """Refuse a steady state that does not stay one when clocks tick.
+
+    Raises:
+        InitializationError: it does not; the message names what changes.
+    """
+    _after(model, "check_ticks", point)
+
+
+def _after(model: CompiledDae, function: str, point: Point) -> Point:
+    """Return where a function of the run-time ends that goes to a point."""
+    instance = _instance(model, point.t, "steady")
+    instance.check(instance.at(getattr(instance.library, function), point))
+    return instance.present()
+
+
+def _found(model: CompiledDae, t0: float, start: StartKind) -> tuple[Instance, int]:
+    """Start by one plan after the other, until one is that of the start that it gives."""
     instance, code = _started(model, t0, start, None)
     for _ in range(_PLANS):
         if code != OK and instance.failed not in _BY_PLAN:
@@ -55,19 +108,7 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
         if plan.choice == instance.native.plan.choice:
             break
         instance, code = _started(model, t0, start, plan)
-    instance.check(code)
-    return instance.present()
-
-
-def steady_near(model: CompiledDae, near: Point) -> Point:
-    """Find the steady state near a point, in its modes.
-
-    Raises:
-        InitializationError: there is none.
-    """
-    instance = _instance(model, near.t, "steady")
-    instance.check(instance.at(instance.library.steady_near, near))
-    return instance.present()
+    return instance, code
 
 
 def _started(model: CompiledDae, t0: float, start: StartKind, plan: StartPlan | None) -> tuple[Instance, int]:

@@ -6,20 +6,51 @@ import numpy as np
 import pytest
 
 from components import (
+    AngleSensor,
     BearingFriction,
     Clutch,
+    Constant,
     ConstantTorque,
     Freewheel,
+    FrequencyMeter,
     Inertia,
+    LinearSpeedDependentTorque,
     LossyGear,
+    P,
+    PulseCounter,
+    PulseSensor,
     SpeedDependentLoad,
+    SpeedSensor,
     SpringDamper,
+    Torque,
+    UniformNoise,
+    ZeroOrderHold,
 )
 from modelica_like import Assembly, build, simulate
 from modelica_like.analyse.operating.curves import characteristic
-from modelica_like.analyse.operating.steady import steady
+from modelica_like.analyse.operating.steady import steady, steady_slopes
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange
-from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, series, var
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Input,
+    Output,
+    Parameter,
+    Variable,
+    clock,
+    der,
+    discrete,
+    guess,
+    param,
+    pre,
+    series,
+    signal_in,
+    signal_out,
+    var,
+    when,
+)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Document 002, set A: the measured speed line and the no-load current exactly.
@@ -254,3 +285,117 @@ def test_drives_with_friction_at_both_ends_turn_steadily(line):
     found = steady(Assembly("drive", parts=parts, series={"line": ("motor", *line, "load")}))
     assert found["table.w"] == pytest.approx(2.0 * (0.9 * 10.0 - 0.1))
     assert found["rotor.w"] == pytest.approx(2.0 * found["table.w"])
+
+
+# -- samplers ----------------------------------------------------------------------------------------------------------
+
+LOAD = 2.0
+"""Torque of the load over the speed in N.m.s."""
+
+
+def turned(wires, w=0.0, **parts):
+    """A torque turns 1 kg.m² under a load; blocks make it of the speed, which a sensor tells."""
+    given = {
+        "drv": Torque(), "rotor": Inertia(J=1.0, phi=0.0, w=w), "s": SpeedSensor(), **parts,
+        "load": LinearSpeedDependentTorque(tau_nominal=-2.0 * LOAD, w_nominal=2.0),
+    }  # fmt: skip
+    wires = {f"w{k}": wire.split() for k, wire in enumerate(wires)} | {"l": ["load.flange", "rotor.flange_b"]}
+    return Assembly("turned", parts=given, series={"line": ["drv", "rotor", "s"]}, connect=wires)
+
+
+def controlled(k, **parts):
+    """Torque k·(ref - speed as it was sampled)."""
+    wires = ["ref.y ctl.u_s", "s.w hold.u", "hold.y ctl.u_m", "ctl.y drv.tau"]
+    return turned(wires, **{"ref": Constant(k=10.0), "ctl": P(k=k), "hold": ZeroOrderHold(period=0.1), **parts})
+
+
+class Adding(Component):
+    """Adds up k times what it is from 10 at each tick: a digital integral controller."""
+
+    units_checked = False
+    u: Input = signal_in("*", "speed")
+    y: Output = signal_out("*", "torque")
+    k: Parameter = param("1", "gain of a sample", default=0.5)
+    sum: Discrete = discrete("*", "what was added up")
+
+    def equations(self) -> Equations:
+        yield self.y == self.sum
+
+    def events(self) -> Events:
+        yield when(clock(0.1), {self.sum: pre(self.sum) + self.k * (10 - self.u)})
+
+
+@pytest.mark.parametrize("k", [1.0, 5.0, 30.0])
+def test_what_samplers_keep_is_steady_too(k):
+    """k·(10 - w) = 2·w, whether the sampled loop gets there (k = 1) or runs away (k = 30)."""
+    found = steady(controlled(k))
+    assert found["rotor.w"] == pytest.approx(10 * k / (k + LOAD), rel=1e-12)
+    assert (found["hold.last"], found["hold.y"]) == pytest.approx(2 * (found["rotor.w"],), rel=1e-12)
+
+
+def test_parameters_are_found_through_samplers():
+    """3 rad/s ask for 5·(ref - 3) = 2·3; a curve follows w = 5·ref/7."""
+    found = steady(controlled(5.0), hold={"rotor.w": 3.0}, by="ref.k")
+    assert found["ref.k"] == pytest.approx(4.2, rel=1e-12)
+    curves = characteristic(controlled(5.0), {"ref.k": [1.0, 10.0]})
+    np.testing.assert_allclose(curves["rotor.w"], [5 / 7, 50 / 7], rtol=1e-12)
+    curves = characteristic(controlled(5.0), {"rotor.w": [1.0, 10.0]}, by="ref.k")
+    np.testing.assert_allclose(curves["ref.k"], [7 / 5, 70 / 5], rtol=1e-12)
+
+
+def test_the_slopes_of_steady_states_pass_samplers():
+    """w = k·ref/(k + 2): by k 2·ref/(k + 2)², by ref k/(k + 2)."""
+    found = steady(controlled(5.0))
+    slopes = steady_slopes(found.model, found.point, ["rotor.w", "hold.y"], ["ctl.k", "ref.k"])
+    np.testing.assert_allclose(slopes, 2 * [[20 / 49, 5 / 7]], rtol=1e-12)
+
+
+def test_a_run_that_has_not_settled_is_a_beginning_only():
+    drive = controlled(5.0)
+    found = steady(drive, near=simulate(drive, 0.35))
+    assert found["rotor.w"] == pytest.approx(50 / 7, rel=1e-12)
+
+
+def test_a_sampled_integral_leaves_no_error():
+    found = steady(turned(["s.w ctl.u", "ctl.y drv.tau"], ctl=Adding()))
+    assert (found["rotor.w"], found["ctl.sum"]) == pytest.approx((10.0, 10.0 * LOAD), rel=1e-12)
+
+
+def test_samples_of_a_given_signal_and_samples_of_samples():
+    """2·w = ref after both; and what is sampled for display only is read as it is after ticks."""
+    parts = {"ref": Constant(k=10.0), "first": ZeroOrderHold(period=0.1), "second": ZeroOrderHold(period=0.03)}
+    wires = ["ref.y first.u", "first.y second.u", "second.y drv.tau", "s.w shown.u"]
+    drive = turned(wires, **parts, shown=ZeroOrderHold(period=0.5))
+    found = steady(drive)
+    assert (found["rotor.w"], found["shown.y"]) == pytest.approx((5.0, 5.0), rel=1e-12)
+    assert steady(drive, hold={"shown.y": 3.0}, by="ref.k")["ref.k"] == pytest.approx(6.0, rel=1e-12)
+
+
+def test_a_start_that_samples_would_move_is_refused():
+    drive = controlled(5.0)
+    for solver in ("native", "idas"):
+        with pytest.raises(InitializationError, match=r"hold\.last changes at the next tick, and the motion with it"):
+            simulate(drive, 1.0, start="steady", solver=solver)
+    # Nothing moves, and nothing will.
+    still = simulate(controlled(5.0, ref=Constant(k=0.0)), 1.0, start="steady")
+    assert np.abs(still["rotor.w"]).max() == 0.0
+
+
+METERED = ["a.flange rotor.flange_b", "meter.y ctl.u_m", "ref.y ctl.u_s", "ctl.y drv.tau"]
+METER = {"ref": Constant(k=10.0), "ctl": P(k=5.0), "a": AngleSensor(), "meter": FrequencyMeter(period=0.1)}
+PULSES = ["hall.flange rotor.flange_b", "hall.y count.u", "count.y meter.u", *METERED]
+NOISE = {"noise": UniformNoise(period=0.1, y_min=-1.0, y_max=1.0)}
+
+
+@pytest.mark.parametrize(
+    ("drive", "named"),
+    [
+        (lambda: turned(["noise.y drv.tau"], **NOISE), "noise.uniform"),
+        (lambda: turned(["a.phi meter.u", *METERED], **METER), "meter.last"),
+        (lambda: turned(PULSES, **METER, hall=PulseSensor(n=4), count=PulseCounter(u_high=0.5)), "meter.last"),
+    ],
+)
+def test_what_never_settles_is_named(drive, named):
+    """Noise, and the speed of an angle or of pulses that are sampled: they grow from tick to tick."""
+    with pytest.raises(InitializationError, match=named):
+        steady(drive())

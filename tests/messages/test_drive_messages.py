@@ -29,17 +29,22 @@ from modelica_like.flatten import flatten
 from modelica_like.language import (
     Assembly,
     Component,
+    Discrete,
     Equations,
+    Events,
     Expr,
     Input,
     Parameter,
     Variable,
+    clock,
     connect,
     der,
+    discrete,
     param,
     series,
     signal_in,
     var,
+    when,
 )
 from modelica_like.native.start import initialize
 from modelica_like.structure import reduce
@@ -82,6 +87,20 @@ class Parabola(Component):
 
     def stored_energy(self) -> Expr:
         return self.E * self.y**2
+
+
+class Sampling(Component):
+    """At rest at x = 1 while nothing is sampled, and nowhere near it after a tick."""
+
+    x: Variable = var("1", "x")
+    last: Discrete = discrete("1", "sample of x")
+    T: Parameter = param("s", "time", default=1.0)
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == 1 - self.x - 2 * self.last
+
+    def events(self) -> Events:
+        yield when(clock(self.T), {self.last: self.x})
 
 
 class Wires(Component):
@@ -368,6 +387,15 @@ case(
 No steady state was found at t = 0 s: load.w keeps changing.
 Check that the drive has an equilibrium. Give guesses near the steady motion, such as guess(100) for \
 a speed; an operating point can also start from the end of a run.""",
+)
+case(
+    errors.InitializationError,
+    "samples that do not stay",
+    lambda: initialize(build(Sampling()), start="steady"),
+    """\
+No steady state was found at t = 0 s: last changes at the next tick, and the motion with it.
+A run of this drive starts as given or at rest. An operating point may be found from the end of a run: \
+steady(drive, near=simulate(drive, "10 s")), --after 10s on the command line.""",
 )
 
 

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.analyse.operating.sampling import change_with_samples, with_samples
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import to_si
-from modelica_like.native.start import initialize, steady_near
+from modelica_like.native.start import steady_between_ticks, steady_near
 from modelica_like.runs.trajectories import Trajectories
 from modelica_like.simulation import Model, build
 from modelica_like.solve.initialize import Point, call, holding
 from modelica_like.solve.initialize.slopes import Sizes, columns_of, nodes_of, slopes
-from modelica_like.solve.initialize.steady import steady_change
 from modelica_like.upper import Shown
 
 _MAX_NEWTON = 40
@@ -130,13 +130,13 @@ def steady(
 
 
 def _settle(model: CompiledDae, near: Point | None) -> Point:
-    if near is None:
-        return initialize(model, 0.0, "steady")
-    try:
-        return steady_near(model, near)
-    except InitializationError:
-        # The modes of the neighbour are not valid here.
-        return initialize(model, 0.0, "steady")
+    if near is not None:
+        try:
+            return with_samples(model, steady_near(model, near))
+        except InitializationError:
+            # The modes of the neighbour are not valid here.
+            pass
+    return with_samples(model, steady_between_ticks(model))
 
 
 class _Target:
@@ -214,4 +214,5 @@ def steady_slopes(model: CompiledDae, point: Point, paths: Sequence[str], free: 
     """Total derivative of variables of steady states by parameters, shape (variables, parameters)."""
     variables = slopes(model, point, "variables", nodes_of(model, paths))
     theta = np.eye(Sizes.of(model).theta)[:, columns_of(model, free)]
-    return variables.x @ steady_change(model, point, theta) + variables.theta @ theta
+    states, theta = change_with_samples(model, point, theta)
+    return variables.x @ states + variables.theta @ theta

@@ -19,19 +19,26 @@ def clocks(model: CompiledDae) -> dict[int, int]:
     return {reset.index: reset.value for one in ticks for reset in one.resets if reset.kind == "discrete"}
 
 
-def memory(model: CompiledDae) -> dict[int, int]:
-    """Return the entries of d that ticks set from the motion, and the rows of the updates that give their values.
+def settling(model: CompiledDae) -> dict[int, int]:
+    """Return the entries of d that ticks set from anything but themselves, and the rows of the updates for them.
 
-    What ticks set from nothing else, such as numbers of ticks and random numbers, does not follow the motion.
+    Numbers of ticks and random numbers never settle.
     """
-    return model.once("memory", lambda: _memory(model))
+    return model.once("settling", lambda: _set_by_ticks(model, "xzpu"))
 
 
-def _memory(model: CompiledDae) -> dict[int, int]:
+def memory(model: CompiledDae) -> dict[int, int]:
+    """Return those entries of d that ticks set from the motion."""
+    return model.once("memory", lambda: _set_by_ticks(model, "xz"))
+
+
+def _set_by_ticks(model: CompiledDae, arguments: str) -> dict[int, int]:
+    """Return what ticks set from some arguments of the model, or from what they set from these."""
     if not (ticks := clocks(model)):
         return {}
     updates = model.events.updates
-    moving, of_d = depends(updates, "x").any(axis=1) | depends(updates, "z").any(axis=1), depends(updates, "d")
+    of_d = depends(updates, "d")
+    moving = np.any([depends(updates, name).any(axis=1) for name in arguments], axis=0)
     # The `pre` of a memory is that memory, before.
     own = {
         row.reset.index: k

@@ -74,7 +74,7 @@ def memory_not_steady(model: CompiledDae, point: Point, before: Vector) -> Initi
     return InitializationError(
         f"No steady state was found at t = {point.t:g} s: {listed(names) or 'what clocks set'} "
         f"{'change' if len(names) > 1 else 'changes'} at the next tick, and the motion with it.",
-        advice="What samplers keep is not solved for. Begin at the end of a run in which it has settled: "
+        advice="A run of this drive starts as given or at rest. An operating point may be found from the end of a run: "
         'steady(drive, near=simulate(drive, "10 s")), --after 10s on the command line.',
     )
 
