@@ -19,7 +19,7 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.edges import kinks_of
 from modelica_like.errors import NoGradient
 from modelica_like.solve.initialize import Point, call, solve_implicit
-from modelica_like.solve.initialize.slopes import slopes
+from modelica_like.solve.initialize.slopes import Slopes, slopes
 from modelica_like.solve.recorder import Segment
 
 _DIFFERENCES = (ca.OP_LT, ca.OP_LE, ca.OP_FMIN, ca.OP_FMAX)
@@ -65,6 +65,10 @@ class Kinks:
             return np.zeros(0)
         fast = model.fast(self._key, lambda: self._function)
         return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
+
+    def slopes(self, at: Point, number: int) -> Slopes:
+        """Value, derivatives and rate of one of the functions at a point."""
+        return slopes(self.model, at, f"{self._key}", [number], lambda: self._function)
 
     def passed(self, before: Vector, after: Vector) -> Any:
         """Which kinks lie between two points (or rows of points), but not at the first of them.
@@ -134,7 +138,7 @@ class Kinks:
             )
         else:
             return None
-        kink = slopes(model, at, f"{self._key}", [number], lambda: self._function)
+        kink = self.slopes(at, number)
         if not kink.rate[0]:
             raise reason  # nothing tells which parameters move it
         return Coincidence(-kink.by[0] / kink.rate[0], SAME * size, reason)

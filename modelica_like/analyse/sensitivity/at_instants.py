@@ -12,7 +12,7 @@ import numpy as np
 from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.edges import Edge
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.sensitivity.replayed import along
+from modelica_like.analyse.sensitivity.values import along
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledTransition
 from modelica_like.compile.soon import time_resolution

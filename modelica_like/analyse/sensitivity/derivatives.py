@@ -15,9 +15,10 @@ from modelica_like.analyse.sensitivity.at_instants import at_instants
 from modelica_like.analyse.sensitivity.at_kinks import Candidate, Sides, kinks, natural_size
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
 from modelica_like.analyse.sensitivity.of_formulas import formula_kinks, formulas
-from modelica_like.analyse.sensitivity.replayed import read_off, value_at
+from modelica_like.analyse.sensitivity.replayed import read_off
 from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.analyse.sensitivity.result import Sensitivities as Sensitivities
+from modelica_like.analyse.sensitivity.values import value_at
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, NoGradient, UnknownName, did_you_mean

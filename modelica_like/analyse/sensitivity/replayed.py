@@ -5,23 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.replay.step import Step, shortened
-from modelica_like.compile.buffers import Vector
-from modelica_like.compile.compiled import CompiledDae
+from modelica_like.analyse.replay.step import shortened
+from modelica_like.analyse.sensitivity.extremes import STILL, extreme
+from modelica_like.analyse.sensitivity.values import along, slopes_of, value_at
 from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange
-from modelica_like.runs.readings import CONDITIONS, INTEGRATED, Output, expression_of, met
+from modelica_like.runs.readings import CONDITIONS, INTEGRATED, Output, met
 from modelica_like.runs.solution import Solution
 from modelica_like.solve.initialize import Point
-from modelica_like.solve.initialize.slopes import Slopes, slopes
-
-_NEAR = 0.05
-_FLAT = 1e-12
-_STILL = 1e-11
 
 
 def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> list[Reading]:
@@ -45,7 +39,7 @@ def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> l
         elif output.kind in ("max", "min", "peak"):
             signs = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}[output.kind]
             largest = max(
-                (_scaled(_peak(replay, output.path, sign), sign) for sign in signs), key=lambda peak: peak.value
+                (_scaled(extreme(replay, output.path, sign), sign) for sign in signs), key=lambda peak: peak.value
             )
             readings.append(_scaled(largest, -1.0 if output.kind == "min" else 1.0))
         else:
@@ -85,10 +79,10 @@ def _first(replay: Replay, output: Output) -> Reading:
         values = [(point.t - move.before.t, value(point)) for point in points]
         for low, high in pairwise(values):
             if met(output.kind, high[1]) and not met(output.kind, low[1]):
-                step = shortened(move, value, low, high, _STILL)
+                step = shortened(move, value, low, high, STILL)
                 # Without a length it is where the step begins, as where another condition has split it.
                 node = replay.at(move.before.t + low[0]) if step is None else replay.split(k, step)
-                part = _slopes(replay, output.path, node)
+                part = slopes_of(replay, output.path, node)
                 return Reading(node.t, ((node, -part.by[0] / float(part.rate[0])),))
     raise UnknownName(f"'{output.name}' does not happen in this run.")
 
@@ -96,23 +90,6 @@ def _first(replay: Replay, output: Output) -> Reading:
 def _at_jump(jump: Jump) -> Reading:
     trigger = jump.time()
     return Reading(jump.before.t + trigger.shift, ((jump.before, trigger.by),))
-
-
-def value_at(replay: Replay, path: str, node: Point, jump: Jump | None = None) -> Reading:
-    """Read a variable at a node, or at a jump that moves with it."""
-    part = _slopes(replay, path, node)
-    parts = [(node, part.by[0])]
-    if jump is not None:
-        parts.append((jump.before, float(part.rate[0]) * jump.time().by))
-    return Reading(float(part.value[0]), tuple(parts))
-
-
-def _slopes(replay: Replay, path: str, node: Point) -> Slopes:
-    return slopes(replay.model, node, f"value of {path}", None, lambda: _function(replay.model, path))
-
-
-def _function(model: CompiledDae, path: str) -> ca.Function:
-    return ca.Function("value", [*model.arguments.values()], [ca.densify(ca.SX(expression_of(model, path)[0]()))])
 
 
 def _check_impacts(solution: Solution, outputs: Sequence[Output]) -> None:
@@ -152,48 +129,3 @@ def _node_of(replay: Replay, output: Output) -> Point:
     if not first <= output.moment <= last:
         raise ValueOutOfRange(f"{output.name}: the run goes from {first:g} s to {last:g} s.")
     return replay.at(output.moment)
-
-
-def _peak(replay: Replay, path: str, sign: float) -> Reading:
-    """Read the largest (`sign` 1) or smallest (-1) value along a replay.
-
-    Candidates are the nodes and the stages in between; near the best ones, zeros of the rate are located.
-    """
-    rate: Callable[[Point], float] = lambda point: sign * float(_slopes(replay, path, point).rate[0])  # noqa: E731
-    values: Callable[[list[Point]], Vector] = lambda points: sign * along(replay, path, points)  # noqa: E731
-    at_nodes = values(replay.nodes)
-    inside = [values(move.inside()) if isinstance(move, Step) else np.zeros(0) for move in replay.moves]
-    everything = np.concatenate([at_nodes, *inside])
-    level = float(np.max(everything) - _NEAR * np.ptp(everything))
-    best, top, top_step = int(np.argmax(at_nodes)), float(np.max(at_nodes)), None
-    for k, (move, between) in enumerate(zip(replay.moves, inside, strict=True)):
-        if isinstance(move, Step) and max(at_nodes[k], at_nodes[k + 1], *between) >= level:
-            for step in _tops(move, rate):
-                value = float(values([step.after])[0])
-                if value > top + _FLAT * abs(top):
-                    best, top, top_step = k, value, step
-    if top_step is not None:
-        return value_at(replay, path, replay.split(best, top_step))
-    # Beside a jump, the event may move.
-    beside = (replay.moves[k] for k in (best, best - 1) if 0 <= k < len(replay.moves))
-    jump = next((move for move in beside if isinstance(move, Jump)), None)
-    return value_at(replay, path, replay.nodes[best], jump)
-
-
-def along(replay: Replay, path: str, points: list[Point]) -> Vector:
-    """Values of a variable at points."""
-    model = replay.model
-    fast = model.fast(("only", path), lambda: _function(model, path))
-    return np.array([fast(o.t, o.x, o.z, model.p, model.u, o.d)[0][0] for o in points])
-
-
-def _tops(step: Step, rate: Callable[[Point], float]) -> list[Step]:
-    """Shorten a step to where a rate passes zero from above."""
-    points = [step.before, *step.inside(), step.after]
-    rates = [(point.t - step.before.t, rate(point)) for point in points]
-    steps = [
-        shortened(step, rate, low, high, _STILL)
-        for low, high in pairwise(rates)
-        if low[1] > 0.0 >= high[1] or low[1] >= 0.0 > high[1]
-    ]
-    return [s for s in steps if s is not None]
