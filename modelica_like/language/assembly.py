@@ -14,6 +14,7 @@ from modelica_like.language.declared import Connector, unknown
 from modelica_like.language.equation import Equations, connect, free, series
 from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Field, Input, Output, Parameter, Variable, param
+from modelica_like.language.formula import CONSTANTS
 from modelica_like.language.inside import Inside, InsideAssembly, inside
 from modelica_like.language.places import NOWHERE, caller
 
@@ -53,7 +54,16 @@ class Assembly(Component):
         own.free = tuple(free)
 
     def add_parameter(self, name: str, value: Any) -> None:
-        """Declare a parameter of the assembly; its unit is that of its value."""
+        """Declare a parameter of the assembly; its unit is that of its value.
+
+        Raises:
+            DuplicateName: the name is in use, also as that of a constant in formulas.
+        """
+        if name in CONSTANTS:
+            raise DuplicateName(
+                f"{self.label}: a parameter cannot be called '{name}'.",
+                why=f"In a formula, {name} is always {CONSTANTS[name]:.7g}….", advice="Choose another name.",
+            )  # fmt: skip
         field: Parameter = param("*", default=value)
         declare(self, name, field)
         field.read(value)

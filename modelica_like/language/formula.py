@@ -39,7 +39,8 @@ _OPERATIONS: dict[str, _Operation] = {
     "tanh": ca.tanh, "min": ca.fmin, "max": ca.fmax, "asin": ca.asin, "acos": ca.acos, "atan": ca.atan,
 }  # fmt: skip
 _FUNCTIONS = ("sqrt", "abs", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh", "min", "max")
-_CONSTANTS = {"pi": math.pi}
+CONSTANTS = {"pi": math.pi}
+"""Names in formulas that are no parameters."""
 _QUANTITY = re.compile(
     r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[ \t]+)((?:[^\W\d_]|[%°])[^\s+*,()-]*(?:\([\w.]+\)[\w.]*)?)"
 )
@@ -221,7 +222,7 @@ def _without_quantities(text: str) -> tuple[str, dict[str, str]]:
 
     def name(match: re.Match[str]) -> str:
         try:
-            is_name = match.group(2) not in _CONSTANTS and parse_unit(match.group(2)).factor
+            is_name = match.group(2) not in CONSTANTS and parse_unit(match.group(2)).factor
         except UnitError:
             is_name = False
         if not is_name:
@@ -262,7 +263,7 @@ def _convert(node: ast.expr, text: str, quantities: dict[str, str]) -> Formula:
         path = _path(node, text)
         if path in quantities:
             return Formula("quantity", (quantities[path],))
-        return Formula("number", (_CONSTANTS[path],)) if path in _CONSTANTS else Formula("name", (path,))
+        return Formula("number", (CONSTANTS[path],)) if path in CONSTANTS else Formula("name", (path,))
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
         return _call(node, node.func.id, text, quantities)
     raise _not_a_formula(text)

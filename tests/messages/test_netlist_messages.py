@@ -148,6 +148,13 @@ An FMU is run by run_fmu(…) in Python, and by `compare` and `report` on the co
         "Brackets or keys are nested too deeply for a netlist.\n  in bad.toml:1",
     ),
     "too large": ("[" * 10_000_000, "'bad.toml' is larger than 2 MB, the limit for netlists.\n  in bad.toml"),
+    "a parameter with the name of a constant": (
+        '[parameters]\npi = 3\nval = "pi"\n[parts]\na = { is = "Inertia", J = "val" }\n',
+        "bad: a parameter cannot be called 'pi'.\n"
+        "  in bad.toml:2 `pi = 3`\n"
+        "In a formula, pi is always 3.141593….\n"
+        "Choose another name.",
+    ),
     "two errors": (
         '[parts]\na = { is = "Inertia", J = -1 }\nb = { is = "Inertia", K = 1 }\n',
         "Inertia.J = -1 is out of range: it must be at least 0 kg.m2.\n"
