@@ -111,7 +111,7 @@ REFUSED = {
     "abs(x > 1)": "abs needs numbers, and a condition is none",
     "if x > 1 and 1 then 1 else 2": "'and' joins conditions, and a number is none",
     "if 1 then 1 else 2": "The condition of this 'if' is a number",
-    "x > 1": "y is Real, and a condition is no number",
+    "x > 1": "y is a Real, and a truth value is none",
     "v[x]": "A subscript must be a number that constants and parameters determine",
 }
 
@@ -126,8 +126,8 @@ def test_what_is_refused(formula: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("declaration", "equation", "what"),
     [
-        ("Boolean b;", "b = 3;", "b is Boolean, and a number is no condition."),
-        ("Integer n;", "n = 2.5;", "n is Integer, and 2.5 is no whole number."),
+        ("Boolean b;", "b = 3;", "b is a Boolean, and 3 is none."),
+        ("Integer n;", "n = 2.5;", "n is an Integer, and 2.5 is none."),
     ],
 )
 def test_types_that_do_not_fit(declaration: str, equation: str, what: str, tmp_path: Path) -> None:

@@ -331,7 +331,8 @@ class StepFunctions:
         error = _solve(matrix, ca.vertcat(rates, ca.MX(self.nz, 1)), self._node_order)
         last = change[self.size - self.nx - self.nz : self.size - self.nz, :]
         gains = self._estimated_gains(z, change, P, begin, error) if self.nq else [ca.MX(0, 2)] * 3
-        return ca.Function("tangent", [*self._names, z, S, P], [last, error[: self.nx, :], *gains])
+        results = [last, error[: self.nx, :], *map(ca.densify, gains)]  # an integrand may be zero for ever
+        return ca.Function("tangent", [*self._names, z, S, P], results)
 
     def _estimated_gains(self, z: Any, change: Any, P: Any, begin: Any, error: Any) -> list[Any]:
         """Errors, amounts and terms of the quadratures and of their derivatives: quadratures are states as others.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from modelica_like.errors import ModelicaTextError, UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.netlist.modelica.functions import elements
+from modelica_like.netlist.modelica.fold import elements
 from modelica_like.netlist.modelica.instance import Given, Instance, Member
 from modelica_like.netlist.modelica.members import check_value
 from modelica_like.netlist.modelica.resolve import Resolver

@@ -11,7 +11,7 @@ from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement, calls_in
-from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside
+from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside, misfit
 from modelica_like.netlist.modelica.written import ASSERT, MEMORY, TERMINATE, Happening
 
 _INSTANTS = ("sample", "edge", "change", "initial", "terminal")
@@ -255,9 +255,7 @@ class Statements:
             for argument, other in zip(left.args, right.args, strict=True):
                 self._equate(argument, other, text, line)
         elif left.kind == "condition":
-            if fold.is_number(right):
-                what = f"{left.args[0][0]} is Boolean, and a number is no condition."
-                raise ModelicaTextError(what, where=text.place(line))
+            self._check_type(left, right, text, line)
             right = _condition(right)
             member = self.instance.members.get(left.args[0][0].partition("[")[0])
             if member is None:
@@ -279,16 +277,13 @@ class Statements:
             self.equations.append((left, right, text.place(line)))
 
     def _check_type(self, left: Expr, right: Expr, text: ClassText, line: int) -> None:
-        """Refuse a condition or a fraction as the value of an own number."""
-        name = left.args[0][0] if left.kind == "name" and len(left.args) == 1 else ""
+        """Refuse a value of another type for an own variable."""
+        name = left.args[0][0] if left.kind in ("name", "condition") and len(left.args) == 1 else ""
         member = self.instance.members.get(name.partition("[")[0])
         basic = basic_type(self.instance, member) if member is not None else None
-        if basic is None:
-            return
-        fraction = basic.kind == "Integer" and right.kind == "number" and right.args[0] != int(right.args[0])
-        if fraction or fold.is_condition(right):
-            given = f"{right.args[0]:g} is no whole number" if fraction else "a condition is no number"
-            raise ModelicaTextError(f"{name} is {basic.kind}, and {given}.", where=text.place(line))
+        wrong = misfit(right, basic) if basic is not None else ""
+        if wrong:
+            raise ModelicaTextError(f"{name} {wrong}.", where=text.place(line))
 
     # -- events ------------------------------------------------------------------------------------------------------
 
