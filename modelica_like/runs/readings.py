@@ -36,6 +36,8 @@ INTEGRATED = ("integral", "mean", "rms", "duration")
 CONDITIONS = ("first", "reach")
 """Kinds that are the first time of a condition."""
 Form = Literal["plain", "negative", "square", "mode"]
+Change = tuple[str, str, str]
+"""A mode, its name before (empty: any), and its name after."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +77,10 @@ class Output:
         kind: `end`, `at`, `max`, `min`, `peak` (largest amount), `integral`, `mean`, `rms`, `first` (when a condition
             with `>` or `<` is true for the first time), `reach` (one with `>=` or `<=`), `duration` (how long a mode
             lasts in all), `time` (of a mode change), `series`, or `formula` of other outputs.
-        path: the variable, the formula, or the mode.
+        path: the variable, the formula, or the (first) mode.
         moment: time of `at` in s.
-        change: which mode change: names before (may be empty) and after, and its number among those.
+        changes: which mode changes: modes, their names before (may be empty) and after; the first of all counts.
+        number: which of several such changes, of one kind.
         struck: whether the integral of a loss contains the energy lost in impacts.
         operands: of a formula, by their names in it; else empty.
     """
@@ -87,25 +90,27 @@ class Output:
     kind: str
     path: str
     moment: float = 0.0
-    change: tuple[str, str, int] = ("", "", 1)
+    changes: tuple[Change, ...] = ()
+    number: int = 1
     struck: bool = False
     operands: tuple[Output, ...] = ()
 
     def is_change(self, event: Event) -> bool:
         """Return whether an event is such a mode change."""
-        before, after, _ = self.change
-        return event.mode == self.path and before in ("", event.before) and after in ("", event.after)
+        return any(
+            event.mode == mode and before in ("", event.before) and after == event.after
+            for mode, before, after in self.changes
+        )
 
     def parts(self, model: CompiledDae) -> list[Part]:
         """Return what it consists of, unless it is a formula."""
         if self.kind in _SIGNED:
             return [Part("max", self.path, form) for form in _SIGNED[self.kind]]  # type: ignore[arg-type]
         if self.kind in ("time", "duration"):
-            names = model.flat_discretes[model.discrete_position[self.path]].names
-            before, after = (names.index(name) if name else -1 for name in self.change[:2])
+            numbers = [(mode, *_numbers(model, mode, names)) for mode, *names in self.changes]
             if self.kind == "duration":
-                return [Part("integral", self.path, "mode", change=(-1, after, 1))]
-            return [Part("change", self.path, change=(before, after, self.change[2]))]
+                return [Part("integral", mode, "mode", change=(-1, after, 1)) for mode, _, after in numbers]
+            return [Part("change", mode, change=(before, after, self.number)) for mode, before, after in numbers]
         if self.kind in ("integral", "mean", "rms"):
             parts = [Part("integral", self.path, "square" if self.kind == "rms" else "plain")]
             return [*parts, Part("impact", self.path.rpartition(".")[0])] if self.struck else parts
@@ -121,6 +126,8 @@ class Output:
             case "mean" | "rms":
                 mean = parts[..., 0] / span
                 return mean if self.kind == "mean" else np.sqrt(mean)
+            case "time":
+                return np.fmin.reduce(parts, axis=-1)
             case _:
                 return np.sum(parts, axis=-1)
 
@@ -132,6 +139,12 @@ class Output:
         quantity: Callable[[str], Any] = lambda text: ca.SX(si_value(text))  # noqa: E731
         value = formula.evaluate(lambda name: column[names.index(name)], quantity)
         return ca.Function("formula", [column], [value, ca.densify(ca.jacobian(value, column))])
+
+
+def _numbers(model: CompiledDae, mode: str, names: Sequence[str]) -> tuple[int, ...]:
+    """Return the numbers of names of a mode; -1 of an empty one."""
+    known = model.flat_discretes[model.discrete_position[mode]].names
+    return tuple(known.index(name) if name else -1 for name in names)
 
 
 def leaves(outputs: Sequence[Output]) -> list[Output]:
@@ -202,7 +215,7 @@ def read_output(model: CompiledDae, name: str) -> Output:
     if kind == "duration":
         mode, _, state = (part.strip() for part in inside.rpartition(":"))
         _check_mode(model, mode, state)
-        return Output(name, _SECOND, kind, mode, change=("", state, 1))
+        return Output(name, _SECOND, kind, mode, changes=((mode, "", state),))
     if kind == "first":
         return Output(name, _SECOND, *_condition(model, name, inside))
     path, _, moment = inside.rpartition(",") if kind == "at" else (inside, "", "")
@@ -267,11 +280,10 @@ def _of_whole_run(model: CompiledDae, name: str) -> Output | None:
         return None
     if last in _ENERGY and owner in model.components:
         return Output(name, _JOULE, "integral", f"{name.removesuffix('energy')}power", struck=last == "loss_energy")
-    holding = _holding_mode(model, owner) if last in _HELD else None
-    if holding is None:
-        return None
-    mode, held = holding
-    return Output(name, _SECOND, "time", mode, change=("", held, 1) if last == "lock_time" else (held, "", 1))
+    changes = _locks(model, owner) if last in _HELD else ()
+    if last == "unlock_time":
+        changes = tuple((mode, after, before) for mode, before, after in changes)
+    return Output(name, _SECOND, "time", changes[0][0], changes=changes) if changes else None
 
 
 def _without_values(name: str) -> ValueOutOfRange:
@@ -285,13 +297,16 @@ def _without_values(name: str) -> ValueOutOfRange:
     return ValueOutOfRange(f"{name} is one number of a whole run: it has no values over time.", advice=advice)
 
 
-def _holding_mode(model: CompiledDae, owner: str) -> tuple[str, str] | None:
-    """The mode of a component in which it holds a motion, and the name of that."""
-    for hold in model.held.motions:
-        if hold.component == owner:
-            mode = model.flat_discretes[hold.mode]
-            return mode.path, mode.names[hold.number]
-    return None
+def _locks(model: CompiledDae, owner: str) -> tuple[Change, ...]:
+    """Return the mode changes by which a component begins to hold a motion: backlash holds in each direction."""
+    holds = [(model.flat_discretes[hold.mode], hold.number) for hold in model.held.motions if hold.component == owner]
+    held = {(mode.path, mode.names[number]): mode for mode, number in holds}
+    return tuple(
+        (mode.path, before, after)
+        for (_, after), mode in held.items()
+        for before in mode.names
+        if (mode.path, before) not in held
+    )
 
 
 def _mode_change(model: CompiledDae, name: str, inside: str) -> Output:
@@ -304,9 +319,8 @@ def _mode_change(model: CompiledDae, name: str, inside: str) -> Output:
         )
     mode = parts["mode"]
     _check_mode(model, mode, *(value for value in (parts["before"], parts["after"]) if value is not None))
-    return Output(
-        name, _SECOND, "time", mode, change=(parts["before"] or "", parts["after"], int(parts["number"] or 1))
-    )
+    number = int(parts["number"] or 1)
+    return Output(name, _SECOND, "time", mode, changes=((mode, parts["before"] or "", parts["after"]),), number=number)
 
 
 def _check_mode(model: CompiledDae, mode: str, *names: str) -> None:
@@ -355,7 +369,7 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
     energies = (*_TERMS, *_ENERGY)
     words = [*model.position, *(f"{component}.{last}" for component in model.components if last in energies)]
     if owner in model.components:
-        held = _HELD if _holding_mode(model, owner) is not None else ()
+        held = _HELD if _locks(model, owner) else ()
         words += [f"{owner}.{word}" for word in (*energies, *held)]
     raise UnknownName(
         f"{model.name} has no variable '{path}'{did_you_mean(path, words) or '.'}",

@@ -22,11 +22,13 @@ from components import (
     Pulse,
     PulseCounter,
     Ramp,
+    RigidBacklash,
     Sine,
     SpringDamper,
     Step,
     Table,
     Torque,
+    TorqueStep,
 )
 from modelica_like import Assembly, build, load_spectrum, sensitivities, simulate, simulation_function, sweep
 from modelica_like.analyse.sizing import load_of, size
@@ -389,3 +391,34 @@ def test_what_would_take_too_many_polynomials_is_refused(monkeypatch: pytest.Mon
     monkeypatch.setattr(polynomials, "MOST_KEPT", 2**16)
     with pytest.raises(MissingValue, match=r"^sin\(J\.phi/\(1 rad\)\) cannot be read off turning: from t = 0 s on"):
         run.read("max(sin(J.phi/(1 rad)))")
+
+
+@pytest.fixture(scope="module")
+def claws() -> CompiledDae:
+    """Flanks meet backward at half the play over 5 rad/s; a torque of -3 N.m from 0.5 s on takes them to the others."""
+    parts = {"torque": TorqueStep(step_torque=-3.0, start_time=0.5), "rotor": Inertia(J=0.02, phi=0.0, w=5.0),
+             "claw": RigidBacklash(b=0.1, e=0.0), "wheel": Inertia(J=0.05, phi=0.0, w=0.0)}  # fmt: skip
+    return build(Assembly("claws", parts=parts, series={"shaft": [*parts]}))
+
+
+ACROSS = math.sqrt(2 * 0.1 * 0.02 / 3)
+"""Time over the whole play at the acceleration of the rotor."""
+LOCKS = {
+    "claw.lock_time": 0.01, "claw.unlock_time": 0.5, "time(claw.contact -> forward)": 0.5 + ACROSS,
+    "claw.unlock_time - claw.lock_time": 0.49,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_backlash_locks_in_each_direction(claws: CompiledDae, solver: Any) -> None:
+    run = simulate(claws, 1.0, solver=solver)
+    found = sweep(claws, {"rotor.J": [0.02]}, [*LOCKS], until=1.0, solver=solver)
+    for number, (name, value) in zip(run.read(*LOCKS), LOCKS.items(), strict=True):
+        for one in (number, float(found[name][0])):
+            assert one == pytest.approx(value, rel=RUN), name
+
+
+def test_derivatives_of_the_locks_of_backlash(claws: CompiledDae) -> None:
+    made = sensitivities(claws, [*LOCKS], ["claw.b", "torque.start_time"], until=1.0)
+    expected = [[0.1, 0], [0, 1], [ACROSS / 0.2, 1], [-0.1, 1]]
+    np.testing.assert_allclose(made.derivatives, expected, rtol=RUN, atol=RUN)

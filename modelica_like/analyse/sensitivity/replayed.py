@@ -111,7 +111,7 @@ def _event_time(solution: Solution, replay: Replay, output: Output) -> Reading:
     # The run counts changes at its start, too, of which some belong to the start itself.
     begin = replay.nodes[0].t
     at_start = sum(output.is_change(event) and event.time <= begin for event in solution.events)
-    number = output.change[2] - at_start + sum(jump.before.t <= begin for jump in jumps)
+    number = output.number - at_start + sum(jump.before.t <= begin for jump in jumps)
     if not 1 <= number <= len(jumps):
         changes = [f"{e.before} → {e.after} at {e.time:.6g} s" for e in solution.events if e.mode == output.path]
         listed = f"{', '.join(changes[:6])}{', …' if len(changes) > 6 else ''}"
