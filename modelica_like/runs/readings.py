@@ -20,7 +20,7 @@ from modelica_like.solve.recorder import Event
 _CALL = re.compile(r"\s*(max|min|peak|integral|mean|rms|at|first|duration|series|time)\s*\((.*)\)\s*$")
 _CONDITION = re.compile(r"(.+?)(<=?|>=?)(.+)")
 _CHANGE = re.compile(
-    r"\s*(?P<mode>[^:\s]+)\s*(?::\s*(?P<before>\w+)\s*)?(?:→|->)\s*(?P<after>\w+)\s*(?:,\s*(?P<number>\d+))?\s*$"
+    r"\s*(?P<mode>[^:\s]+)\s*(?::\s*(?P<before>\w+)\s*)?(?:→|->)\s*(?P<after>\w+)\s*(?:,\s*(?P<number>-?\d+))?\s*$"
 )
 _ENERGY = ("loss_energy", "source_energy")
 """Integrals of powers over the whole run."""
@@ -320,6 +320,12 @@ def _mode_change(model: CompiledDae, name: str, inside: str) -> Output:
     mode = parts["mode"]
     _check_mode(model, mode, *(value for value in (parts["before"], parts["after"]) if value is not None))
     number = int(parts["number"] or 1)
+    if number < 1:
+        first = inside.rpartition(",")[0].strip()
+        raise ValueOutOfRange(
+            f"'{name}' asks for mode change {number}: they are counted from 1.",
+            advice=f"The first one is time({first}), the second one time({first}, 2).",
+        )
     return Output(name, _SECOND, "time", mode, changes=((mode, parts["before"] or "", parts["after"]),), number=number)
 
 

@@ -72,6 +72,12 @@ Ask for clutch.lock_time itself, or for a formula of such numbers, e.g. 2*clutch
     "a time of a change that a part does not have": (UnknownName, lambda: read_output(build(DRIVE), "2*table.lock_time"), """\
 machine_table_direct has no variable 'table.lock_time'; did you mean 'table.loss_power'?
 Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(…), at(…, time), first(… > …), duration(mode: name), series(…), time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time."""),
+    "a mode change before the first": (ValueOutOfRange, lambda: read_output(build(DRIVE), "time(clutch.mode -> stuck, 0)"), """\
+'time(clutch.mode -> stuck, 0)' asks for mode change 0: they are counted from 1.
+The first one is time(clutch.mode -> stuck), the second one time(clutch.mode -> stuck, 2)."""),
+    "a negative mode change": (ValueOutOfRange, lambda: read_output(build(DRIVE), "time(clutch.mode: forward -> stuck, -1)"), """\
+'time(clutch.mode: forward -> stuck, -1)' asks for mode change -1: they are counted from 1.
+The first one is time(clutch.mode: forward -> stuck), the second one time(clutch.mode: forward -> stuck, 2)."""),
     "a mode": (UnknownName, lambda: read_output(build(DRIVE), "duration(clutch.mode: sliding)"), """\
 clutch.mode has no mode 'sliding'. It has free, stuck, start_forward, start_backward, forward, backward."""),
     "a load": (UnknownName, lambda: load_of(run(), "clutch.tau", "peek"), """\
