@@ -80,14 +80,14 @@ def steady(
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.operating.curves import characteristic
         from modelica_like.analyse.operating.steady import steady as find
-        from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
+        from modelica_like.analyse.sweeps.ranges import by_name, read_assignment, read_range
         from modelica_like.show.plot import save_plot
         from modelica_like.show.report.analysis import curves_report, point_report
         from modelica_like.simulation import simulate
 
         near = simulate(assembly, after) if after else None
         if over is None:
-            held = dict(read_assignment(text) for text in hold or ())
+            held = by_name((read_assignment(text) for text in hold or ()), "--hold")
             page.print(point_report(find(assembly, held, by or (), near=near), show or ()))
             return
         curves = characteristic(assembly, dict([read_range(over)]), by=(by or [""])[0], near=near)
@@ -114,7 +114,7 @@ def sweep(
     finished = checkpoint / "zarr.json" if checkpoint else None
     with told(debug, json=json, tables=[output], pictures=[plot], files=[finished]) as page:
         assembly = load_netlist(netlist, assignments)
-        from modelica_like.analyse.sweeps.ranges import read_range
+        from modelica_like.analyse.sweeps.ranges import by_name, read_range
         from modelica_like.analyse.sweeps.sweep import sweep as run
         from modelica_like.show.report.analysis import sweep_report
         from modelica_like.show.report.files import write_dataset
@@ -122,7 +122,7 @@ def sweep(
 
         with Bar(title="runs") as bar:
             dataset = run(
-                assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
+                assembly, by_name(map(read_range, over), "--over"), of, until=until, checkpoint=checkpoint,
                 processes=processes, scheduler=scheduler, progress=bar, solver=solver,
             )  # fmt: skip
         page.print(sweep_report(dataset))

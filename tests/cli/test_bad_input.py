@@ -103,3 +103,11 @@ def test_check_finds_what_a_run_refuses_at_its_start(
     assert result.exit_code == code
     assert "can be simulated" not in result.stdout
     assert result.stderr.startswith(message)
+
+
+def test_a_parameter_of_a_sweep_given_twice(tmp_path: Path) -> None:
+    drive = tmp_path / "drive.toml"
+    drive.write_text(DRIVE)
+    result = called(["sweep", str(drive), "--over", "rotor.J=1", "--over", "rotor.J=2", "--of", "rotor.w"])
+    assert result.exit_code == 2
+    assert "--over gives rotor.J twice." in result.stderr

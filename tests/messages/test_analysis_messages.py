@@ -19,12 +19,13 @@ from modelica_like.analyse.operating.curves import characteristic
 from modelica_like.analyse.operating.steady import steady
 from modelica_like.analyse.sweeps.importance import importance
 from modelica_like.analyse.sweeps.plan import LatinHypercube
-from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
+from modelica_like.analyse.sweeps.ranges import by_name, read_assignment, read_range
 from modelica_like.analyse.sweeps.sweep import sweep
 from modelica_like.analyse.sweeps.workers import Job, in_processes
 from modelica_like.errors import (
     CalibrationFailed,
     CheckpointMismatch,
+    DuplicateName,
     InitializationError,
     LanguageError,
     MissingExtra,
@@ -161,6 +162,12 @@ Write for example 'motor.w=4000 rpm'."""),
     "no range": (ValueOutOfRange, lambda: read_range("load=0:x:3"), """\
 'load=0:x:3': '0:x:3' is neither FIRST:LAST:COUNT nor a list of numbers.
 Write for example 'load=0:0.25:26 N.m' or 'load=0,0.1,0.2 N.m'."""),
+    "a range given twice": (DuplicateName, lambda: by_name(map(read_range, ["J=0.4", "m=1,2", "J=0.5"]), "--over"), """\
+--over gives J twice.
+Give all its values at once: --over J=0.1,0.2."""),
+    "a variable held twice": (DuplicateName, lambda: by_name(map(read_assignment, ["a.w=4 rpm", "a.w=5 rpm"]), "--hold"), """\
+--hold gives a.w twice.
+Leave out one of them."""),
     "a sweep as a picture": (NetlistError, lambda: write_dataset(swept(), Path("found.png")), """\
 'found.png': a table can be .csv, .parquet, .nc.
 `-` is standard output, as .csv."""),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, TypeVar
 
 import numpy as np
 
-from modelica_like.errors import ValueOutOfRange
+from modelica_like.errors import DuplicateName, ValueOutOfRange
+
+Given = TypeVar("Given")
 
 MOST_RUNS = 10_000_000
 _DIGITS = len(str(MOST_RUNS))
@@ -22,6 +25,23 @@ def read_assignment(text: str) -> tuple[str, str]:
     if not equals or not name.strip() or not value.strip():
         raise ValueOutOfRange(f"'{text}' is not NAME=VALUE.", advice="Write for example 'motor.w=4000 rpm'.")
     return name.strip(), value.strip()
+
+
+def by_name(pairs: Iterable[tuple[str, Given]], option: str) -> dict[str, Given]:
+    """Return what the repeated option of a command gives, by name.
+
+    Raises:
+        DuplicateName: it gives the same name twice, of which one would count.
+    """
+    given: dict[str, Given] = {}
+    for name, value in pairs:
+        if name in given:
+            lists = f"Give all its values at once: {option} {name}=0.1,0.2."
+            raise DuplicateName(
+                f"{option} gives {name} twice.", advice=lists if isinstance(value, list) else "Leave out one of them."
+            )
+        given[name] = value
+    return given
 
 
 def too_many(what: str) -> ValueOutOfRange:
