@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from components import Clutch, ConstantSpeed, Inertia
+from components import Clutch, ConstantSpeed, Inertia, RigidBacklash
 from modelica_like import Assembly, build, calibrate, sensitivities, simulate, sweep
 from modelica_like.analyse.calibration.measurements import Numbers
 from modelica_like.analyse.sizing import size
@@ -109,3 +109,18 @@ def test_formulas_of_a_table(tmp_path: Path) -> None:
     numbers, sizes = read_results(run, ["3*brake.loss_energy"])
     assert sizes[0] == pytest.approx(3 * 100.0 * 2.0, rel=1e-12)
     assert numbers[0].unit == "J"
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_energies_of_impacts_are_in_formulas(solver: Any) -> None:
+    """Flanks that meet without rebound lose the energy of their speeds about the common centre of mass."""
+    parts = {"rotor": Inertia(J=0.02, phi=0.0, w=5.0), "claw": RigidBacklash(b=0.1, e=0.0),
+             "wheel": Inertia(J=0.05, phi=0.0, w=0.0)}  # fmt: skip
+    model, lost = build(Assembly("met", parts=parts, series={"shaft": [*parts]})), 0.5 * 0.02 * 0.05 / 0.07 * 5.0**2
+    names = ["2*claw.loss_energy", "3*loss_energy"]
+    found = sweep(model, {"rotor.J": [0.02]}, names, until=0.3, solver=solver)
+    for name, number, times in zip(names, simulate(model, 0.3, solver=solver).read(*names), (2, 3), strict=True):
+        assert number == pytest.approx(times * lost, rel=EXACT)
+        assert float(found[name][0]) == pytest.approx(times * lost, rel=EXACT)
+    with pytest.raises(NoGradient, match=r"No gradient of claw\.loss_energy: claw loses 0\.178571 J in an impact"):
+        sensitivities(model, names[0], "rotor.J", until=0.3)

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from modelica_like.analyse.replay.chain import Replay, replay
+from modelica_like.analyse.replay.chain import Reading, Replay, replay
 from modelica_like.analyse.replay.edges import Edge, edges
 from modelica_like.analyse.replay.steps import Tolerances
 from modelica_like.analyse.sensitivity.at_instants import at_instants
@@ -121,11 +121,7 @@ def _differentiate(
     parts = leaves(plain)
     of_parts = read_off(solution, chain, parts)
     readings = formulas(plain, of_parts)
-    # The same name has the same number everywhere, though the replay is more precise.
-    values = solution.read(*(output.name for output in plain))
-    for output, value in zip(plain, values, strict=True):
-        if not np.isfinite(value):
-            raise NoGradient(f"{output.name} is {value:g}: what is not finite has no derivative.")
+    values = _finite(solution, plain)
     over_time = [value_at(chain, output.path, node) for output in series for node in nodes]
     on_edge = [*edges(chain, of_parts), *at_instants(chain, of_parts, parts), *formula_kinks(plain, of_parts)]
     at_kink = kinks(chain, outputs)
@@ -133,12 +129,7 @@ def _differentiate(
     positions = [k for k, _ in chosen]
     # A column costs about the same in both directions.
     way = method if method != "auto" else "adjoint" if len(total) < len(chosen) else "forward"
-    if way == "adjoint":
-        derivatives = chain.adjoint(total)[:, positions]
-    else:
-        directions = np.zeros((len(chain.model.fixed_position), len(positions)))
-        directions[positions, np.arange(len(positions))] = 1.0
-        derivatives = chain.forward(total, directions)
+    derivatives = _derivatives(chain, total, positions, way)
     # Without `to`, the other parameters still get their derivatives.
     if series:
         # Somewhere along the run everything is felt.
@@ -168,6 +159,24 @@ def _differentiate(
         left_out | left_at_kinks,
         (*_of_rounding(solution, plain, values), *sides.remark([*candidates])),
     )
+
+
+def _finite(solution: Solution, outputs: Sequence[Output]) -> list[float]:
+    """Return the values: the same name has the same number everywhere, though the replay is more precise."""
+    values = solution.read(*(output.name for output in outputs))
+    for output, value in zip(outputs, values, strict=True):
+        if not np.isfinite(value):
+            raise NoGradient(f"{output.name} is {value:g}: what is not finite has no derivative.")
+    return values
+
+
+def _derivatives(chain: Replay, readings: Sequence[Reading], positions: Sequence[int], way: Method) -> Vector:
+    """Return the derivatives of readings by parameters at positions in (p, u)."""
+    if way == "adjoint":
+        return chain.adjoint(readings)[:, positions]
+    directions = np.zeros((len(chain.model.fixed_position), len(positions)))
+    directions[positions, np.arange(len(positions))] = 1.0
+    return chain.forward(readings, directions)
 
 
 def _by_sides(
