@@ -310,6 +310,24 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("extends B(kk = 3); parameter Real kk = 1;", before="model B parameter Real k = 1; end B;"),
         "B has no 'kk'; did you mean 'k'?\n  in a.mo:3 `extends B(kk = 3); parameter Real kk = 1;`",
     ),
+    "a parameter of the class around": (
+        model("model C Real y = k; end C;\nparameter Real k = 3; C c;"),
+        "k is a parameter of A: other classes, those in it too, see its constants only.\n"
+        "  in a.mo:3 `model C Real y = k; end C;`\nGive C a parameter for it, or declare it as a constant.",
+    ),
+    "a variable of the class around": (
+        model("model C Real y = t; end C;\nReal t = time; C c;"),
+        "t is a variable of A: other classes, those in it too, see its constants only.\n"
+        "  in a.mo:3 `model C Real y = t; end C;`\nGive C an input for it.",
+    ),
+    "a parameter around a function": (
+        model(
+            "function f input Real u; output Real y; algorithm y := u*k; end f;\nparameter Real k = 3; Real x = f(1);"
+        ),
+        "k is a parameter of A: other classes, those in it too, see its constants only.\n"
+        "  in a.mo:3 `function f input Real u; output Real y; algorithm y := u*k; end f;`\n"
+        "Give f an input for it, or declare it as a constant.",
+    ),
     "two values": (
         model("B b(k = 1, k = 2);", before="model B parameter Real k; end B;"),
         "One modification gives k two values.\n  in a.mo:3 `B b(k = 1, k = 2);`\nRemove one of them.",

@@ -523,3 +523,21 @@ def test_modifications_that_mean_nothing_are_refused(text_file: Any, declaration
 def test_values_that_fit_their_types_are_read(text_file: Any, declarations: str, slope: str, value: float) -> None:
     classes = "type M = enumeration(a, b); record P parameter Real u; parameter Real v; end P;"
     assert final_x(text_file, declarations, slope, classes) == pytest.approx(value, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("classes", "declarations", "slope", "value"),
+    [
+        ("", "constant Real k = 3; model I Real y = 2*k; end I; I a;", "a.y", 6),
+        ("", "constant Real k = 3; function f input Real u; output Real y; algorithm y := u*k; end f;", "f(2)", 6),
+        ("package P constant Real k = 2; model I Real y = k + P.k; end I; end P;", "P.I a;", "a.y", 4),
+        ("package P parameter Real k = 2; model I Real y = k; end I; end P;", "P.I a;", "a.y", 2),
+        ("", "parameter Real p = 2; model D = C(k = p); D d;", "d.y", 2),
+        ("model H parameter Real p = 7; replaceable model X = C; X c; end H;",
+         "parameter Real p = 2; H h(redeclare model X = B(k = p));", "h.c.y", 4),
+    ],
+)  # fmt: skip
+def test_what_classes_see_of_the_classes_around_them(
+    text_file: Any, classes: str, declarations: str, slope: str, value: float
+) -> None:
+    assert final_x(text_file, declarations, slope, classes) == pytest.approx(value, rel=1e-8)

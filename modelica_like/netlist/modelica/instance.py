@@ -153,6 +153,12 @@ class Instance:
             return new
         return self.classes.find(name, text)
 
+    def scope_of(self, text: ClassText) -> Instance:
+        """Return the instance whose names a short class uses: that of the redeclaration, or this one."""
+        scopes = (entry.scope for entry in self._replaced.values() if entry.redeclared is text)
+        scope = next(scopes, None)
+        return self if scope is None else scope[0]
+
     def constraint(self, name: str, text: ClassText) -> Given:
         """Return the modification behind the `constrainedby` of a class, which a class in its place takes, too."""
         declared = self.classes.find(name, text)

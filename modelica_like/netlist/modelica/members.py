@@ -165,7 +165,7 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
         base = owner.find(inner.short.base, scope)
         if base is None:
             raise unknown_class(inner.short.base, scope, inner.line)
-        short = given(inner.short.modification, (owner, scope), inner.line)
+        short = given(inner.short.modification, (owner.scope_of(inner), scope), inner.line)
         member.given = member.given.over(short, declared.name)
         member.declaration = declared = replace(declared, type=inner.short.base)
         member.text, inner = scope, base

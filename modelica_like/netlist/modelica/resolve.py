@@ -281,9 +281,23 @@ class Resolver:
         if isinstance(holder, ClassText):
             inside = Instance(self.classes, holder, Given())
             if name in inside.members:
+                self._demand_constant(inside.members[name], holder, expression)
                 return self.indexed(members.value_of(inside, name, self.text, line), expression.args[-1][1], line)
         names = [*self.local, *(self.instance.members if self.instance else ())]
         raise members.unknown_name(f"There is no '{path}'{did_you_mean(path, names) or '.'}", self.text, line)
+
+    def _demand_constant(self, member: Member, holder: ClassText, expression: Expr) -> None:
+        """Refuse what differs from part to part, because a class does not know in which part it is used."""
+        declared = member.declaration
+        if "constant" in declared.prefixes or holder.kind == "package":
+            return
+        kind = "parameter" if "parameter" in declared.prefixes else "variable"
+        own = "a parameter" if kind == "parameter" and self.text.kind != "function" else "an input"
+        raise ModelicaTextError(
+            f"{expression.path} is a {kind} of {holder.name}: other classes, those in it too, see its constants only.",
+            where=self.text.place(expression.line),
+            advice=f"Give {self.text.name} {own} for it{', or declare it as a constant' * (kind == 'parameter')}.",
+        )
 
     def _imported_constant(self, name: str) -> ClassText | None:
         """Return the package of a constant that is imported by its own name."""
