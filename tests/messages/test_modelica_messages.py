@@ -328,6 +328,21 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "  in a.mo:3 `function f input Real u; output Real y; algorithm y := u*k; end f;`\n"
         "Give f an input for it, or declare it as a constant.",
     ),
+    **{
+        f"by initial equations: {text}": (
+            model(f"parameter Real p(fixed = false);\n{text}", before="model C parameter Real k; end C;"),
+            f"{what} depends on p, which has fixed = false: only parameters of its own class may do that.\n"
+            f"  in a.mo:4 `{text}`\n"
+            "Leave it out, and write an initial equation for it; a parameter needs fixed = false, too.",
+        )
+        for text, what in {
+            "C c(k = p);": "c.k",
+            "parameter Real q = 2*p; C c(k = q);": "c.k",
+            f"{R}.Inertia J(J = p);": "J.J",
+            f"{R}.Inertia J(w(start = p));": "J.w.start",
+            "Real z(start = p);": "z.start",
+        }.items()
+    },
     "two values": (
         model("B b(k = 1, k = 2);", before="model B parameter Real k; end B;"),
         "One modification gives k two values.\n  in a.mo:3 `B b(k = 1, k = 2);`\nRemove one of them.",

@@ -541,3 +541,21 @@ def test_what_classes_see_of_the_classes_around_them(
     text_file: Any, classes: str, declarations: str, slope: str, value: float
 ) -> None:
     assert final_x(text_file, declarations, slope, classes) == pytest.approx(value, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("declarations", "initial", "slope", "value"),
+    [
+        ("parameter Real q = 2*p;", "p = 2;", "q", 4), ("parameter Real q = 2*p;", "q = 8;", "p", 4),
+        ("parameter Real r = 3*q; parameter Real q = 2*p;", "p = 2;", "r", 12),
+        ("parameter Real r = q + q; parameter Real q = p + p;", "2*r = 16;", "p", 2),
+        ("C c(k(fixed = false)); parameter Real q = 2*p;", "p = 2; c.k = q;", "c.y", 4),
+    ],
+)  # fmt: skip
+def test_what_depends_on_a_parameter_of_the_initial_equations(
+    text_file: Any, declarations: str, initial: str, slope: str, value: float
+) -> None:
+    declarations = f"parameter Real p(fixed = false, start = 1); {declarations}"
+    body = f"Real x(start = 0, fixed = true);\ninitial equation\n  {initial}\nequation\n  der(x) = {slope};"
+    result = run(text_file(f"{OWN}\nmodel A\n{declarations}\n{body}\nend A;\n"), until=1.0)
+    assert result.final["x"] == pytest.approx(value, rel=1e-8)

@@ -37,9 +37,10 @@ from modelica_like.netlist.modelica.attributes import check_attributes, check_de
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
 from modelica_like.netlist.modelica.library import Known, connector_type
-from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
+from modelica_like.netlist.modelica.members import demand_determined, element, exists, part_of, sizes, undetermined
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.statements import Statements
+from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside
 from modelica_like.netlist.modelica.wiring import Wire, groups
 from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConnector, as_formula, written_class
@@ -190,13 +191,22 @@ class _Builder:
             self.notes.tell(f"{f'{self.instance.path}.{name}'.lstrip('.')} has no value; its start value is taken.")
         low, high = (self._number(basic.given.inner.get(limit)) for limit in ("min", "max"))
         fixed = self._known(basic.given.inner.get("fixed")) is not False
-        parameter = param(self.unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
         outside = given.scope is not None and given.scope[0] is not self.instance
-        if given.value is not None and not outside:
+        formula = None if given.value is None or given.scope is None else Resolver(*given.scope)(given.value)
+        # What depends on a parameter of the initial equations is another one, by an equation of its own.
+        follows = fixed and not outside and formula is not None and bool(undetermined(self.instance, formula))
+        parameter = param(
+            self.unit(basic), member.declaration.description, min=low, max=high, fixed=fixed and not follows
+        )
+        if follows and formula is not None:
+            place = member.text.place(member.declaration.line)
+            self.statements.initial.append((Expr("name", ((name, ()),)), formula, place))
+        elif given.value is not None and not outside:
             parameter.default = self._value(given, self.instance, "")
         parameter.nominal = self.nominal(basic)
         declare(self.component, name, parameter)
         if given.value is not None and outside:
+            demand_determined(f"{self.instance.path}.{name}".lstrip("."), given)
             self.component.give(name, self._value(given, self.instance.owner, ""))
 
     def _value(self, given: Given, reader: Instance | None, prefix: str) -> Any:
@@ -263,6 +273,8 @@ class _Builder:
         if isinstance(declared, Input) or basic.kind == "Boolean" or (given is None and not fixed):
             return
         outside = given is not None and given.scope is not None and given.scope[0] is not self.instance
+        if given is not None:
+            demand_determined(f"{path}.start", given)
         value = (
             0.0
             if given is None or given.value is None

@@ -133,6 +133,7 @@ class Instance:
         self.initial_equations: list[tuple[Statement, ClassText]] = []
         self.algorithm: list[tuple[Statement, ClassText]] = []
         self.folded: set[str] = set()
+        self.free: dict[str, str] = {}
         self._replaced = {name: entry for name, entry in given.inner.items() if isinstance(entry.redeclared, ClassText)}
         self._demand(given, self._collect(text, given, 0), text)
 

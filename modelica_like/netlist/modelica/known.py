@@ -14,7 +14,7 @@ from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.attributes import check_attributes
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
-from modelica_like.netlist.modelica.members import record_of
+from modelica_like.netlist.modelica.members import demand_determined, record_of
 from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import Expr, names_in, substituted
@@ -155,6 +155,7 @@ class _Part:
             self._show(here, Resolver(*unit.scope)(unit.value) if unit.scope else unit.value)
         if given.value is None or given.scope is None:
             return
+        demand_determined(f"{self.name}.{name}", given)
         node = Resolver(*given.scope)(given.value)
         if given.scope[0] is not self.owner or (as_formula(node) is None and node.kind not in (*fold.KNOWN, "array")):
             number = Resolver(*given.scope, numeric=True)(given.value)
@@ -238,6 +239,7 @@ class _Part:
         value: Any = self.known.starts.get(here, 0.0)
         if start is not None and start.value is not None and start.scope is not None:
             outside = start.scope[0] is not self.owner
+            demand_determined(f"{self.name}.{here}.start", start)
             node = Resolver(*start.scope, numeric=outside)(start.value)
             value = self._value(node)
         if fixed:

@@ -10,7 +10,7 @@ from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold, resolve
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, refused, unknown_class
 from modelica_like.netlist.modelica.library import Known
-from modelica_like.netlist.modelica.tree import ClassText, Expr
+from modelica_like.netlist.modelica.tree import ClassText, Expr, names_in
 from modelica_like.netlist.modelica.types import basic_type, misfit
 
 
@@ -139,6 +139,50 @@ def _shape(value: Expr) -> tuple[int, ...] | None:
     inner = {_shape(one) for one in value.args}
     row = inner.pop() if inner else ()
     return None if inner or row is None else (len(value.args), *row)
+
+
+def undetermined(owner: Instance, formula: Expr) -> str:
+    """Return the first parameter with `fixed = false` that a formula of an instance depends on, empty if none."""
+    for name in names_in(formula):
+        member = owner.members.get(name.args[0][0])
+        if member is None or "parameter" not in member.declaration.prefixes:
+            continue
+        key = member.declaration.name
+        if key not in owner.free:
+            owner.free[key] = ""  # one that depends on itself is told elsewhere
+            owner.free[key] = _undetermined(owner, member)
+        if owner.free[key]:
+            return owner.free[key]
+    return ""
+
+
+def _undetermined(owner: Instance, member: Member) -> str:
+    basic, value = basic_type(owner, member), member.given
+    fixed = basic.given.inner.get("fixed") if basic is not None else None
+    if fixed is not None and fixed.value is not None and fixed.scope is not None:
+        told = resolve.Resolver(*fixed.scope, numeric=True)(fixed.value)
+        if told.kind == "boolean" and not told.args[0]:
+            return member.declaration.name
+    if basic is None or value.value is None or value.scope is None or value.scope[0] is not owner:
+        return ""
+    return undetermined(owner, resolve.Resolver(*value.scope)(value.value))
+
+
+def demand_determined(what: str, given: Given) -> None:
+    """Refuse a value that depends on what the initial equations of another class determine.
+
+    Raises:
+        ModelicaTextError: it does.
+    """
+    if given.value is None or given.scope is None:
+        return
+    free = undetermined(given.scope[0], resolve.Resolver(*given.scope)(given.value))
+    if free:
+        raise ModelicaTextError(
+            f"{what} depends on {free}, which has fixed = false: only parameters of its own class may do that.",
+            where=given.scope[1].place(given.value.line),
+            advice="Leave it out, and write an initial equation for it; a parameter needs fixed = false, too.",
+        )
 
 
 def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known | str:
