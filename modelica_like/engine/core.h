@@ -162,7 +162,7 @@ typedef struct { /* of something for which there may be another way */
 } Refusal;
 
 /* points to come back to */
-typedef enum { KEPT_FAILED, KEPT_LED, KEPT_SETTLING, KEPT_TICKS, KEPT_TICK, N_KEPT_STARTS } KeptStart;
+typedef enum { KEPT_FAILED, KEPT_LED, KEPT_SETTLING, KEPT_TICK, N_KEPT_STARTS } KeptStart;
 
 /* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns; `wanting` transitions fire at the
  * end of the piece. */

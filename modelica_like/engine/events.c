@@ -193,7 +193,8 @@ int count_clocks(const Instance *c) {
     return count;
 }
 
-/* Marks what happens when all clocks tick, at whatever time: they, and state events that are due, but no end of a run. */
+/* Marks what happens when all clocks tick, at whatever time: they, and state events that are due, but no end of a
+ * run. */
 static void find_ticking(Instance *c, const double *moments, unsigned char *wanting) {
     const Model *m = c->model;
     unsigned char *changed = memset(c->changed, 0, (size_t)m->n_modes);

@@ -235,7 +235,11 @@ static Result lead(Instance *c) {
         if (step < LEAST_SHARE) return RESULT_ERROR;
         keep_start(c, KEPT_LED, 1);
     }
-    return steady ? check_ticks(c) : RESULT_OK;
+    if (!steady) return RESULT_OK;
+    keep_start(c, KEPT_LED, 0);
+    if (!check_ticks(c)) return RESULT_ERROR;
+    keep_start(c, KEPT_LED, 1);
+    return RESULT_OK;
 }
 
 static Result pass_start(Instance *c) {

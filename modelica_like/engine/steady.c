@@ -122,22 +122,19 @@ static int stays(Instance *c, const double *before, double step) {
 
 /* What samplers keep belongs to a steady state: it is one if clocks may tick, and state events happen on the way, and
  * all stays at rest. The memory of a linear controller that moves nothing in as many ticks as it has numbers never
- * does. The point stays as it is. */
+ * does. Where all is after the last tick tells what changes, though nothing moves with it. */
 Result check_ticks(Instance *c) {
     const Model *m = c->model;
     int rounds = (int)fmin(m->n_updates + m->n_resets + 1, MOST_TICKS), rests = 1;
     double step;
     if (m->n_steady == 0 || count_clocks(c) == 0) return RESULT_OK;
-    keep_start(c, KEPT_TICKS, 0);
     for (int k = 0; k < rounds && rests; k++) {
         const double *before = keep_start(c, KEPT_TICK, 0);
         memcpy(c->d_before, c->d, (size_t)m->n_d * sizeof(double));
         if (!tick(c, &step)) return RESULT_ERROR;
         rests = at_rest(c) && stays(c, before, step);
     }
-    if (!rests) return fail(c, MEMORY_NOT_STEADY, c->state.t);
-    keep_start(c, KEPT_TICKS, 1);
-    return RESULT_OK;
+    return rests ? RESULT_OK : fail(c, MEMORY_NOT_STEADY, c->state.t);
 }
 
 /* The steady state of the present modes near the present point, as long as no clock ticks. */

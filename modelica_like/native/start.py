@@ -82,13 +82,13 @@ def ticked(model: CompiledDae, point: Point) -> Point:
     return _after(model, "tick", point)
 
 
-def check_ticks(model: CompiledDae, point: Point) -> None:
-    """Refuse a steady state that does not stay one when clocks tick.
+def check_ticks(model: CompiledDae, point: Point) -> Point:
+    """Refuse a steady state that does not stay one when clocks tick; return where all is after some ticks.
 
     Raises:
         InitializationError: it does not; the message names what changes.
     """
-    _after(model, "check_ticks", point)
+    return _after(model, "check_ticks", point)
 
 
 def _after(model: CompiledDae, function: str, point: Point) -> Point:

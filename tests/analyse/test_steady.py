@@ -382,20 +382,42 @@ def test_a_start_that_samples_would_move_is_refused():
 
 
 METERED = ["a.flange rotor.flange_b", "meter.y ctl.u_m", "ref.y ctl.u_s", "ctl.y drv.tau"]
-METER = {"ref": Constant(k=10.0), "ctl": P(k=5.0), "a": AngleSensor(), "meter": FrequencyMeter(period=0.1)}
 PULSES = ["hall.flange rotor.flange_b", "hall.y count.u", "count.y meter.u", *METERED]
-NOISE = {"noise": UniformNoise(period=0.1, y_min=-1.0, y_max=1.0)}
+
+
+def metered(wires, k=5.0, **parts):
+    """Torque k·(10 - what a frequency meter shows)."""
+    given = {"ref": Constant(k=10.0), "ctl": P(k=k), "a": AngleSensor(), "meter": FrequencyMeter(period=0.1), **parts}
+    return turned(wires, **given)
+
+
+def counted():
+    return {"hall": PulseSensor(n=4), "count": PulseCounter(u_high=0.5)}
+
+
+def noisy():
+    return turned(["noise.y drv.tau"], noise=UniformNoise(period=0.1, y_min=-1.0, y_max=1.0))
 
 
 @pytest.mark.parametrize(
     ("drive", "named"),
     [
-        (lambda: turned(["noise.y drv.tau"], **NOISE), "noise.uniform"),
-        (lambda: turned(["a.phi meter.u", *METERED], **METER), "meter.last"),
-        (lambda: turned(PULSES, **METER, hall=PulseSensor(n=4), count=PulseCounter(u_high=0.5)), "meter.last"),
+        (noisy, "noise.uniform"),
+        (lambda: metered(["a.phi meter.u", *METERED]), "meter.last"),
+        (lambda: metered(PULSES, **counted()), "meter.last"),
     ],
 )
 def test_what_never_settles_is_named(drive, named):
     """Noise, and the speed of an angle or of pulses that are sampled: they grow from tick to tick."""
     with pytest.raises(InitializationError, match=named):
         steady(drive())
+
+
+def test_what_is_only_read_and_never_settles_has_no_value():
+    """10 N.m turn the load: pulses are counted, and their frequency shown; what is sampled is the speed."""
+    parts = {**counted(), "zero": Constant(k=0.0), "shown": ZeroOrderHold(period=0.1)}
+    wires = ["hall.flange rotor.flange_b", "hall.y count.u", "count.y meter.u", "a.flange rotor.flange_b"]
+    wires += ["ref.y ctl.u_s", "zero.y ctl.u_m", "ctl.y drv.tau", "s.w shown.u"]
+    found = steady(metered(wires, 1.0, **parts))
+    assert (found["rotor.w"], found["shown.y"]) == pytest.approx((10.0 / LOAD, 10.0 / LOAD), rel=1e-12)
+    assert all(np.isnan(found[name]) for name in ("meter.y", "count.number", "count.y"))

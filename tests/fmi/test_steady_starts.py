@@ -18,9 +18,11 @@ from components import (
     Fixed,
     Inertia,
     LossyGear,
+    P,
     QuadraticSpeedDependentTorque,
     SpeedSensor,
     Torque,
+    ZeroOrderHold,
 )
 from modelica_like import simulate
 from modelica_like.language import Assembly, guess
@@ -122,6 +124,20 @@ def test_a_cascade_of_controllers_begins_where_it_settles(exported):
     final = simulate(drive, 0.1).final
     assert [final[one] for one in names] == pytest.approx(settled, abs=1e-9)
     assert case.started("me").getReal([case.ref(one) for one in names]) == pytest.approx(settled, abs=1e-9)
+
+
+def test_a_start_that_samples_would_move_is_refused(exported):
+    """Nothing is sampled at the start; then 5·(10 - w) = 0.2·w, which a start does not look for."""
+    parts = {
+        "wish": Constant(k=10.0), "control": P(k=5.0), "hold": ZeroOrderHold(period=0.1), "torque": Torque(),
+        "rotor": Inertia(J=1.0), "oil": Damper(d=0.2), "wall": Fixed(), "tacho": SpeedSensor(),
+    }  # fmt: skip
+    wires = {"wish": ["wish.y", "control.u_s"], "speed": ["tacho.w", "hold.u"], "held": ["hold.y", "control.u_m"],
+             "u": ["control.y", "torque.tau"], "end": ["rotor.flange_b", "tacho.flange"]}  # fmt: skip
+    sampled = Assembly("sampled", parts=parts, series={"shaft": ["torque", "rotor", "oil", "wall"]}, connect=wires)
+    sampled.simulate.update(start="steady", until=1.0)
+    with pytest.raises(FMICallException):
+        exported(sampled).started("me")
 
 
 def driven(*parts, **wires):

@@ -11,12 +11,12 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError
 from modelica_like.native.start import check_ticks, steady_near, ticked
 from modelica_like.solve.initialize import Point, call
-from modelica_like.solve.initialize.memory import clocks, settling
+from modelica_like.solve.initialize.memory import clocks, depends, settling
 from modelica_like.solve.initialize.slopes import Sizes, slopes
 from modelica_like.solve.initialize.steady import steady_change
 
 _MAX_NEWTON = 40
-_CLOSE = 1e-13
+_CLOSE, _SETTLED = 1e-13, 1e-9
 
 
 def with_samples(model: CompiledDae, point: Point) -> Point:
@@ -45,6 +45,21 @@ def with_samples(model: CompiledDae, point: Point) -> Point:
         point.d[entries] += step
     check_ticks(model, point)
     return point
+
+
+def unsettled(model: CompiledDae, point: Point) -> set[str]:
+    """Return what has no steady value at a steady state, by path: what events change, and variables that read it.
+
+    The motion does not depend on it: counts of the pulses of a turning shaft, noise that is only shown.
+    """
+    if not clocks(model):
+        return set()
+    change = np.abs(check_ticks(model, point).d - point.d) > _SETTLED * (1.0 + np.abs(point.d))
+    kinds = enumerate(model.flat_discretes)
+    # Numbers of ticks grow everywhere, and hidden values are those of clocks; modes are those of the angle there.
+    changed = [k for k, one in kinds if change[k] and not one.hidden and not one.names and one.kind == "number"]
+    reading = np.flatnonzero(depends(model.equations.variables, "d")[:, changed].any(axis=1))
+    return {model.flat_discretes[k].path for k in changed} | {model.flat_variables[k].path for k in reading}
 
 
 def change_with_samples(model: CompiledDae, point: Point, theta: Vector) -> tuple[Vector, Vector]:

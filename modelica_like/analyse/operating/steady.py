@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.operating.sampling import change_with_samples, with_samples
+from modelica_like.analyse.operating.sampling import change_with_samples, unsettled, with_samples
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import to_si
@@ -28,6 +28,8 @@ _ENERGY_LOSS, _ENERGY_SOURCE = 1, 2
 @dataclass(frozen=True, eq=False)
 class OperatingPoint(Shown, Mapping[str, float]):
     """A steady state: all variables, modes and parameters by path, in SI units.
+
+    What events keep changing without moving anything is not a number: noise that is shown, pulses that are counted.
 
     Attributes:
         model: the compiled model with the values of the parameters there.
@@ -126,6 +128,7 @@ def steady(
     values.update(zip(model.discrete_position, map(float, point.d), strict=False))
     values.update(zip(model.parameter_position, map(float, model.p), strict=True))
     values.update(zip(model.derived_position, map(float, model.equations.derived(model.p).full().ravel()), strict=True))
+    values.update(dict.fromkeys(unsettled(model, point), float("nan")))
     return OperatingPoint(model, point, values)
 
 
