@@ -1,6 +1,7 @@
 """Every message of splitting and of co-simulation, as its reader sees it."""
 
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -223,6 +224,32 @@ def test_a_system_file_with_a_mistake(case: str, tmp_path: Path) -> None:
     with pytest.raises(ModelicaLikeError) as told:
         load_system(file, tmp_path)
     assert str(told.value) == sentence
+
+
+def test_a_system_file_that_connects_different_quantities(tmp_path: Path) -> None:
+    units = (
+        '<Unit name="N.m"><BaseUnit kg="1" m="2" s="-2"/></Unit><Unit name="rad/s"><BaseUnit s="-1" rad="1"/></Unit>'
+    )
+    variables = (
+        '<ScalarVariable name="w" valueReference="1" causality="output"><Real unit="rad/s"/></ScalarVariable>'
+        '<ScalarVariable name="tau" valueReference="2" causality="input"><Real unit="N.m" start="0"/></ScalarVariable>'
+    )
+    with zipfile.ZipFile(tmp_path / "a.fmu", "w") as archive:
+        archive.writestr(
+            "modelDescription.xml",
+            '<fmiModelDescription fmiVersion="2.0" modelName="m" guid="1"><CoSimulation modelIdentifier="m"/>'
+            f"<UnitDefinitions>{units}</UnitDefinitions><ModelVariables>{variables}</ModelVariables>"
+            "<ModelStructure/></fmiModelDescription>",
+        )
+    file = tmp_path / "bench.toml"
+    file.write_text('fmus.a = "a.fmu"\nfmus.b = "a.fmu"\n[connect]\nx = ["a.w", "b.tau"]\n')
+    with pytest.raises(ModelicaLikeError) as told:
+        load_system(file, tmp_path)
+    assert str(told.value) == (
+        "b.tau and a.w are different quantities: their units are N.m and rad/s.\n"
+        '  in bench.toml:4 `x = ["a.w", "b.tau"]`\n'
+        "Connect an input with an output of the same quantity."
+    )
 
 
 TAU = Link("tau", Port("a", "tau"), (Port("b", "tau"),))

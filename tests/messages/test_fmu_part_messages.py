@@ -11,10 +11,12 @@ from modelica_like.netlist import loads
 
 DESCRIPTION = """<fmiModelDescription fmiVersion="2.0" modelName="motor" guid="0">
 {kind}
+<UnitDefinitions><Unit name="N.m"><BaseUnit kg="1" m="2" s="-2"/></Unit></UnitDefinitions>
 <ModelVariables>
 <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
 <ScalarVariable name="tau" valueReference="1" causality="output"><Real/></ScalarVariable>
 <ScalarVariable name="w" valueReference="2" causality="output"><Real/></ScalarVariable>
+<ScalarVariable name="load" valueReference="4" causality="input"><Real start="0" unit="N.m"/></ScalarVariable>
 <ScalarVariable name="k" valueReference="3" causality="parameter" variability="fixed"><Real start="1"/></ScalarVariable>
 </ModelVariables>
 <ModelStructure/>
@@ -130,6 +132,11 @@ CASES = {
         f'[parts]\n{MOTOR}\n[connect]\nx = ["motor.tau", "motor.u"]\ny = ["motor.w", "motor.u"]',
         "motor.u is given twice, by x and y.\n"
         + line('x = ["motor.tau", "motor.u"]', 4) + "\n" + line('y = ["motor.w", "motor.u"]', 5) + "\nRemove one.",
+    ),
+    "different quantities": (
+        f'[parts]\n{MOTOR}\nk = {{ is = "Constant", k = "1 rad/s" }}\n[connect]\nx = ["k.y", "motor.load"]',
+        "motor.load and k.y are different quantities: their units are N.m and rad/s.\n"
+        + line('x = ["k.y", "motor.load"]', 5) + "\nConnect an input with an output of the same quantity.",
     ),
     "given twice among the others": (
         wired('x = ["k.y", "end.tau"]\ny = ["motor.tau", "end.tau"]'),

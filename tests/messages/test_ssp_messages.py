@@ -21,6 +21,7 @@ FMU = """<fmiModelDescription fmiVersion="2.0" modelName="m" guid="1"><CoSimulat
 <ScalarVariable name="u" valueReference="2" causality="input"><Real unit="rad/s" start="0"/></ScalarVariable>
 <ScalarVariable name="J" valueReference="3" causality="parameter" variability="fixed"><Real start="1"/></ScalarVariable>
 </ModelVariables><ModelStructure/></fmiModelDescription>"""
+TORQUE = FMU.replace('<BaseUnit s="-1" rad="1" factor="{factor}"/>', '<BaseUnit kg="1" m="2" s="-2"/>')
 IN_SYSTEM = "SystemStructure.ssd"
 HEAD = " ".join(f'xmlns:{name}="{space}"' for name, space in NAMES.items())
 TOP = f'<ssd:SystemStructureDescription {HEAD} version="1.0" name="bench">'
@@ -79,6 +80,8 @@ INNER = '<ssd:Connectors><ssd:Connector name="x" kind="input"/><ssd:Connector na
 CIRCLE = elements(f'<ssd:System name="s">{INNER}</ssd:System>{A}') + wires(
     wire("s/y", "s/x"), "\n", wire("s/x", "s/y"), "\n", wire("s/y", "a/u")
 )
+KILONEWTON_METRE = """<ssd:Units><ssc:Unit name="kN.m"><ssc:BaseUnit kg="1" m="2" s="-2" factor="1000"/></ssc:Unit>
+</ssd:Units>"""
 DIRECT = "Connect the components directly."
 SELF = "Do the conversion in one of the FMUs."
 SYSTEMS: dict[str, tuple[str, str, str]] = {
@@ -171,6 +174,16 @@ SYSTEMS: dict[str, tuple[str, str, str]] = {
         "a.u and b.w have different units, rad/s and rpm, and conversion is not supported.\n"
         f"{at(5, 'b/w', 'a/u')}\n{SELF}",
     ),
+    "quantities": (
+        elements(A, B.replace("a.fmu", "torque.fmu")) + wires(wire("b/w", "a/u")), "",
+        "a.u and b.w are different quantities: their units are rad/s and N.m.\n"
+        f"{at(5, 'b/w', 'a/u')}\nConnect an input with an output of the same quantity.",
+    ),
+    "a value of another quantity": (
+        values('<ssv:Parameter name="u"><ssv:Real value="2" unit="kN.m"/></ssv:Parameter>'), KILONEWTON_METRE,
+        "a.u is in rad/s; 2 kN.m is another quantity.\n"
+        f'  in {IN_SYSTEM}:4 `<Parameter name="u">`\nGive it in rad/s, or in a unit of the same dimension.',
+    ),
     "mapping": (
         bound("<ssd:ParameterMapping/>"), "",
         f"Mappings of parameters (ssm) are not supported.\n  in {IN_SYSTEM}:4 `<ParameterBinding>`\n"
@@ -224,6 +237,7 @@ def told(write: Callable[[zipfile.ZipFile], None], tmp_path: Path) -> str:
         write(archive)
         archive.write(fmu(tmp_path / "a.fmu"), "a.fmu")
         archive.write(fmu(tmp_path / "rpm.fmu", "rpm", 0.10471975511965977), "rpm.fmu")
+        archive.write(fmu(tmp_path / "torque.fmu", "N.m", text=TORQUE), "torque.fmu")
     work.mkdir()
     with pytest.raises(ModelicaLikeError) as error:
         load_system(path, work)
@@ -349,3 +363,13 @@ def test_a_unit_with_two_meanings(tmp_path: Path) -> None:
     with pytest.raises(ModelicaLikeError) as error:
         write_ssp(System("bench", tuple(units), links), tmp_path / "bench.ssp")
     assert str(error.value) == "Two FMUs define the unit 'rpm' differently, which an SSP cannot express."
+
+
+def test_a_unit_without_a_definition_is_no_number(tmp_path: Path) -> None:
+    """Nothing is known of it: it fits everything, also after it has been written and read."""
+    text = FMU.replace('<BaseUnit s="-1" rad="1" factor="{factor}"/>', "")
+    units = Unit("a", fmu(tmp_path / "a.fmu", "turns", text=text)), Unit("b", fmu(tmp_path / "b.fmu"))
+    links = (Link("w", Port("a", "w"), (Port("b", "u"),)),)
+    write_ssp(System("bench", units, links), tmp_path / "bench.ssp")
+    (tmp_path / "work").mkdir()
+    assert load_system(tmp_path / "bench.ssp", tmp_path / "work").links == links

@@ -14,6 +14,7 @@ import tomlkit
 
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, raise_together_or_one
 from modelica_like.fmi.cosimulation import system as kinds
+from modelica_like.fmi.cosimulation.described import check_units
 from modelica_like.fmi.cosimulation.system import Bond, Link, Port, Settings, System, Unit, check_system, find_bonds
 from modelica_like.language.units import ONE, parse_unit, to_si
 from modelica_like.netlist import document as toml
@@ -45,6 +46,7 @@ def load_system(path: Path, work: Path) -> System:
     own_names = read.get("own_names", False)
     system = System(read.get("name", path.stem), units, links, bonds or find_bonds(links), settings, own_names)
     check_system(system)
+    check_units(system, lambda name: lines.source("connect", name))
     return system
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, did_you_mean, raise_together_or_one
-from modelica_like.fmi.cosimulation.described import DescribedFmu, described
+from modelica_like.fmi.cosimulation.described import DescribedFmu, check_units, described
 from modelica_like.fmi.cosimulation.system import Link, Port, Settings, System, Unit, check_system, find_bonds
 from modelica_like.fmi.export import export_fmu
 from modelica_like.language import Assembly, Connector
@@ -82,6 +82,11 @@ class _Joiner:
         settings = Settings(until if until is None else seconds(until))
         system = System(self.document.name, tuple(units), tuple(links), find_bonds(links), settings)
         check_system(system)
+        check_units(
+            system,
+            lambda name: self.document.lines.source("connect", name),
+            lambda port: port.variable if port.unit == self.title else str(port),
+        )
         return system
 
     def _tried(self, section: str, name: str, action: Any, *arguments: Any) -> Any:

@@ -6,6 +6,7 @@ Both versions have the same namespaces; 2.0 has the types of FMI 3.0.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Literal
 
 from modelica_like.errors import NetlistError
@@ -75,7 +76,8 @@ def _component(
     component = element(
         parts, "ssd:Component", name=unit.name, type=FMU_TYPE, source=source, implementation="CoSimulation"
     )
-    variables = [fmu.variables[port.variable] for port in ports if port.unit == unit.name]
+    known = {name: one if one.unit in fmu.units else replace(one, unit="") for name, one in fmu.variables.items()}
+    variables = [known[port.variable] for port in ports if port.unit == unit.name]
     if variables:
         connectors = element(component, "ssd:Connectors")
         for variable in variables:
@@ -88,7 +90,7 @@ def _component(
         given = element(group, "ssv:Parameters")
         for name, value in unit.parameters.items():
             parameter = element(given, "ssv:Parameter", name=name)
-            _type(parameter, "ssv", fmu.variables[name], version, value)
+            _type(parameter, "ssv", known[name], version, value)
 
 
 def _type(parent: Element, prefix: str, variable: FmuVariable, version: Version, value: float | None = None) -> None:
@@ -117,9 +119,9 @@ def _units(top: Element, used: list[tuple[DescribedFmu, str]]) -> None:
     units: dict[str, UnitDefinition] = {}
     for fmu, name in used:
         unit = fmu.variables[name].unit
-        if not unit:
+        if unit not in fmu.units:
             continue
-        definition = fmu.units.get(unit, UnitDefinition(unit))
+        definition = fmu.units[unit]
         if units.setdefault(unit, definition) != definition:
             raise NetlistError(f"Two FMUs define the unit '{unit}' differently, which an SSP cannot express.")
     if units:

@@ -12,7 +12,7 @@ from typing import Any
 
 from modelica_like.errors import DuplicateName, NetlistError, Source
 from modelica_like.fmi.cosimulation import ssp_elements as ssp
-from modelica_like.fmi.cosimulation.described import UnitDefinition, described
+from modelica_like.fmi.cosimulation.described import UnitDefinition, described, refuse_other_unit
 from modelica_like.fmi.cosimulation.ssp_document import COSIMULATION, NAMES
 from modelica_like.fmi.cosimulation.ssp_elements import Element, ElementPath, Files, Target, needed, number, place
 from modelica_like.fmi.cosimulation.system import Bond, Link, Port, Settings, System, Unit, check_system, find_bonds
@@ -161,16 +161,11 @@ class _Reader:
         return Port(self.names[target[0]], target[1])
 
     def _check_units(self, target: Target, way: list[_Drive]) -> None:
-        """Refuse connections that would need a unit conversion."""
+        """Refuse connections that would need a unit conversion, unless that is suppressed."""
         ends = [target, *(drive.source for drive in way)]
-        first, *others = [unit for end in ends for unit in self._units_of(end)] or [UnitDefinition("1")]
-        other = next((unit for unit in others if not first.same_scale(unit)), None)
-        if other is not None and all(drive.converts for drive in way):
-            raise NetlistError(
-                f"{_text(target)} and {_text(way[-1].source)} have different units, {first.name} and {other.name}, "
-                "and conversion is not supported.",
-                where=way[0].place, advice="Do the conversion in one of the FMUs.",
-            )  # fmt: skip
+        if all(drive.converts for drive in way):
+            units = [unit for end in ends for unit in self._units_of(end)]
+            refuse_other_unit(_text(target), _text(way[-1].source), units, way[0].place)
 
     def _units_of(self, end: Target) -> list[UnitDefinition]:
         path, name = end
@@ -191,6 +186,11 @@ class _Reader:
             given, own_unit = bound[source], fmu.unit_of(name)
             # A value that was given for a connector of a system is in the connector's unit if it has none.
             unit = given.unit if source == target else given.unit or self._unit_of(source)
+            if unit and own_unit and not unit.same_dimension(own_unit):
+                raise NetlistError(
+                    f"{_text(target)} is in {own_unit.name}; {given.value:g} {unit.name} is another quantity.",
+                    where=given.place, advice=f"Give it in {own_unit.name}, or in a unit of the same dimension.",
+                )  # fmt: skip
             value = unit.convert(given.value, own_unit) if unit and own_unit else given.value
             if not isfinite(value):
                 raise NetlistError(f"{_text(target)} = {value:g} is not finite.", where=given.place)
