@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 
 from modelica_like.errors import ModelicaTextError, UnknownName
@@ -165,7 +166,9 @@ def _undetermined(owner: Instance, member: Member) -> str:
             return member.declaration.name
     if basic is None or value.value is None or value.scope is None or value.scope[0] is not owner:
         return ""
-    return undetermined(owner, resolve.Resolver(*value.scope)(value.value))
+    with suppress(ModelicaTextError):  # what cannot be read is told at the parameter
+        return undetermined(owner, resolve.Resolver(*value.scope)(value.value))
+    return ""
 
 
 def demand_determined(what: str, given: Given) -> None:
