@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components import ConstantSpeed, Inertia
+from components import ConstantSpeed, ConstantTorque, Damper, Fixed, Inertia
 from modelica_like import Assembly, build, load, sensitivities, simulate
 from modelica_like.errors import NoGradient
 from modelica_like.netlist import loads
@@ -76,3 +76,16 @@ def test_a_press_that_reaches_a_breakpoint_of_its_force() -> None:
     ]
     found = sensitivities(str(PRESS), of, by)
     assert found[of, by] == pytest.approx((sides[1] - sides[0]) / (2 * width), rel=2e-4)
+
+
+def test_a_value_that_comes_to_rest_has_its_largest_node_anywhere() -> None:
+    """w = tau/d (1 - exp(-d t/J)): after a hundred time constants nothing but errors tells the nodes apart."""
+    parts = {
+        "motor": ConstantTorque(tau_constant=6.0),
+        "J": Inertia(J=1.0, phi=0.0, w=0.0),
+        "d": Damper(d=2.0),
+        "wall": Fixed(),
+    }
+    drive = Assembly("settling", parts=parts, series={"shaft": [*parts]})
+    found = sensitivities(drive, ["max(J.w)", "peak(d.tau)"], ["motor.tau_constant", "d.d"], until=50.0)
+    np.testing.assert_allclose(found.derivatives, [[0.5, -1.5], [1.0, 0.0]], rtol=1e-7, atol=1e-7)

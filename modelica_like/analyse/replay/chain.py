@@ -23,12 +23,12 @@ from modelica_like.analyse.replay.steps import ABSOLUTE, StepFunctions, Toleranc
 from modelica_like.analyse.replay.tangents import Tangents
 from modelica_like.analyse.replay.when import Coincidence, event_time
 from modelica_like.compile.buffers import Vector
-from modelica_like.compile.compiled import TERMINAL, CompiledDae
+from modelica_like.compile.compiled import TERMINAL, CompiledDae, CompiledTransition
 from modelica_like.errors import LanguageError, NoGradient
 from modelica_like.native.start import initialize
 from modelica_like.runs.solution import Solution
 from modelica_like.solve.initialize import Point, StartKind, holding
-from modelica_like.solve.initialize.slopes import Sizes
+from modelica_like.solve.initialize.slopes import Sizes, Slopes, slopes
 from modelica_like.solve.recorder import Event, Segment
 
 _SHRINK, _GROW, _SAFETY = 0.2, 8.0, 0.8
@@ -73,6 +73,7 @@ class Replay:
         start_d: derivatives of its discrete values, shape (nd, np + nu), likewise.
         chances: motions of zero that modes hold from the start, by (x, theta) there.
         silent: nodes at which rates or integrands jump without an event, and how the time of that moves.
+        ticks: of clocks at the start, and their moments as they are before.
     """
 
     functions: StepFunctions
@@ -82,6 +83,7 @@ class Replay:
     start_d: ca.DM = field(default_factory=lambda: ca.DM(0, 0))
     chances: list[Coincidence] = field(default_factory=list)
     silent: list[tuple[Point, Coincidence]] = field(default_factory=list)
+    ticks: list[tuple[CompiledTransition, Slopes]] = field(default_factory=list)
 
     @property
     def model(self) -> CompiledDae:
@@ -300,6 +302,7 @@ class _Maker:
             chances = work.chances()
             start_d = _sparse(product(work.d, whole))
         if changes:
+            self.chain.ticks += self._ticks(point.copy())
             integrands = self.chain.functions.integrands
             jump = make_jump(self.model, point, tuple(self.events[0]), point, integrands, first=True)
             chances += jump.chances
@@ -312,6 +315,13 @@ class _Maker:
         ]
         self.chain.nodes.append(point)
         self.tangents.begin(start_x, start_d)
+
+    def _ticks(self, before: Point) -> Iterator[tuple[CompiledTransition, Slopes]]:
+        """Yield the clocks that tick at the start: the only timed transitions that lead to where they come from."""
+        fired = [self.model.events.transitions[event.transition] for event in self.events[0] if event.transition >= 0]
+        for one in fired:
+            if one.timed and one.target in one.sources:
+                yield one, slopes(self.model, before, "moments", [one.index])
 
     def _append(self, move: Move) -> None:
         self.chain.append(move)

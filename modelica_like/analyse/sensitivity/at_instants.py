@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +12,8 @@ import numpy as np
 from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.edges import Edge
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.sensitivity.values import along
+from modelica_like.analyse.sensitivity.moving_kinks import kinks_at
+from modelica_like.analyse.sensitivity.values import slopes_of
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledTransition
 from modelica_like.compile.soon import time_resolution
@@ -74,30 +75,35 @@ class _Change:
 
 def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
     """Timed events that would come a moment after the start; the start has passed over them."""
-    model, start = chain.model, chain.nodes[0]
-    for transition, part in _passed_over(chain):
-        mode = model.flat_discretes[transition.mode]
+    start = chain.nodes[0]
+    for transition, part in [*chain.ticks, *_passed_over(chain)]:
+        ticks = transition.target in transition.sources
 
-        def matters(one: CompiledTransition = transition, part: Slopes = part) -> bool:
-            multipliers = {0: np.zeros(0)}
-            chain.adjoint(readings, multipliers)
-            for modes in _modes_before(chain, one, part):
-                before = start.copy()
-                before.d[:] = modes
-                share(model, before)
-                solve_implicit(model, before)
-                change = _Change.between(chain, before, start)
-                if any(change.felt(multipliers[0][:, k], reading.quadratures) for k, reading in enumerate(readings)):
-                    return True
-            return False
+        def matters(one: CompiledTransition = transition, part: Slopes = part, ticks: bool = ticks) -> bool:
+            sides = [part.point.d] if ticks else _modes_before(chain, one, part)
+            return _begins_otherwise(chain, readings, sides)
 
-        reading = Reading(float(part.value[0]) - start.t, ((start, part.by[0]),))
-        yield Edge(
-            reading,
-            0.0,
-            _error(start.t, mode.path, mode.names[transition.target], "at the start of the run", transition.source),
-            matters,
-        )
+        # A clock has counted its tick at the start, so its time there is that before.
+        by = part.by[0] * (np.arange(part.by.shape[1]) < part.by.shape[1] - len(start.d)) if ticks else part.by[0]
+        mode = chain.model.flat_discretes[transition.mode]
+        what = "ticks" if ticks else f"becomes {mode.names[transition.target]}"
+        error = _error(start.t, f"{mode.path} {what}", "at the start of the run", transition.source)
+        yield Edge(Reading(float(part.value[0]) - start.t, ((start, by),)), 0.0, error, matters)
+
+
+def _begins_otherwise(chain: Replay, readings: Sequence[Reading], sides: Iterable[Vector]) -> bool:
+    """Whether readings feel that a run begins with other discrete variables, shape (nd,), for a moment."""
+    model, start, multipliers = chain.model, chain.nodes[0], {0: np.zeros(0)}
+    chain.adjoint(readings, multipliers)
+    for modes in sides:
+        before = start.copy()
+        before.d[:] = modes
+        share(model, before)
+        solve_implicit(model, before)
+        change = _Change.between(chain, before, start)
+        if any(change.felt(multipliers[0][:, k], reading.quadratures) for k, reading in enumerate(readings)):
+            return True
+    return False
 
 
 def _modes_before(chain: Replay, passed: CompiledTransition, moment: Slopes) -> Iterator[Vector]:
@@ -140,6 +146,10 @@ def _read_there(chain: Replay, readings: Sequence[Reading], outputs: Sequence[Ou
         for instant in instants:
             for jump in (jump for _, jump in chain.jumps if jump.trigger and _same(chain, jump.before.t, instant)):
                 yield _edge(chain, jump, instant, reading, output)
+        if output.kind in ("end", "at"):
+            node = reading.parts[0][0]
+            for late, by in kinks_at(chain, output.path, node):
+                yield Edge(Reading(late, ((node, by),)), _ROUNDING * _NEAR, _bent(node.t, output.name))
 
 
 def _edge(chain: Replay, jump: Jump, instant: float, reading: Reading, output: Output) -> Edge:
@@ -150,13 +160,23 @@ def _edge(chain: Replay, jump: Jump, instant: float, reading: Reading, output: O
         row = reading.parts[0][1] if reading.parts else np.zeros(len(points[0].x))
         if _Change.between(chain, points[0], points[1]).felt(row, reading.quadratures):
             return True
-        before, after = along(chain, output.path, points) if reading.parts else (0.0, 0.0)
-        return bool(abs(after - before) > _ROUNDING * (abs(before) + abs(after)))
+        if not reading.parts:
+            return False
+        return _differ(chain, *(slopes_of(chain, output.path, point) for point in points))
 
     where = "at the end of the run" if instant == chain.nodes[-1].t else f"when {output.name} is read"
     late = jump.before.t + trigger.shift - instant
-    error = _error(instant, event.mode, event.after, where, event.source)
+    error = _error(instant, f"{event.mode} becomes {event.after}", where, event.source)
     return Edge(Reading(late, ((jump.before, trigger.by),)), _ROUNDING * _NEAR, error, matters)
+
+
+def _differ(chain: Replay, before: Slopes, after: Slopes) -> bool:
+    """Whether a value or its rate jumps: with a kink in time it has on both sides another part of what moves that."""
+    values, rates = ([float(getattr(one, name)[0]) for one in (before, after)] for name in ("value", "rate"))
+    # A motion that is held has rates of rounding, which would not change the value in the whole run.
+    size, span = sum(map(abs, values)), chain.nodes[-1].t - chain.nodes[0].t
+    jumps = abs(values[1] - values[0]), abs(rates[1] - rates[0])
+    return jumps[0] > _ROUNDING * size or jumps[1] > _ROUNDING * (sum(map(abs, rates)) + size / span)
 
 
 def _moved(chain: Replay, point: Point, by: float) -> Point:
@@ -171,9 +191,17 @@ def _same(chain: Replay, time: float, instant: float) -> bool:
     return abs(time - instant) <= _NEAR * max(chain.nodes[-1].t - chain.nodes[0].t, abs(instant))
 
 
-def _error(time: float, mode: str, name: str, instant: str, source: Any) -> NoGradient:
+def _bent(time: float, name: str) -> NoGradient:
     return NoGradient(
-        f"No gradient at t = {time:.9g} s: {mode} becomes {name} exactly {instant}.",
+        f"No gradient at t = {time:.9g} s: {name} is read exactly at a kink or jump of its value.",
+        why="A small change of a parameter moves that to either side, so the derivatives on both sides differ.",
+        advice="Read it at another time.",
+    )
+
+
+def _error(time: float, what: str, instant: str, source: Any) -> NoGradient:
+    return NoGradient(
+        f"No gradient at t = {time:.9g} s: {what} exactly {instant}.",
         where=source,
         why="A small change of a parameter moves it to either side, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",

@@ -5,34 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 
-import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.replay.step import Step, shortened
+from modelica_like.analyse.sensitivity.moving_kinks import kinks_at
 from modelica_like.analyse.sensitivity.values import along, slopes_of, value_at
 from modelica_like.compile.buffers import Vector
-from modelica_like.compile.compiled import CompiledDae
-from modelica_like.compile.edges import kinks_of
 from modelica_like.errors import NoGradient
-from modelica_like.runs.readings import expression_of
-from modelica_like.solve.initialize import Point, call, solve_implicit
+from modelica_like.solve.initialize import Point
 
 _NEAR = 0.05
 _FLAT = 1e-12
 STILL = 1e-11
 """Rate, relative to those on both sides, that is zero."""
-_AT_IT = 1e-8
-"""Distance of an extreme from its kink, relative to the time: steps end 2e-13 before it, searches of it within 1e-9."""
-_BESIDE = 1e-7
-"""Distance of points on both sides of a kink, relative to the time."""
-_NEARER, _STAYS = 0.1, 0.5
-"""Nearer to a kink, at this part of the distance, what jumps is as large; what is merely bent is this part of it."""
 _MOVES = 1e-3
-"""Rate at an extreme, relative to the largest one beside it, that is not zero: where it is found by its value, which is
-flat to twelve digits, it has half of these."""
+"""Rate at an extreme, relative to the largest one beside it, that is not zero: where a node is as high as the top to
+twelve digits, it has about a millionth."""
 _RISES = 1e-6
 """Rise over a step beside an extreme, relative to the range of the value, that is more than errors of its nodes: among
 those of a value that comes to rest, any may be the largest."""
@@ -93,7 +83,7 @@ def _inside(replay: Replay, path: str, k: int, width: float) -> Reading:
     """
     node = replay.nodes[k]
     part, reading = slopes_of(replay, path, node), value_at(replay, path, node)
-    shifts = _shifts(replay, path, node)
+    shifts = [by for _, by in kinks_at(replay, path, node)]
     if shifts:
         first, *others = shifts
         apart = max((float(np.max(np.abs(other - first))) for other in others), default=0.0)
@@ -103,52 +93,9 @@ def _inside(replay: Replay, path: str, k: int, width: float) -> Reading:
     steps = [move for move in replay.moves[k - 1 : k + 1] if isinstance(move, Step)]
     largest = max(abs(float(slopes_of(replay, path, point).rate[0])) for step in steps for point in step.inside())
     rate, longest = abs(float(part.rate[0])), max(step.h for step in steps)
-    if rate > _MOVES * largest and rate * longest > _RISES * width:
+    if rate > _MOVES * largest and rate * longest > max(_RISES * width, _FLAT * abs(reading.value)):
         raise _unknown(replay, path, node, "It has a kink there, and nothing tells how its time moves.")
     return reading
-
-
-def _shifts(replay: Replay, path: str, node: Point) -> list[Vector]:
-    """Return how the times of kinks move at which the value or its rate jumps, by (x, theta) at the node.
-
-    Kinks of the value itself, and of what it follows from, come first: others that the run passes at the same time, as
-    those of a table in the equations of states, leave its rate as it is unless they jump.
-    """
-    model = replay.model
-    kinks, own = model.once(("kinks of", path), lambda: _kinks_of(model, path))
-    rates, size = call(model, model.equations.ode, node), max(1.0, abs(node.t))
-
-    def both(time: float) -> Vector:
-        """Value and rate a moment from the node."""
-        point = Point(node.t + time, node.x + time * rates, node.z.copy(), node.d)
-        solve_implicit(model, point)
-        part = slopes_of(replay, path, point)
-        return np.array([part.value[0], part.rate[0]])
-
-    def jumps(late: float) -> bool:
-        """Whether the value or its rate jumps so much later than the node."""
-        far, near = (abs(both(late + by) - both(late - by)) for by in (_BESIDE * size, _NEARER * _BESIDE * size))
-        return bool(np.any((near > _STAYS * far) & (far > 0.0)))
-
-    for numbers in (range(kinks.count - own, kinks.count), range(kinks.count - own)):
-        there = [kink for kink in (kinks.slopes(node, number) for number in numbers) if kink.rate[0]]
-        times = [-float(kink.value[0] / kink.rate[0]) for kink in there]
-        shifts = [
-            -kink.by[0] / kink.rate[0]
-            for kink, late in zip(there, times, strict=True)
-            if abs(late) <= _AT_IT * size and jumps(late)
-        ]
-        if shifts:
-            return shifts
-    return []
-
-
-def _kinks_of(model: CompiledDae, path: str) -> tuple[Kinks, int]:
-    """Kinks of the equations and of a value, and how many, the last ones, are of the value and of its equations."""
-    value, given = ca.SX(expression_of(model, path)[0]()), model.arguments
-    if ca.depends_on(value, given["z"]):
-        value = ca.vertcat(value, model.equations.alg(*given.values()))
-    return Kinks(model, (), value), len(kinks_of(given, value))
 
 
 def _unknown(replay: Replay, path: str, node: Point, why: str) -> NoGradient:
