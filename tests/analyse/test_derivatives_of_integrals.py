@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 
 from components import ConstantSpeed, Inertia
-from modelica_like import Assembly, sensitivities, simulation_function
+from modelica_like import Assembly, load, sensitivities, simulation_function
+from modelica_like.analyse.replay.chain import replay
+from modelica_like.runs.readings import quadratures, read_output
+from modelica_like.simulation import quick_run
 
-LINKAGES = Path(__file__).parents[2] / "examples/elements/linkages.toml"
+EXAMPLES = Path(__file__).parents[2] / "examples"
+LINKAGES, CIRCUITS = EXAMPLES / "elements/linkages.toml", EXAMPLES / "components/circuits.toml"
 END = 2.0
 OF = ["integral(sin(J.phi/(1 rad))**4)", "mean(sin(J.phi/(1 rad))**4)", "rms(sin(J.phi/(1 rad)))"]
 
@@ -62,3 +66,13 @@ def test_a_torque_that_is_a_mass_times_something() -> None:
     of = "rms(cam_shaft.flange.tau)"
     found = sensitivities(str(LINKAGES), of, "follower.m")
     assert found[of, "follower.m"] == pytest.approx(found.outputs[0].value / found.parameters[0].value, rel=1e-6)
+
+
+def test_the_loss_of_an_ideal_switch_is_rounding_that_asks_for_no_steps() -> None:
+    """A capacitor is charged by C V²/2 (1 - exp(-2 t/(R C))) lost in the resistor, from 1 ms on."""
+    run = quick_run(load(str(CIRCUITS)))
+    column, name = quadratures(run.model, [read_output(run.model, "switch.loss_energy")])
+    assert len(replay(run, column, name).moves) < 30
+    found = sensitivities(run, ["switch.loss_energy", "R1.loss_energy"], "battery.V")
+    lost = 20e-6 * 12.0 * (1 - np.exp(-2 * 9e-3 / (100.0 * 20e-6)))
+    np.testing.assert_allclose(found.derivatives[:, 0], [0.0, lost], rtol=1e-7, atol=1e-12)

@@ -29,6 +29,7 @@ class Tangent:
         errors: of the quadratures and of their derivatives, shape (2, nq).
         amounts: integrals of the amounts of both over the step, shape (2, nq).
         terms: what these would be if nothing cancelled out, shape (2, nq).
+        noise: integrals of the rounding of both, over the unit roundoff, shape (2, nq).
     """
 
     end: Vector
@@ -36,6 +37,12 @@ class Tangent:
     errors: Vector
     amounts: Vector
     terms: Vector
+    noise: Vector
+
+    @property
+    def sizes(self) -> Vector:
+        """Amounts, terms and noise, shape (3, 2, nq)."""
+        return np.stack([self.amounts, self.terms, self.noise])
 
 
 @dataclass(frozen=True)
@@ -67,8 +74,8 @@ class Step:
         nx, nq = len(self.before.x), self.functions.nq
         end, error, *gains = self.functions.tangent(*self._arguments, self.before.z, whole[:nx], whole[nx:])
         # An integrand such as sqrt(abs(x)) has no slope at zero: there the estimate tells nothing.
-        errors, amounts, terms = (np.nan_to_num(gain.reshape(2, nq), posinf=0.0, neginf=0.0) for gain in gains)
-        return Tangent(np.concatenate([end, whole[nx:]]), error.copy(), errors, amounts, terms)
+        errors, amounts, terms, noise = (np.nan_to_num(gain.reshape(2, nq), posinf=0.0, neginf=0.0) for gain in gains)
+        return Tangent(np.concatenate([end, whole[nx:]]), error.copy(), errors, amounts, terms, noise)
 
     def adjoint(self, whole: Vector, Q: Vector) -> Vector:
         """Carry derivatives by (x, theta) to the beginning; Q are those by the quadratures."""

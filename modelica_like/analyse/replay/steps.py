@@ -13,6 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.replay.noise import rounding
 from modelica_like.analyse.replay.tableau import radau
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
@@ -26,7 +27,8 @@ _FINEST, _COARSEST = 1e-13, 1e-3
 _LEFT = 1e-2
 """Part of the wanted error that Newton's method may leave in states and unknowns: integrands feel it as noise."""
 _ROUNDING = 1e-13
-"""Noise of states and unknowns beside their sizes, however small the wanted error is."""
+"""Noise of states and unknowns beside their sizes, however small the wanted error is, and of what follows from them:
+hundreds of roundings."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +53,18 @@ class Tolerances:
         """Estimated error of a step, relative to the states, over what is allowed."""
         return float(np.linalg.norm(relative)) / (len(relative) ** 0.5 * self.rtol**_ORDERS)
 
-    def of_integrals(self, errors: Vector, amounts: Vector, terms: Vector) -> float:
+    def of_integrals(self, errors: Vector, amounts: Vector, terms: Vector, noise: Vector) -> float:
         """Return the largest estimated error of integrals in a step over what is allowed.
 
         Args:
             errors: estimated.
             amounts: integrals of the amounts so far, to which the errors are relative.
             terms: what they would be if all terms of the integrands had one sign: their noise is relative to it.
+            noise: integrals of the rounding of the integrands, over the unit roundoff.
         """
-        allowed = self.rtol**_ORDERS * amounts + max(_LEFT * self.rtol, _ROUNDING) * terms
+        allowed = self.rtol**_ORDERS * amounts + max(_LEFT * self.rtol, _ROUNDING) * terms + _ROUNDING * noise
+        # Of what is nothing but rounding, derivatives are those of the motion, whose steps are short enough for them.
+        allowed[1, amounts[0] <= _ROUNDING * noise[0]] = np.inf
         return float(np.max(np.divide(errors, allowed, out=np.zeros(errors.shape), where=allowed > 0.0), initial=0.0))
 
 
@@ -314,7 +319,7 @@ class StepFunctions:
         """Function of (t, h, x, W, p, u, d, z, S, P) of the beginning: S at the end, and estimates of errors.
 
         S are derivatives of x and P of (p, u, d) in one direction. The estimates are that of S, and for the quadratures
-        and their derivatives those, their amounts and their terms (`_gains`), each of shape (nq, 2).
+        and their derivatives those, their amounts, terms and noise (`_gains`), each of shape (nq, 2).
         """
         return self._cached("tangent", self._make_tangent)
 
@@ -330,12 +335,11 @@ class StepFunctions:
         rates = self._tangent_rates(*self._names, change, P) + self.tableau.gamma * h * first
         error = _solve(matrix, ca.vertcat(rates, ca.MX(self.nz, 1)), self._node_order)
         last = change[self.size - self.nx - self.nz : self.size - self.nz, :]
-        gains = self._estimated_gains(z, change, P, begin, error) if self.nq else [ca.MX(0, 2)] * 3
-        results = [last, error[: self.nx, :], *map(ca.densify, gains)]  # an integrand may be zero for ever
-        return ca.Function("tangent", [*self._names, z, S, P], results)
+        gains = self._estimated_gains(z, change, P, begin, error) if self.nq else [ca.MX(0, 2)] * 4
+        return ca.Function("tangent", [*self._names, z, S, P], [last, error[: self.nx, :], *gains])
 
     def _estimated_gains(self, z: Any, change: Any, P: Any, begin: Any, error: Any) -> list[Any]:
-        """Errors, amounts and terms of the quadratures and of their derivatives: quadratures are states as others.
+        """Errors, amounts, terms and noise of the quadratures and their derivatives: quadratures are states as others.
 
         Args:
             z: implicit unknowns at the beginning.
@@ -349,18 +353,21 @@ class StepFunctions:
         first = ca.horzcat(self._integrands(t, x, z, p, u, d), ca.mtimes(by_w, begin) + ca.mtimes(by_theta, P))
         # What x and z are wrong by is taken along, or an integrand of a stiff motion would seem to be wrong.
         taken = ca.mtimes(by_w, ca.horzcat(self._estimated(W, z), error))
-        weighted, amounts, terms = self._gains(*self._names, change, P)
-        return [ca.fabs(weighted + self.tableau.gamma * h * (first + taken)), amounts, terms]
+        weighted, *sizes = self._gains(*self._names, change, P)
+        return [ca.fabs(weighted + self.tableau.gamma * h * (first + taken)), *sizes]
 
     @cached_property
     def _gains(self) -> ca.Function:
-        """Sums over the stages for quadratures and their derivatives: weighted for the error estimate, amounts, terms.
+        """Sums over the stages for quadratures and their derivatives: weighted for the estimate, amounts, terms, noise.
 
         Arguments after those of a step are tangents (x, z) at the stages and P. Terms are what the amounts would be if
-        nothing cancelled out: the noise of an integrand is that of x and z times its slopes.
+        nothing cancelled out: an integrand is wrong by what x and z are wrong by, times its slopes. Besides, it is
+        rounded: the loss of an ideal switch is nothing else.
         """
         width, change, P = self.nx + self.nz, ca.SX.sym("change", self.size), ca.SX.sym("P", self.nt)
         (powers,), (_, q_w, q_theta) = self._at_stages(self._integrands), self._at_stages(self._parameters)
+        given = list(self.model.arguments.values())
+        rounded = self._function("rounding", ca.densify(rounding(given, self.quadratures)))
         least = ca.vertcat(ABSOLUTE * ca.DM(self.model.equations.nominals), ca.DM.ones(self.nz))
         values: list[Any] = []
         terms: list[Any] = []
@@ -375,6 +382,7 @@ class StepFunctions:
             self._weighted(self.tableau.estimate, values),
             self._weighted(self.tableau.weights, [ca.fabs(value) for value in values]),
             self._weighted(self.tableau.weights, terms),
+            self._weighted(self.tableau.weights, [ca.repmat(one, 1, 2) for one in self._at_stages(rounded)[0]]),
         )
         return ca.Function("gains", [*self._symbols, change, P], [ca.densify(one) for one in sums])
 

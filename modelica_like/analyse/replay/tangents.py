@@ -52,7 +52,7 @@ class Tangents:
         if isinstance(move, Step):
             if tangent is None or move is not tried:
                 tangent = move.tangent(last)
-            self._add(tangent.end, np.stack([tangent.amounts, tangent.terms]))
+            self._add(tangent.end, tangent.sizes)
         else:
             self._add(move.forward(last[:, None])[0][:, 0])
 
@@ -73,9 +73,9 @@ class Tangents:
         largest = np.fmax(self._largest, np.abs(tangent.end[: len(self._largest)]))
         scale = np.maximum(largest, _UNFELT * np.max(largest / nominals) * nominals)
         of_states = self._tolerances.norm(tangent.error / scale) if np.all(scale > 0.0) else 0.0
-        amounts, terms = self._gained[-1] + np.stack([tangent.amounts, tangent.terms])
+        amounts, terms, noise = self._gained[-1] + tangent.sizes
         amounts[1] = np.maximum(amounts[1], _UNFELT * amounts[0])
-        return max(of_states, self._tolerances.of_integrals(tangent.errors, amounts, terms))
+        return max(of_states, self._tolerances.of_integrals(tangent.errors, amounts, terms, noise))
 
     def _add(self, tangent: Vector, gained: Any = 0.0) -> None:
         self._carried.append(tangent)
