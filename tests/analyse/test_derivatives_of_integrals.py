@@ -76,3 +76,8 @@ def test_the_loss_of_an_ideal_switch_is_rounding_that_asks_for_no_steps() -> Non
     found = sensitivities(run, ["switch.loss_energy", "R1.loss_energy"], "battery.V")
     lost = 20e-6 * 12.0 * (1 - np.exp(-2 * 9e-3 / (100.0 * 20e-6)))
     np.testing.assert_allclose(found.derivatives[:, 0], [0.0, lost], rtol=1e-7, atol=1e-12)
+
+
+def test_a_part_without_losses_has_none() -> None:
+    found = sensitivities(turning(), "J.loss_energy", "motor.w_fixed", until=END)
+    assert found.outputs[0].value == found.derivatives[0, 0] == 0.0

@@ -354,7 +354,8 @@ class StepFunctions:
         # What x and z are wrong by is taken along, or an integrand of a stiff motion would seem to be wrong.
         taken = ca.mtimes(by_w, ca.horzcat(self._estimated(W, z), error))
         weighted, *sizes = self._gains(*self._names, change, P)
-        return [ca.fabs(weighted + self.tableau.gamma * h * (first + taken)), *sizes]
+        errors = ca.fabs(weighted + self.tableau.gamma * h * (first + taken))
+        return [ca.densify(one) for one in (errors, *sizes)]
 
     @cached_property
     def _gains(self) -> ca.Function:
