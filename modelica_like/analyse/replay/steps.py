@@ -29,6 +29,8 @@ _LEFT = 1e-2
 _ROUNDING = 1e-13
 """Noise of states and unknowns beside their sizes, however small the wanted error is, and of what follows from them:
 hundreds of roundings."""
+_BESIDE = 1e-15
+"""Errors of an integral beside the largest one that is asked for which are nothing in any units."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,8 @@ class Tolerances:
             noise: integrals of the rounding of the integrands, over the unit roundoff.
         """
         allowed = self.rtol**_ORDERS * amounts + max(_LEFT * self.rtol, _ROUNDING) * terms + _ROUNDING * noise
+        # Losses of parts at rest are the noise of motions beside them, far below the last digit of what these lose.
+        allowed += _BESIDE * np.max(amounts, axis=1, keepdims=True, initial=0.0)
         # Of what is nothing but rounding, derivatives are those of the motion, whose steps are short enough for them.
         allowed[1, amounts[0] <= _ROUNDING * noise[0]] = np.inf
         return float(np.max(np.divide(errors, allowed, out=np.zeros(errors.shape), where=allowed > 0.0), initial=0.0))
