@@ -23,7 +23,7 @@
 #define MOST_STEPS 1000
 #define MOST_ITERATIONS 8
 #define MOST_ROUNDS_OF_STEP 10
-#define MOST_TICKS 100 /* after which what samplers keep is taken to stay */
+#define MOST_TICKS 100  /* after which what samplers keep is taken to stay */
 #define STEP_FOUND 1e-9 /* change by Newton's method after which only the end of all counts: it is but a guess */
 
 /* Rates of moving states and residuals of implicit equations, and their slopes by these unknowns, row by row. Tells
