@@ -32,12 +32,13 @@ from modelica_like.flatten.model import (
 from modelica_like.flatten.parameters import Parameters
 from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
-from modelica_like.language.component import Component, scopes_of
+from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.discrete import HOMOTOPY, INITIAL, TERMINAL
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
 from modelica_like.language.inside import inside
+from modelica_like.language.scopes import scopes_of
 from modelica_like.language.units import ONE, coherent
 
 _WIRE = Source("")

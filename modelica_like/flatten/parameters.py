@@ -14,11 +14,12 @@ from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.dimensions import Dimensions, check_expression
 from modelica_like.flatten.model import FlatParameter
 from modelica_like.flatten.template import column
-from modelica_like.language.component import Component, scope_for, scopes_of
+from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id
 from modelica_like.language.fields import Input, Parameter, Value
 from modelica_like.language.inside import inside
+from modelica_like.language.scopes import scope_for, scopes_of
 from modelica_like.language.units import Unit, coherent, read_quantity
 
 

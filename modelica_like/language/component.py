@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from itertools import chain
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like import upper
-from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source, UnknownName
+from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
 from modelica_like.language.declared import Connector, Declared, Terminal, annotated, refuse_collection, unknown
 from modelica_like.language.equation import Equations
 from modelica_like.language.expr import TIME, Expr
@@ -262,13 +261,13 @@ class Component(Declared):
         return component
 
     def set(self, path: str, value: Any) -> None:
-        """Set a value by its path: `drive.set("clutch.mu", 0.3)`.
-
-        Names in a formula are parameters of this component, also where the path goes into parts of parts.
+        """Set a value by its path, `drive.set("clutch.mu", 0.3)`; names in a formula are parameters of this component.
 
         Raises:
             UnknownName: there is no such part, parameter or variable.
         """
+        from modelica_like.language.scopes import give_by_path
+
         give_by_path(self, path, value)
 
     def source_of(self, key: str) -> Source:
@@ -277,26 +276,15 @@ class Component(Declared):
 
     def place_of(self, name: str = "") -> Source:
         """Return the place of this part in a netlist, of a parameter of the netlist, or of a value given later."""
+        from modelica_like.language.scopes import given_above
+
         root, path = self.root, f"{self.path}.{name}".lstrip(".")
         source = root.source_of(f"set.{path}") if isinstance(root, Component) else NOWHERE
-        source = source if source.file else self._given_above(name)
+        source = source if source.file else given_above(self, name)
         source = source if source.file else self.source_of(f"parameters.{name}")
         if source.file or not isinstance(self._inside.owner, Component):
-            return source
-        # All elements of an array are in one line.
+            return source  # and all elements of an array are in one line
         return self._inside.owner.source_of(f"parts.{self._inside.name.partition('[')[0]}")
-
-    def _given_above(self, name: str) -> Source:
-        """Return the place of a value in the netlist of an owner, which need not be the nearest one."""
-        own = self._inside
-        value = own.values.get(name) or own.starts.get(name)
-        if value is None or own.owner is None or (value.levels < 2 and name in own.starts):
-            return NOWHERE
-        above = owners(self, value.levels)[-1]
-        inner = f"{self.path}.{name}".removeprefix(f"{above.path}.")
-        found = (above.source_of(key) for key in (f"start.{inner}", f"guess.{inner}"))
-        part = inner.partition(".")[0].partition("[")[0]
-        return next((source for source in found if source.file), above.source_of(f"parts.{part}"))
 
     @contextmanager
     def at_its_place(self, name: str = "") -> Generator[None]:
@@ -398,72 +386,14 @@ class Component(Declared):
         return f"{type(self).__name__}({', '.join(values)})"
 
 
-def give_by_path(component: Component, path: str, value: Any, *, above: int = 0) -> None:
-    """Set a value by its path; see `Component.set`.
-
-    Args:
-        component: where the path begins.
-        path: of the value.
-        value: as for `Component.give`.
-        above: how many levels above the component a formula stands, whose names are parameters there.
-
-    Raises:
-        UnknownName: there is no such part, parameter or variable.
-    """
-    owner_path, _, name = path.rpartition(".")
-    owner, levels = component.find(owner_path), path.count(".") + above
-    owner.give(name, value)
-    own = inside(owner)
-    for store in (own.values, own.starts):
-        if name in store and store[name].formula is not None:
-            store[name] = replace(store[name], levels=max(levels, 1))
-
-
-def owners(component: Component, levels: int) -> list[Component]:
-    """Return the owners of a component, the nearest first: as many as there are, and at most `levels`."""
-    found: list[Component] = []
-    owner = inside(component).owner
-    while isinstance(owner, Component) and len(found) < levels:
-        found.append(owner)
-        owner = inside(owner).owner
-    return found
-
-
-def scopes_of(component: Component, value: Value, *, given: bool) -> list[Component]:
-    """Return the components whose names the formula of a value uses; the first that knows a name counts.
-
-    A given value uses the names where its formula stands; what is unknown there is sought in the owner. A default uses
-    those of the component itself.
-    """
-    above = owners(component, value.levels) if given else []
-    return [above[-1], *above[:1]] if above else [component]
-
-
-def scope_for(scopes: Sequence[Component], path: str) -> Component:
-    """Return the first of the components that knows a parameter, or the very first one."""
-    if len(scopes) == 1:
-        return scopes[0]
-    return next((scope for scope in scopes if _knows(scope, path)), scopes[0])
-
-
-def _knows(scope: Component, path: str) -> bool:
-    owner, _, name = path.rpartition(".")
-    try:
-        return isinstance(scope.find(owner).fields.get(name), Parameter | Input)
-    except UnknownName:
-        return False
-
-
 _MOST = 100_000
 _PLAIN: dict[type, str] = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 _Kind = TypeVar("_Kind")
 
 
 def _is_part(value: object) -> bool:
-    if isinstance(value, list):
-        elements = cast("list[object]", value)
-        return bool(elements) and all(isinstance(element, Component) for element in elements)
-    return isinstance(value, Component)
+    elements = cast("list[object]", value) if isinstance(value, list) else [value]
+    return bool(elements) and all(isinstance(element, Component) for element in elements)
 
 
 def _joined(*named: Mapping[str, _Kind]) -> dict[str, _Kind]:

@@ -18,9 +18,9 @@ from modelica_like.errors import (
     raise_together_or_one,
 )
 from modelica_like.language import Assembly, Component, Variable, guess
-from modelica_like.language.component import give_by_path
 from modelica_like.language.fields import Discrete
 from modelica_like.language.inside import declarations, inside
+from modelica_like.language.scopes import give_by_path
 from modelica_like.netlist.document import Document, check_part, parse, read_text
 from modelica_like.netlist.registry import find_type
 from modelica_like.trust import trusting

@@ -12,10 +12,10 @@ from tomlkit.items import Item
 
 from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component
-from modelica_like.language.component import scope_for, scopes_of
 from modelica_like.language.fields import Field, Parameter, Value
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import declarations, inside
+from modelica_like.language.scopes import scope_for, scopes_of
 from modelica_like.language.tables import frozen_rows
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.read import load, new_component

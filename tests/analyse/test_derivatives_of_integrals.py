@@ -8,7 +8,7 @@ import pytest
 
 from components import ConstantSpeed, Inertia
 from modelica_like import Assembly, load, sensitivities, simulation_function
-from modelica_like.analyse.replay.chain import replay
+from modelica_like.analyse.replay.make import replay
 from modelica_like.runs.readings import quadratures, read_output
 from modelica_like.simulation import quick_run
 

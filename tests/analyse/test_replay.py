@@ -7,9 +7,11 @@ import pytest
 
 from components import Fixed, Inertia, SpringDamper
 from modelica_like import build, simulate
-from modelica_like.analyse.replay.chain import Step, Tolerances, replay
 from modelica_like.analyse.replay.kinks import Kinks
+from modelica_like.analyse.replay.make import replay
+from modelica_like.analyse.replay.step import Step
 from modelica_like.analyse.replay.tableau import radau
+from modelica_like.analyse.replay.tolerances import Tolerances
 from modelica_like.language import Component, Equations, series
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

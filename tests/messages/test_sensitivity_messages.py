@@ -11,7 +11,7 @@ import pytest
 
 from components import Freewheel, Inertia
 from modelica_like import Assembly, build, load, sensitivities, simulate, simulation_function
-from modelica_like.analyse.replay.chain import replay
+from modelica_like.analyse.replay.make import replay
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient, StepFailed, UnknownName, ValueOutOfRange
 from modelica_like.language import (
     Component,

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modelica_like.analyse.replay.steps import ABSOLUTE, StepFunctions
+from modelica_like.analyse.replay.steps import StepFunctions
+from modelica_like.analyse.replay.tolerances import ABSOLUTE
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import StepFailed
 from modelica_like.solve.initialize import Point

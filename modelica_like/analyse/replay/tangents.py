@@ -15,7 +15,7 @@ import numpy as np
 from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.analyse.replay.start import product
 from modelica_like.analyse.replay.step import Step, Tangent
-from modelica_like.analyse.replay.steps import Tolerances
+from modelica_like.analyse.replay.tolerances import Tolerances
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 

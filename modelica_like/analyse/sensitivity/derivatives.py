@@ -8,9 +8,10 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from modelica_like.analyse.replay.chain import Reading, Replay, replay
+from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.edges import Edge, edges
-from modelica_like.analyse.replay.steps import Tolerances
+from modelica_like.analyse.replay.make import replay
+from modelica_like.analyse.replay.tolerances import Tolerances
 from modelica_like.analyse.sensitivity.at_instants import at_instants
 from modelica_like.analyse.sensitivity.at_kinks import Candidate, Sides, kinks, natural_size
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas

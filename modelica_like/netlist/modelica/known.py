@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from modelica_like.errors import Source, UnknownName, did_you_mean
 from modelica_like.language import Component, Parameter, Variable, guess
-from modelica_like.language.component import give_by_path
 from modelica_like.language.fields import Input, Output
 from modelica_like.language.inside import declarations
+from modelica_like.language.scopes import give_by_path
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.attributes import check_attributes
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused

@@ -9,11 +9,11 @@ from typing import Any
 
 from modelica_like.errors import ModelicaTextError
 from modelica_like.language import Assembly, Component, Connector, Input, Output, Parameter
-from modelica_like.language.component import scope_for, scopes_of
 from modelica_like.language.fields import Value
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import declarations, inside
 from modelica_like.language.places import located
+from modelica_like.language.scopes import scope_for, scopes_of
 from modelica_like.language.units import coherent, parse_unit, read_quantity, to_si
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.modelica import fold
