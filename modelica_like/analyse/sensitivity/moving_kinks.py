@@ -49,13 +49,11 @@ def kinks_at(replay: Replay, path: str, node: Point) -> list[tuple[float, Vector
         return bool(np.any((near > _STAYS * far) & (near > _FELT * sizes)))
 
     for numbers in (range(kinks.count - own, kinks.count), range(kinks.count - own)):
-        there = [kink for kink in (kinks.slopes(node, number) for number in numbers) if kink.rate[0]]
+        every = (kinks.slopes(node, number) for number in numbers)
+        # Without a division: a rate may be so small that a time has no number.
+        there = [kink for kink in every if kink.rate[0] and abs(kink.value[0]) <= _AT_IT * size * abs(kink.rate[0])]
         times = [-float(kink.value[0] / kink.rate[0]) for kink in there]
-        found = [
-            (late, -kink.by[0] / kink.rate[0])
-            for kink, late in zip(there, times, strict=True)
-            if abs(late) <= _AT_IT * size and jumps(late)
-        ]
+        found = [(late, -kink.by[0] / kink.rate[0]) for kink, late in zip(there, times, strict=True) if jumps(late)]
         if found:
             return found
     return []
