@@ -8,6 +8,7 @@ import pytest
 from modelica_like import sensitivities
 from modelica_like.errors import NoGradient
 from modelica_like.netlist import loads
+from tests.analyse.test_extremes_at_kinks import TABLE
 
 RAMP = """
 [parts]
@@ -20,23 +21,6 @@ a = ["drive", "J"]
 x = ["ramp.y", "drive.tau"]
 [simulate]
 until = "1 s"
-"""
-TABLE = """
-[parts]
-m = { is = "ConstantSpeed", w_fixed = 2, phi = 0 }
-J = { is = "Inertia", J = 1 }
-angle = { is = "AngleSensor" }
-tab = { is = "Table1D", table = [[0, 0], [1, 10], [2, 4]] }
-drive = { is = "Torque" }
-wheel = { is = "Inertia", J = 1, phi = 0, w = 0 }
-[series]
-a = ["m", "J", "angle"]
-b = ["drive", "wheel"]
-[connect]
-q = ["angle.phi", "tab.u"]
-r = ["tab.y", "drive.tau"]
-[simulate]
-until = "0.9 s"
 """
 HELD = """
 [parts]

@@ -148,11 +148,12 @@ WRONG = {
     "z[2:3] := {1, 2}; y := z[2];": (
         "f(time)", "An assignment to several elements of an array: that is not supported here.",
     ),
-    "z := {1, 2}; y := z[1];": ("f(true)", "u of f is of type Real: True does not fit."),
-    "y := n;": ("f(1, n = 2.5)", "n of f is of type Integer: 2.5 does not fit."),
+    "z := {1, 2}; y := z[1];": ("f(true)", "u of f is a Real, and true is none."),
+    "y := n;": ("f(1, n = 2.5)", "n of f is an Integer, and 2.5 is none."),
     "y := w[1];": ("f(1, w = {1, 2})", "w of f has 3 elements, not 2."),
     "y := w[2];": ("f(1, w = 1)", "w of f is an array."),
     "y := u;": ("f(1, u = 2)", "These arguments of f: that is not supported here."),
+    'assert(\nu < 0.5,\n"too large"); y := u;': ("f(2)", "f refuses its arguments: too large."),
     'assert(u < 0.5, "too large"); y := u;': ("f(2)", "f refuses its arguments: too large."),
     "if u > 1 then z := {1, 2, 3}; else z := zeros(2); end if; y := z[1];": (
         "f(time)", "The values of an 'if' have different sizes.",

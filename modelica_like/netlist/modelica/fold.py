@@ -136,14 +136,19 @@ def _of_arrays(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
     return Expr("array", tuple(operation(kind, row, line) for row in rows), line)
 
 
+def identity(size: int, line: int) -> Expr:
+    """Return the unit matrix."""
+    rows = (tuple(number(row == column, line) for column in range(size)) for row in range(size))
+    return Expr("array", tuple(Expr("array", row, line) for row in rows), line)
+
+
 def _power(base: Expr, exponent: Expr, line: int) -> Expr:
     """Return the power of a square matrix, by repeated products."""
     times, size = exponent.args[0] if exponent.kind == "number" else -1.0, len(base.args)
     square = base.kind == "array" and all(row.kind == "array" and len(row.args) == size for row in base.args)
     if not square or not 0 <= times <= _LARGEST_POWER or times != int(times):
         raise Unfit(f"Only a square matrix has powers, from 0 to {_LARGEST_POWER}: .^ is element by element")
-    unit = (tuple(number(row == column, line) for column in range(size)) for row in range(size))
-    result = Expr("array", tuple(Expr("array", row, line) for row in unit), line)
+    result = identity(size, line)
     for _ in range(int(times)):
         result = _product(result, base, line)
     return result

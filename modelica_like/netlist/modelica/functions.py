@@ -9,6 +9,7 @@ from modelica_like.errors import ModelicaTextError
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Given, Instance, refused
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
+from modelica_like.netlist.modelica.types import basic_type, misfit
 
 if TYPE_CHECKING:
     from modelica_like.netlist.modelica.resolve import Resolver
@@ -47,8 +48,7 @@ def _identity(args: tuple[Expr, ...], line: int) -> Expr:
         raise fold.Unfit("The size of an array must be known")
     size = fold.count(args[0].args[0])
     fold.count(size * size)
-    rows = (tuple(fold.number(row == column, line) for column in range(size)) for row in range(size))
-    return Expr("array", tuple(Expr("array", row, line) for row in rows), line)
+    return fold.identity(size, line)
 
 
 def _scalar(args: tuple[Expr, ...], _: int) -> Expr:
@@ -144,9 +144,8 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
 class _Call:
     def __init__(self, resolver: Resolver, text: ClassText) -> None:
         self.resolver, self.text = resolver, text
-        inside = Instance(resolver.classes, text, Given())
-        self.algorithm, self.members = inside.algorithm, inside.members
-        self.declared = {name: member.declaration for name, member in inside.members.items()}
+        self.inside = Instance(resolver.classes, text, Given())
+        self.declared = {name: member.declaration for name, member in self.inside.members.items()}
         self.local: dict[str, Expr] = {}
 
     def result(self, given: tuple[Expr, ...], named: Mapping[str, Expr], line: int) -> Expr:
@@ -178,7 +177,7 @@ class _Call:
             if name not in self.local:
                 self.local[name] = self._start(name, line)
         own = self.text
-        for statement, text in self.algorithm:
+        for statement, text in self.inside.algorithm:
             self.text = text
             self.run([statement])
         self.text = own
@@ -196,16 +195,16 @@ class _Call:
             if size.kind == "number" and size.args[0] != len(value.args):
                 raise fold.Unfit(f"{label} has {size.args[0]:g} elements, not {len(value.args)}")
             value = value.args[0] if value.args else fold.number(0)
-        wrong = {"Real": ("boolean", "string"), "Integer": ("boolean", "string"), "Boolean": ("number", "string")}
-        for item in fold.elements(self.local[name]):
-            broken = declared.type == "Integer" and item.kind == "number" and item.args[0] != int(item.args[0])
-            if broken or item.kind in wrong.get(declared.type, ()):
-                raise fold.Unfit(f"{label} is of type {declared.type}: {item.args[0]} does not fit")
+        basic = basic_type(self.inside, self.inside.members[name])
+        wrong = misfit(self.local[name], basic) if basic is not None else ""
+        if wrong:
+            raise fold.Unfit(f"{label} {wrong}")
 
     def _start(self, name: str, line: int) -> Expr:
-        declaration, entry = self.declared[name], self.members[name].given
+        declaration, member = self.declared[name], self.inside.members[name]
+        entry = member.given
         if entry.value is not None:
-            return self.here(entry.scope[1] if entry.scope else self.members[name].text)(entry.value)
+            return self.here(entry.scope[1] if entry.scope else member.text)(entry.value)
         if "input" in declaration.prefixes:
             raise refused(f"{self.text.name} without its argument {name}", self.resolver.text, line)
         shape = tuple(self.here()(dimension) for dimension in declaration.dimensions if dimension.kind != "all")
@@ -243,7 +242,8 @@ class _Call:
     def insist(self, statement: Statement) -> None:
         """Refuse what an assertion excludes; what only a run knows is not checked."""
         given = statement.parts[0].args[1]
-        if given and self.here()(given[0]) == Expr("boolean", (False,), given[0].line):
+        holds = self.here()(given[0]) if given else None
+        if holds is not None and holds.kind == "boolean" and not holds.args[0]:
             said = given[1].args[0] if len(given) > 1 and given[1].kind == "string" else "no reason is given"
             raise fold.Unfit(f"{self.text.name} refuses its arguments: {said}")
 
