@@ -10,7 +10,19 @@ from scipy.optimize import brentq
 
 from modelica_like import Assembly, build, export_fmu, load, run_fmu, simulate
 from modelica_like.errors import LimitPassed, ModelicaTextError
-from modelica_like.language import Component, Equations, Events, Parameter, Variable, der, param, terminate, var, when
+from modelica_like.language import (
+    Component,
+    Equations,
+    Events,
+    Parameter,
+    Variable,
+    any_of,
+    der,
+    param,
+    terminate,
+    var,
+    when,
+)
 from modelica_like.netlist import loads
 from modelica_like.netlist.modelica.netlist_form import netlist_text
 from modelica_like.netlist.modelica.write import modelica_text
@@ -349,3 +361,19 @@ def test_the_value_of_an_input_is_an_equation(kind: str, tmp_path: Path) -> None
     assert result["one.y"] == pytest.approx(0.5 * t**3 + t - 1 + np.exp(-t), rel=1e-8, abs=1e-10)
     assert result["constant_rate.y"] == pytest.approx(4 * t, rel=1e-10, abs=1e-12)
     assert result["one_s"] == pytest.approx(2.0)
+
+
+class Counting(Component):
+    """Conditions as numbers, as the language has them: x climbs by 1 before 1, by 3 before 2, and then by 2."""
+
+    x: Variable = var("1")
+
+    def equations(self) -> Equations:
+        before = [self.x < bound for bound in (1.0, 2.0)]
+        yield der(self.x) == 2 + before[1] - 2 * before[0] * any_of(before[0], self.x < 0)
+
+
+def test_a_condition_that_is_a_number_is_written_with_if(tmp_path: Path) -> None:
+    (tmp_path / "counting.mo").write_text(modelica_text(Assembly("drive", parts={"law": Counting()})), encoding="utf-8")
+    run = simulate(load(tmp_path / "counting.mo"), 2)
+    assert run["law.x"][-1] == pytest.approx(2 + 2 * (2 - 1 - 1 / 3), abs=1e-6)

@@ -38,6 +38,8 @@ _SINGLE: dict[int, Callable[[str], str]] = {
     ca.OP_NEG: lambda x: f"(-{x})", ca.OP_SQ: lambda x: f"{x}^2", ca.OP_TWICE: lambda x: f"(2*{x})",
     ca.OP_INV: lambda x: f"(1/{x})", ca.OP_NOT: lambda x: f"(not {x})", ca.OP_ASSIGN: lambda x: x,
 }  # fmt: skip
+_JOINING = {ca.OP_AND, ca.OP_OR, ca.OP_NOT}
+_CONDITIONS = {*_JOINING, ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
 
 
 def class_of_equations(
@@ -71,7 +73,7 @@ def class_of_equations(
         if isinstance(statement, Equation):
             sides = ca.vertsplit(ca.cse(ca.vertcat(statement.left, statement.right)))
             events = event_steps(sides[0] - sides[1])
-            left, right = (_text(side, component, events=events) for side in sides)
+            left, right = (_value(side, component, events=events) for side in sides)
             lines.append(f"  {left} = {right};")
     return "\n".join([*lines, *_events(component), f"end {name};"])
 
@@ -86,7 +88,7 @@ def _events(component: Component) -> list[str]:
     for name, mode in component.modes.items():
         goes = [e for e in events if isinstance(e, Transition) and e.mode.mode is mode and not e.fails]
         begins = [e for e in events if isinstance(e, StartMode) and e.mode.mode is mode]
-        chosen = " else".join(f"if {_text(b.when, component, True)} then {mode.number(b.target)}" for b in begins)
+        chosen = " else".join(f"if {_condition(b.when, component, True)} then {mode.number(b.target)}" for b in begins)
         first = str(mode.number(component.start_mode(name)))
         first = f"{chosen} else {first}" if chosen else first
         rest = "".join(f" elseif {_due(t, component)} then {mode.number(t.target)}" for t in goes)
@@ -96,14 +98,14 @@ def _events(component: Component) -> list[str]:
     for k, event in enumerate(resets):
         lines.append(f"  {'elsewhen' if k else 'when'} {_due(event, component)} then")
         for target, value in event.reset.items():
-            symbol, new = symbols_in(target)[0], _text(value, component, True)
+            symbol, new = symbols_in(target)[0], _value(value, component, True)
             field = symbol.owner.fields[symbol.name]
             _check_reset(component, symbol, value)
             path = identifier(relative_path(symbol.owner, component, symbol.name))
             lines.append(f"    {path} = {new};" if isinstance(field, Discrete) else f"    reinit({path}, {new});")
     lines += ["  end when;"] if resets else []
     for event in ends:
-        conditions = ", ".join(_text(each, component) for each in event.conditions)
+        conditions = ", ".join(_condition(each, component) for each in event.conditions)
         texts = (key.text.replace('"', "'") for _, new in event.branches for key in new if isinstance(key, Ending))
         written = (f'    terminate("{re.sub(r"[{}]", "", text)}");' for text in texts)
         lines += [f"  when {{{conditions}}} then", *written, "  end when;"]
@@ -126,9 +128,9 @@ def _due(transition: Transition, component: Component, before: bool = True) -> s
     name = f"pre({name})" if before else name
     sources = " or ".join(f"{name} == {transition.mode.mode.number(source)}" for source in transition.sources)
     when = (
-        f"time >= {_text(transition.at, component, before)}"
+        f"time >= {_value(transition.at, component, before)}"
         if transition.when is None
-        else _text(transition.when, component, before)
+        else _condition(transition.when, component, before)
     )
     return f"({sources}) and {when}"
 
@@ -209,6 +211,30 @@ def connector_class(connector: Connector) -> str:
     raise ModelicaTextError(f"{connector.label} is a {type(connector).__name__}, which has no counterpart in Modelica.")
 
 
+def _is_condition(node: Any) -> bool:
+    """Return whether an expression is a condition; in the language it is also the number 1 or 0, in Modelica not."""
+    if node.is_symbolic():
+        symbol = symbols_in(node)[0]
+        return isinstance(symbol, Marker) and symbol.kind == "relation"
+    return not node.is_constant() and node.op() in _CONDITIONS
+
+
+def _condition(expression: Any, component: Component, before: bool = False, events: Collection[int] = ()) -> str:
+    """Return a condition as text; for the arguments see `_text`."""
+    node = ca.SX(expression)
+    return str(bool(float(node))).lower() if node.is_constant() else _text(node, component, before, events)
+
+
+def _value(expression: Any, component: Component, before: bool = False, events: Collection[int] = ()) -> str:
+    """Return a number as text; for the arguments see `_text`."""
+    node = ca.SX(expression)
+    text = _text(node, component, before, events)
+    if not _is_condition(node):
+        return text
+    text = f"if {text} then 1 else 0"
+    return f"({text})" if _has_events(node, events) else f"noEvent({text})"
+
+
 def _text(expression: Any, component: Component, before: bool = False, events: Collection[int] = ()) -> str:
     """Return an expression as text, with values before an event or the present ones, and steps that make events."""
     node = ca.SX(expression)
@@ -220,8 +246,9 @@ def _text(expression: Any, component: Component, before: bool = False, events: C
         if symbol is TIME:
             return "time"
         if isinstance(symbol, Marker) and symbol.kind in ("relation", "floor"):
-            inside = _text(symbol.of, component, before)
-            return inside if symbol.kind == "relation" else f"floor({inside})"
+            if symbol.kind == "relation":
+                return _condition(symbol.of, component, before)
+            return f"floor({_value(symbol.of, component, before)})"
         owner = symbol.owner  # None of what only the language has, such as a delay
         field = owner.fields.get(symbol.name) if owner is not None else None
         if owner is None or (field is None and symbol.name not in getattr(owner, "modes", {})):
@@ -231,8 +258,12 @@ def _text(expression: Any, component: Component, before: bool = False, events: C
             return f"pre({path})"
         return "der(" * symbol.order + path + ")" * symbol.order
     if silence(node):
-        return _text(node.dep(0), component, before)
-    operation, args = node.op(), [_text(operand, component, before, events) for operand in operands(node)]
+        return _condition(node.dep(0), component, before)
+    operation, args = node.op(), list[str]()
+    compared = operation in (ca.OP_EQ, ca.OP_NE) and all(map(_is_condition, operands(node)))
+    for k, operand in enumerate(operands(node)):
+        joined = operation in _JOINING or compared or (operation == ca.OP_IF_ELSE_ZERO and k == 0)
+        args.append((_condition if joined else _value)(operand, component, before, events))
     quiet = not _has_events(node, events)
     if operation in _SIGNS:
         return f"({args[0]} {_SIGNS[operation]} {args[1]})"
