@@ -218,6 +218,10 @@ class NoValidModes(SolveError):
     """No combination of the modes of ideal elements is possible."""
 
 
+class ContradictingValue(SolveError):
+    """An event gives a variable a value that something else determines."""
+
+
 class LimitPassed(SolveError):
     """A component has ended the run, because a limit was passed."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import casadi as ca
@@ -21,6 +21,7 @@ from modelica_like.compile.groups import (
     StartEntry,
     Starts,
 )
+from modelica_like.compile.keeping import Keeping
 from modelica_like.compile.soon import guards_soon
 from modelica_like.compile.start_system import start_system
 from modelica_like.compile.updates import updates
@@ -135,6 +136,7 @@ class _Builder:
         self.arguments = [flat.time, reduced.x, reduced.z, flat.p, reduced.u, flat.d]
         self.place = {one.path: k for k, one in enumerate(flat.discretes)}
         self.variable = {one.path: k for k, one in enumerate(flat.variables)}
+        self.keeping = Keeping(reduced)
 
     def function(self, name: str, expression: Any) -> ca.Function:
         result = expression if name == "alg_jacobian" else ca.densify(ca.SX(expression))
@@ -161,7 +163,9 @@ class _Builder:
         reduced, flat = self.reduced, self.reduced.flat
         guards, moments, transitions, resets, targets = self.transitions()
         delays, delay_parts = self.delays()
-        news, update_rows = updates(reduced, partial(self._reset, targets=targets), [one[0] for one in delay_parts])
+        news, update_rows = updates(
+            reduced, partial(self._resets, targets=targets), self._kept, [one[0] for one in delay_parts]
+        )
         return EventTables(
             guards=self.function("guards", guards),
             guard_rates=self.function("guard_rates", reduced.total_derivative(guards)),
@@ -206,8 +210,9 @@ class _Builder:
                 store.append(own[number][form.index])
                 changes: list[Reset] = []
                 for path, position in form.resets:
-                    changes.append(self._reset(prefix + path, len(resets), targets))
-                    resets.append(columns["resets"][number][position])
+                    values = columns["resets"][number][position], *self._kept(prefix + path)
+                    changes += self._resets(prefix + path, len(resets), targets)
+                    resets += values
                 numbers = {"mode": self.place[prefix + form.mode], "index": len(store) - 1, "resets": tuple(changes)}
                 found.append(CompiledTransition(**{**vars(form), **numbers}))
         for one in reduced.choices:
@@ -230,15 +235,33 @@ class _Builder:
             found += [tuple(self.place[prefix + name] for name in one) for one in instance.template.delay_parts]
         return ca.vertcat(*(columns[k] for k in sorted(columns))), tuple(found)
 
-    def _reset(self, path: str, value: int, targets: list[int]) -> Reset:
+    def _kept(self, path: str) -> list[Any]:
+        """Return the values of what keeps its value where a variable gets a new one."""
+        return [] if path in self.place else [self.reduced.values[k] for k in self.keeping.beside(self.variable[path])]
+
+    def _resets(self, path: str, value: int, targets: list[int]) -> list[Reset]:
+        """Return what gets the new values from number `value` on: a variable, and what keeps its value then."""
         if path in self.place:
-            return Reset("discrete", self.place[path], 1.0, value, 0)
+            return [Reset("discrete", self.place[path], 1.0, value, 0)]
         node = self.variable[path]
         state = self.reduced.node_states[node]
-        if state is not None:
-            return Reset("state", state[0], state[1], value, 0)
-        targets.append(node)
-        return Reset("value", -1, 1.0, value, len(targets) - 1)
+        if self.sets_states and state is not None:
+            return [Reset("state", state[0], state[1], value, 0)]
+        first, (same, factor) = len(targets), self.keeping.same(node)
+        kept = self.keeping.beside(node)
+        targets += [same, *kept]
+        return [Reset("value", -1, 0.0 if k else factor, value + k, first + k) for k in range(1 + len(kept))]
+
+    @cached_property
+    def sets_states(self) -> bool:
+        """Whether events give new values to states only, and others have nothing to keep then."""
+        paths: set[str] = set()
+        for instance in self.reduced.flat.instances:
+            prefix, template = f"{instance.path}." if instance.path else "", instance.template
+            paths |= {prefix + path for form in template.transitions for path, _ in form.resets}
+            paths |= {prefix + form.target for form in template.update_forms}
+        nodes = [self.variable[path] for path in paths - self.place.keys()]
+        return all(self.reduced.node_states[k] is not None and not self.keeping.beside(k) for k in nodes)
 
     def start_modes(self) -> tuple[Any, StartModes]:
         flat = self.reduced.flat

@@ -21,7 +21,10 @@ _Group = TypeVar("_Group", "Equations", "EventTables", "Held", "Starts")
 
 @dataclass(frozen=True)
 class Reset:
-    """A value that changes at an event: entry of x (`state`), of d (`discrete`), or of the reset nodes (`value`)."""
+    """A value that changes at an event: entry of x (`state`), of d (`discrete`), or of the reset nodes (`value`).
+
+    With a factor of zero a node keeps its value where another one gets a new value, if it gets none itself.
+    """
 
     kind: str
     index: int

@@ -30,7 +30,10 @@ class _Row:
 
 
 def updates(
-    reduced: ReducedDae, reset: Callable[[str, int], Reset], delayed: Sequence[int] = ()
+    reduced: ReducedDae,
+    resets: Callable[[str, int], list[Reset]],
+    keeping: Callable[[str], list[Any]],
+    delayed: Sequence[int] = (),
 ) -> tuple[Any, tuple[CompiledUpdate, ...]]:
     """Return what discrete variables, and variables set by a `when`, become in one iteration of an event.
 
@@ -39,14 +42,15 @@ def updates(
 
     Args:
         reduced: the reduced system.
-        reset: gives the target for its path and the number of the update.
+        resets: gives what is set, for its path and the number of the update, and what keeps its value then.
+        keeping: gives the values of the latter.
         delayed: entries of d that are delayed values at the start.
 
     Raises:
         StructureError: discrete variables depend on each other in a loop.
     """
     flat = reduced.flat
-    rows = _rows(reduced, reset)
+    rows = _rows(reduced, resets, keeping)
     own = [row for row in rows if row.entry is not None]
     old = {row.entry: row.kept for row in own}
     before = [(flat.d[k], old[of if of in old else k]) for k, of in flat.pres.items()]
@@ -72,17 +76,19 @@ def _solve_delays(those: list[int], symbols: list[Any], values: list[Any]) -> No
         values[k] = one
 
 
-def _rows(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> list[_Row]:
+def _rows(
+    reduced: ReducedDae, resets: Callable[[str, int], list[Reset]], keeping: Callable[[str], list[Any]]
+) -> list[_Row]:
     """All updates, those of `pre` without an equation and of `initial()` last."""
     flat = reduced.flat
     columns = evaluate(flat, "updates", reduced.values)
     found: list[_Row] = []
 
     def add(path: str, active: Any, value: Any, source: Source, at_start: bool) -> None:
-        target = reset(path, len(found))
-        entry = target.index if target.kind == "discrete" else None
-        kept = ca.SX(np.inf) if entry is None else ca.SX.sym("old")
-        found.append(_Row(CompiledUpdate(target, at_start, source), path, active, value, kept, entry))
+        for target, new in zip(resets(path, len(found)), [value, *keeping(path)], strict=True):
+            entry = target.index if target.kind == "discrete" else None
+            kept = ca.SX(np.inf) if entry is None else ca.SX.sym("old")
+            found.append(_Row(CompiledUpdate(target, at_start, source), path, active, new, kept, entry))
 
     for number, instance in enumerate(flat.instances):
         prefix = f"{instance.path}." if instance.path else ""

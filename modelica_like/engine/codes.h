@@ -2,7 +2,7 @@
  * those of native/codes.py. In a sentence %g stands for a number, another letter for a place and its name:
  * A above and C (of the same place) below in a table's column, B a block, D a delay, E a start value, I an ideal
  * element, N the notice of a transition, R a value reference, S a state, T the mode of a transition, V the variable of
- * a value reference, Z an implicit unknown. */
+ * a value reference, X a variable by its number, Z an implicit unknown. */
 #define CANNOT_SET(why) "%V cannot be set: " why
 #define NO_DERIVATIVES(why) "There are no derivatives with respect to %V after t = %g s: " why "."
 #define STUCK_TWICE "Where two frictions stick on the same motion, make one compliant, or let one start open."
@@ -37,6 +37,9 @@ FAILURE(STILL_SWITCHING,
 FAILURE(STAYS_TRUE,
     "At %g s the condition of %T stays true: what is set there is at rest, and would pass without another event. Let "
     "it rest: a mode that holds the motion, with a restitution.")
+FAILURE(TWO_NEW_VALUES, "At t = %g s %S gets two new values. Give one to each motion only.")
+FAILURE(NEW_VALUE_CONTRADICTS,
+    "At t = %g s %X cannot become %g: something else determines it. Give new values to what is free to take them only.")
 FAILURE(NO_VALID_MODES,
     "At t = %g s no combination of modes is valid: %I would take %g at once. Give the current another path (a "
     "freewheeling diode), or put a resistance in series with a capacitor.")

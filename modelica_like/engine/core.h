@@ -124,14 +124,16 @@ typedef struct {
         A(start_unknowns, system), A(start_errors, system), A(start_sizes, system),                                  \
         A(kept_starts, N_KEPT_STARTS *(n + 2 * n_d)), A(start_values, starts),                                       \
         A(start_residual, larger(m->n_start_values, resets)), A(delayed, 2 * delays),                                \
-        A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(d_before, n_d), A(d_begun, n_d), A(d_earlier, n_d),  \
-        A(d_fired, n_d), A(reset_values, resets), A(target_values, resets), A(respond_d, n_d), A(respond_z, n_z),    \
-        A(rates, n), A(x_kept, n_x), A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds),  \
-        A(use, holds), A(best, n_d), A(kept_z, n_z), A(reactions, members), A(sizes, members), A(edges, 3 * edges),  \
-        A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n),           \
-        A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d))
+        A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(motions, holds), A(d_before, n_d), A(d_begun, n_d),  \
+        A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),                       \
+        A(target_missing, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x),                \
+        A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d),  \
+        A(kept_z, n_z), A(reactions, members), A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges),   \
+        A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n), A(edge_guards, 2 * guards),           \
+        A(trials, 2 * (n + n_d))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
- * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; idle:
+ * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; jolted: what new
+ * values of states let go; idle:
  * time events that changed nothing of d that is felt by what moves when they came last */
 #define WORK_INDICES(A)                                                                                          \
     A(order, n_z), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), A(member, members), \
@@ -139,8 +141,8 @@ typedef struct {
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
-        A(tuned, m->n_p), A(entered, holds), A(positive, guards), A(idle, m->n_transitions),                        \
-        A(ticking, m->n_transitions), A(felt, n_d)
+        A(tuned, m->n_p), A(entered, holds), A(jolted, holds), A(renewed, m->n_x), A(positive, guards),             \
+        A(idle, m->n_transitions), A(ticking, m->n_transitions), A(felt, n_d)
 
 typedef struct Gradient Gradient; /* see gradient.c */
 
@@ -293,7 +295,8 @@ Result meet(Instance *c, double keep, int *any);
 Result refuse_contradiction(Instance *c);
 Result renew(Instance *c);
 /* impacts.c */
-Result stop_motions(Instance *c, const double *before);
+void keep_motions(Instance *c);
+Result stop_motions(Instance *c, const double *before, int jolts);
 Result strike_here(Instance *c, const unsigned char *entering, unsigned char *knocked, int *hard);
 /* delay.c */
 #define MOST_PAST 16384 /* rows */
@@ -317,6 +320,7 @@ Result update_discrete(Instance *c, int *restart, double *next);
 Result check_turned_back(Instance *c, const double *before);
 double number_or_false(double guard);
 void move_states(Instance *c, const int *nodes, const double *values, int count);
+int take_resets(Instance *c, const unsigned char *firing, double *d);
 void note_change(Instance *c, int name, int transition, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
 /* integrate.c */

@@ -9,6 +9,7 @@
 #define LATER 1e3     /* time resolutions, for the difference of a rate: what turns round in less is at rest */
 #define NEVER 1e29    /* s: a moment that does not come */
 #define CONVERGES 0.9 /* length of a crowd over the one before: rebounds come to their end, chattering does not */
+#define REACHED 1e-9  /* of the largest value of its unit, and of what moves: what a new value may be missed by */
 #define CROWDED 1e-6  /* of the run: in less time, CROWD further instants follow each other ever faster */
 
 /* A guard that is not a number is false; what is nothing but rounding is zero. */
@@ -111,6 +112,25 @@ void move_states(Instance *c, const int *nodes, const double *values, int count)
     for (int k = 0; k < c->model->n_x; k++) c->x[k] += step[k];
 }
 
+/* Gives variables their new values. An error if something else determines one of them: others, or what is given. */
+static Result move_targets(Instance *c, int count) {
+    const Model *m = c->model;
+    double *missing = c->target_missing;
+    if (count < 0) return fail(c, TWO_NEW_VALUES, c->state.t, -1 - count);
+    if (count == 0) return RESULT_OK;
+    variables_now(c);
+    for (int k = 0; k < count; k++) missing[k] = c->target_values[k] - c->variables[c->targets[k]];
+    move_states(c, c->targets, c->target_values, count);
+    for (int k = 0; k < count; k++) {
+        double *slope = c->square, size = fmax(largest_like(m, c->variables, c->targets[k]), fabs(c->target_values[k]));
+        slope_of_node(c, c->targets[k], 0, slope);
+        size += sqrt(dot(m->n_x, slope, slope) * dot(m->n_x, c->point, c->point));
+        if (fabs(missing[k] - dot(m->n_x, slope, c->point)) <= REACHED * size) continue;
+        return fail(c, NEW_VALUE_CONTRADICTS, c->state.t, c->targets[k], c->target_values[k]);
+    }
+    return RESULT_OK;
+}
+
 void note_change(Instance *c, int name, int transition, int mode, int target) {
     const Model *m = c->model;
     const Mode *one = &m->modes[mode];
@@ -123,28 +143,50 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
             text_of(m, names[(int)before]), text_of(m, names[target]));
 }
 
-/* Gives a state or a discrete value its new value, or notes a variable for move_states; tells whether it changes. */
+/* Gives a state or a discrete value its new value, or notes a variable for move_targets; tells whether it changes. What
+ * is to keep its value is noted where it gets no other one. A state that gets two values makes `count` negative. */
 static int take_value(Instance *c, const Reset *one, double value, double *d, int *count) {
     int entry = one->place - c->model->n_x, node = entry - c->model->n_d, discrete = entry >= 0 && node < 0;
     if (!discrete && isinf(value) && d == c->d) return 0; /* an update that sets nothing now */
     if (!discrete) c->stopped = 0;
+    if (node >= 0 && *count < 0) return 1;
     if (node >= 0) {
-        c->targets[*count] = c->model->reset_nodes[node];
-        c->target_values[(*count)++] = value;
+        int target = c->model->reset_nodes[node];
+        for (int k = 0; k < *count && one->factor == 0; k++)
+            if (c->targets[k] == target) return 0;
+        c->targets[*count] = target;
+        c->target_values[(*count)++] = one->factor == 0 ? value : value / one->factor;
         return 1;
     }
     double *place = discrete ? &d[entry] : &c->x[one->place], before = *place;
-    *place = value;
-    return before != value;
+    *place = value / one->factor;
+    if (!discrete && c->renewed[one->place] && fabs(*place - before) > REACHED * fabs(before)) *count = -1 - one->place;
+    if (!discrete) c->renewed[one->place] = 1;
+    return before != *place;
+}
+
+/* Whether what gets a new value at this event is one that keeps its value, which is noted last. */
+static int comes(const Reset *one, int keeping) { return (one->factor == 0) == keeping; }
+
+/* Carries out the resets of transitions, whose values have been evaluated; returns how many variables have been noted
+ * for move_targets. */
+int take_resets(Instance *c, const unsigned char *firing, double *d) {
+    const Model *m = c->model;
+    int count = 0;
+    memset(c->renewed, 0, (size_t)m->n_x);
+    for (int keeping = 0; keeping < 2; keeping++)
+        for (const Reset *one = m->resets; one < m->resets + m->n_resets; one++)
+            if (firing[one->transition] && comes(one, keeping))
+                take_value(c, one, c->reset_values[one->value], d, &count);
+    return count;
 }
 
 /* Fire transitions together; of one mode only the one declared first. An error if one of them ends the run. */
 static Result fire(Instance *c, unsigned char *wanting) {
     const Model *m = c->model;
-    double *values = c->reset_values, *d = c->d_fired;
+    double *d = c->d_fired;
     unsigned char *changed = memset(c->changed, 0, (size_t)m->n_modes);
-    int count = 0;
-    evaluate_now(c, &m->tapes.resets, values);
+    evaluate_now(c, &m->tapes.resets, c->reset_values);
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     for (int k = 0; k < m->n_transitions; k++) {
         const Transition *one = &m->transitions[k];
@@ -159,11 +201,9 @@ static Result fire(Instance *c, unsigned char *wanting) {
         if (*notice) report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, notice);
         d[one->mode] = one->target;
     }
-    for (const Reset *one = m->resets; one < m->resets + m->n_resets; one++)
-        if (wanting[one->transition]) take_value(c, one, values[one->value] / one->factor, d, &count);
+    int count = take_resets(c, wanting, d);
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
-    if (count > 0) move_states(c, c->targets, c->target_values, count);
-    return RESULT_OK;
+    return move_targets(c, count);
 }
 
 /* Evaluate the discrete equations once; tells whether something changes. */
@@ -174,12 +214,13 @@ static Result update_once(Instance *c, int *changes) {
     *changes = 0;
     if (m->n_updates == 0) return RESULT_OK;
     evaluate_now(c, &m->tapes.updates, values);
-    for (const Reset *one = m->updates; one < m->updates + m->n_updates; one++)
-        *changes |= take_value(c, one, values[one->value] / one->factor, c->d, &count);
+    memset(c->renewed, 0, (size_t)m->n_x);
+    for (int keeping = 0; keeping < 2; keeping++)
+        for (const Reset *one = m->updates; one < m->updates + m->n_updates; one++)
+            if (comes(one, keeping)) *changes |= take_value(c, one, values[one->value], c->d, &count);
     if (!*changes) return RESULT_OK;
     c->state.n_events++;
-    if (count > 0) move_states(c, c->targets, c->target_values, count);
-    return share_and_solve(c) && check_singular(c);
+    return move_targets(c, count) && share_and_solve(c) && check_singular(c);
 }
 
 static int ticks(const Instance *c, const Transition *one) {
@@ -210,17 +251,15 @@ static void find_ticking(Instance *c, const double *moments, unsigned char *want
 /* Lets every clock tick once. `step` gets the shortest time to another tick. */
 Result tick(Instance *c, double *step) {
     const Model *m = c->model;
-    double *before = c->outputs, *after = c->guards, *values = c->reset_values, events = c->state.n_events;
+    double *before = c->outputs, *after = c->guards, events = c->state.n_events;
     unsigned char *wanting = nothing_wanting(c);
-    int count = 0, changes = 1;
+    int changes = 1;
     evaluate_now(c, &m->tapes.moments, before);
     find_ticking(c, before, wanting);
-    evaluate_now(c, &m->tapes.resets, values);
+    evaluate_now(c, &m->tapes.resets, c->reset_values);
     for (int k = 0; k < m->n_transitions; k++)
         if (wanting[k]) c->d[m->transitions[k].mode] = m->transitions[k].target;
-    for (const Reset *one = m->resets; one < m->resets + m->n_resets; one++)
-        if (wanting[one->transition]) take_value(c, one, values[one->value] / one->factor, c->d, &count);
-    if (count > 0) move_states(c, c->targets, c->target_values, count);
+    if (!move_targets(c, take_resets(c, wanting, c->d))) return RESULT_ERROR;
     for (int round = 0; round < ROUNDS && changes; round++)
         if (!update_once(c, &changes)) return RESULT_ERROR;
     c->state.n_events = events; /* none of a run */
@@ -282,11 +321,20 @@ static void want_jumped(Instance *c, const double *before, unsigned char *wantin
         if (before[g] < 0 && c->guards_before[g] > 0 && guard_active(c, g)) wanting[c->model->guard_transition[g]] = 1;
 }
 
+/* Whether what is held may get a new speed. */
+static int may_jolt(const Model *m) {
+    int any = 0;
+    for (int k = 0; k < m->n_resets; k++) any |= m->resets[k].place < m->n_x || m->resets[k].place >= m->n_x + m->n_d;
+    for (int k = 0; k < m->n_updates; k++)
+        any |= m->updates[k].place < m->n_x || m->updates[k].place >= m->n_x + m->n_d;
+    return any && m->n_holds > 0;
+}
+
 /* Fire what wants to fire until nothing does. `wanting` holds the state events that were located, if `located`. */
 Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     const Model *m = c->model;
     double *before = c->d_before, *jumped = c->edge_guards;
-    int changes = m->n_updates > 0, rounds = ROUNDS + ALONE * (m->n_holds + m->n_ideals), met;
+    int changes = m->n_updates > 0, rounds = ROUNDS + ALONE * (m->n_holds + m->n_ideals), met, jolts = may_jolt(m);
     double events = c->state.n_events;
     c->stopped = 0;
     memset(c->entered, 0, (size_t)m->n_holds);
@@ -312,17 +360,21 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         c->round = round;
         memcpy(c->d_earlier, before, (size_t)m->n_d * sizeof(double));
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
+        if (jolts) keep_motions(c);
         if (any && !fire(c, wanting)) return RESULT_ERROR;
         if (any && (!share_and_solve(c) || !check_singular(c)))
             return RESULT_ERROR; /* nothing stops what is prescribed */
-        if (any && (!stop_motions(c, before) || !check_singular(c))) return RESULT_ERROR;
+        if (any && (!stop_motions(c, before, jolts) || !check_singular(c))) return RESULT_ERROR;
         if (any && m->n_ideals > 0) {
             int same = round > 0; /* modes return */
             for (int k = 0; k < m->n_ideals; k++) same &= c->d[m->ideals[k].mode] == c->d_earlier[m->ideals[k].mode];
             if (!meet(c, same ? GIVEN_BACK : 0, &met)) return RESULT_ERROR;
         }
         if (m->n_updates > 0 && m->n_guards > 0) evaluate_now(c, &m->tapes.guards, jumped);
+        if (jolts) keep_motions(c);
         if (!update_once(c, &changes)) return RESULT_ERROR;
+        memcpy(c->d_fired, c->d, (size_t)m->n_d * sizeof(double));
+        if (changes && jolts && (!stop_motions(c, c->d_fired, 1) || !check_singular(c))) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) {
             drop_balanced(c, c->guards);

@@ -156,9 +156,36 @@ static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
     }
 }
 
-/* Stop what modes have begun to hold since `before`, by an impulse that all other components pass on. All impacts at an
- * instant are one, from the speeds before the first. */
-Result stop_motions(Instance *c, const double *before) {
+/* Motions that modes may hold, before states get new values. */
+void keep_motions(Instance *c) {
+    const double *values = variables_now(c);
+    for (int k = 0; k < c->model->n_holds; k++) c->motions[k] = values[c->model->holds[k].motion];
+}
+
+/* What new values of states have moved although it is held: friction lets go, as it stops nothing at once, and what
+ * nothing limits is struck. Tells whether friction lets go. */
+static int find_jolted(Instance *c, const Terms *terms, const double *before, unsigned char *entering) {
+    const Model *m = c->model;
+    const double *values = variables_now(c);
+    int any = 0;
+    memset(c->jolted, 0, (size_t)m->n_holds);
+    for (int k = 0; k < m->n_holds; k++) {
+        const Held *one = &m->holds[k];
+        double limit = ROUNDING * fmax(largest_like(m, values, one->motion), one->nominal);
+        int limited = fmax(terms[k].forward, terms[k].backward) < UNLIMITED;
+        if (!entering[k] || before[one->mode] != one->number) continue;
+        entering[k] = fabs(values[one->motion]) > limit && fabs(values[one->motion] - c->motions[k]) > limit;
+        if (!entering[k] || !limited || one->loose < 0) continue;
+        entering[k] = 0;
+        any = c->jolted[k] = 1;
+    }
+    return any;
+}
+
+/* Stop what modes have begun to hold since `before`, by an impulse that all other components pass on; and what is held
+ * and got a new speed since keep_motions, if `jolts`. All impacts at an instant are one, from the speeds before the
+ * first. */
+Result stop_motions(Instance *c, const double *before, int jolts) {
     const Model *m = c->model;
     Strike *strike = &c->strike;
     Terms *terms = c->strike_terms;
@@ -167,7 +194,12 @@ Result stop_motions(Instance *c, const double *before) {
     if (m->n_holds == 0) return RESULT_OK;
     memset(strike->loose, 0, (size_t)m->n_holds);
     find_held(c, terms, strike->entering);
-    for (int k = 0; k < m->n_holds; k++) strike->entering[k] &= before[m->holds[k].mode] != m->holds[k].number;
+    if (jolts && find_jolted(c, terms, before, strike->entering)) {
+        choose_loose(c, c->jolted);
+        if (!share_and_solve(c)) return RESULT_ERROR;
+    }
+    for (int k = 0; k < m->n_holds && !jolts; k++)
+        strike->entering[k] &= before[m->holds[k].mode] != m->holds[k].number;
     if (!any_of(strike->entering, m->n_holds)) return RESULT_OK;
     begin_strike(c, strike, terms);
     if (strike->hard) {

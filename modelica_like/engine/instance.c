@@ -39,6 +39,10 @@ static const char *name_of(const Model *m, char kind, double place) {
         case 'S': return text_of(m, m->state_names[k]);
         case 'T': return text_of(m, m->transitions[k].name);
         case 'Z': return text_of(m, m->implicit_names[k]);
+        case 'X':
+            for (const Variable *one = m->variables; one < m->variables + m->n_variables; one++)
+                if (one->kind == KIND_VARIABLE && one->index == k) v = one;
+            break;
         case 'E':
             for (const Variable *one = m->variables; one < m->variables + m->n_variables; one++)
                 if (one->kind <= KIND_VARIABLE && one->start == k) v = one;

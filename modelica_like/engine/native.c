@@ -210,7 +210,7 @@ EXPORTED int native_states(Native *n, const double *given, double *x) {
         for (int k = 0; k < c->model->n_d; k++) c->d_before[k] = -1;
         memset(c->entered, 0, (size_t)c->model->n_holds);
         c->stopped = c->state.piece_valid = c->state.event_pending = 0;
-        if (!share_and_solve(c) || !stop_motions(c, c->d_before) || !instance_begin(c)) return NATIVE_FAILED;
+        if (!share_and_solve(c) || !stop_motions(c, c->d_before, 0) || !instance_begin(c)) return NATIVE_FAILED;
     }
     memcpy(x, c->x, (size_t)c->model->n_x * sizeof(double));
     return NATIVE_OK;

@@ -189,6 +189,7 @@ static int step_settling(Instance *c, const double *begin, double step) {
 static int fire_settling(Instance *c) {
     const Model *m = c->model;
     int changed = 0;
+    unsigned char *firing = nothing_wanting(c);
     evaluate_now(c, &m->tapes.guards, c->guards_before);
     if (m->n_resets > 0) evaluate_now(c, &m->tapes.resets, c->reset_values);
     memset(c->decided, 0, (size_t)m->n_d);
@@ -198,9 +199,10 @@ static int fire_settling(Instance *c) {
         changed |= c->d[one->mode] != one->target;
         c->decided[one->mode] = 1;
         c->d[one->mode] = one->target;
-        for (const Reset *r = m->resets; r < m->resets + m->n_resets; r++)
-            if (r->transition == k && r->place < m->n_x) c->x[r->place] = c->reset_values[r->value] / r->factor;
+        firing[k] = 1;
     }
+    int count = take_resets(c, firing, c->d_fired); /* of no discrete value */
+    if (count > 0) move_states(c, c->targets, c->target_values, count);
     return changed;
 }
 

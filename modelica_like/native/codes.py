@@ -39,6 +39,8 @@ class Code(IntEnum):
     NOT_SETTLED = auto()
     STILL_SWITCHING = auto()
     STAYS_TRUE = auto()
+    TWO_NEW_VALUES = auto()
+    NEW_VALUE_CONTRADICTS = auto()
     NO_VALID_MODES = auto()
     CONTRADICTS = auto()
     DELAY_NOT_POSITIVE = auto()

@@ -6,7 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
-from modelica_like.errors import Chattering, InitializationError, LimitPassed, ModelicaLikeError, NoGradient, SolveError
+from modelica_like.errors import (
+    Chattering,
+    ContradictingValue,
+    InitializationError,
+    LimitPassed,
+    ModelicaLikeError,
+    NoGradient,
+    SolveError,
+    Source,
+)
 from modelica_like.language.fields import out_of_range
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.native.codes import WORDED, Code
@@ -132,6 +141,34 @@ def _out_of_range(one: Failure) -> ModelicaLikeError:
     return out_of_range(f"{one.numbers[0]:g}", one.name, str(parameter.unit), most, one.numbers[1])
 
 
+def _new_value_contradicts(failure: Failure) -> ModelicaLikeError:
+    variable, (time, value) = failure.model.flat_variables[failure.place], failure.numbers
+    return ContradictingValue(
+        f"At {time:.9g} s {variable.path} cannot become {value:g} {variable.unit}: something else determines it, what "
+        "prescribes its motion or another new value.",
+        where=_of_resets(failure.model, "value", failure.place),
+        advice="Give a new value to what is free to take it only, and to one of those that follow from each other.",
+    )
+
+
+def _two_new_values(failure: Failure) -> ModelicaLikeError:
+    return ContradictingValue(
+        f"At {failure.numbers[0]:.9g} s {failure.model.states[failure.place]} gets two new values.",
+        where=_of_resets(failure.model, "state", failure.place),
+        advice="Give one to each motion only: what is coupled rigidly follows.",
+    )
+
+
+def _of_resets(model: CompiledDae, kind: str, place: int) -> list[Source]:
+    """Source lines that give a state, or a variable by its number, a new value."""
+    events = model.events
+    resets = [(reset, transition.source) for transition in events.transitions for reset in transition.resets]
+    resets += [(row.reset, row.source) for row in events.update_rows]
+    given = ((reset, source) for reset, source in resets if reset.kind == kind and reset.factor)
+    places = ((events.reset_nodes[reset.target] if kind == "value" else reset.index, of) for reset, of in given)
+    return list(dict.fromkeys(source for number, source in places if number == place))
+
+
 def _no_real(one: Failure) -> ModelicaLikeError:
     what = "an array" if one.code is Code.OF_ARRAY else "no real number"
     return NoGradient(f"{one.name} is {what}: it has no derivatives.")
@@ -178,6 +215,8 @@ WRITTEN: dict[Code, Callable[[Failure], ModelicaLikeError]] = {
     Code.NOT_SETTLED: _not_settled,
     Code.STILL_SWITCHING: _still_switching,
     Code.STAYS_TRUE: lambda one: stays_true(one.model, one.point, one.transition),
+    Code.TWO_NEW_VALUES: _two_new_values,
+    Code.NEW_VALUE_CONTRADICTS: _new_value_contradicts,
     Code.NO_VALID_MODES: lambda one: no_valid_modes(one.model, one.point, one.place),
     Code.CONTRADICTS: lambda one: contradiction(one.model, one.point, one.place),
     Code.BELOW_LEAST: _out_of_range,

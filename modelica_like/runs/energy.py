@@ -254,7 +254,10 @@ def energy_balance(
     rows = tuple(map(EnergyRow, model.components, *(column.tolist() for column in columns)))
     exchanged = (inflow, source + work, lost + impact)
     throughput = max([powers.stored, powers.cancelled, *(float(np.sum(np.abs(part))) for part in exchanged)])
-    resets = {number for number, transition in enumerate(model.events.transitions) if transition.resets}
+    # Which `when` came true is not written down: where one sets states, any relation may have been its own.
+    sets_states = any(row.reset.kind != "discrete" for row in model.events.update_rows)
+    relations = {k for k, discrete in enumerate(model.flat_discretes) if sets_states and discrete.hidden}
+    resets = {n for n, one in enumerate(model.events.transitions) if one.resets or one.mode in relations}
     reset = [event.time for event in events if event.transition in resets]
     unexplained = [(hit.time, hit.energy - float(np.sum(work))) for hit, work in zip(impacts, given, strict=True)]
     at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, unexplained)

@@ -251,6 +251,33 @@ class Sampling(Basis):
         yield when(clock(0.1), {self.last: self.x})
 
 
+class Given(Basis):
+    """y is prescribed, and yet gets a value."""
+
+    y: Variable = var("1", "prescribed")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == -1
+        yield self.y == 2 * self.a
+
+    def events(self) -> Events:
+        yield when(self.x < 0.5, {self.y: 1})
+
+
+class GivenTwice(Basis):
+    """Two conditions that come true together give x a value."""
+
+    m = Mode("a", "b")
+    n = Mode("a", "b")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == -1
+
+    def events(self) -> Events:
+        yield self.m.go("a", "b", when=self.x < 0.5, reset={self.x: 2})
+        yield self.n.go("a", "b", when=self.x < 0.5, reset={self.x: 3})
+
+
 def gradient(drive, of, by, do=lambda _: None):
     handle = build(drive).native(outputs=[of], by=[by])
     handle.reset(until=10.0)

@@ -12,12 +12,17 @@ from modelica_like.analyse.replay.holds import impact, projection, share_slopes
 from modelica_like.analyse.replay.when import Coincidence, Trigger, When, at_rest, either_first, event_time
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
+from modelica_like.compile.groups import Reset
+from modelica_like.language.holding import UNLIMITED
 from modelica_like.native.holds import is_hard, share, strike
-from modelica_like.solve.initialize import Point, holding, solve_implicit
+from modelica_like.solve.initialize import Point, call, holding, solve_implicit
+from modelica_like.solve.initialize.holds import capacities
 from modelica_like.solve.initialize.slopes import Sizes, slopes
 from modelica_like.solve.recorder import Event
 
 _SMOOTH = 1e-9
+_JOLT = 1e-9
+"""Change of a held motion, relative to itself or to 1, that is a new value: held motions change by rounding only."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +182,8 @@ class Work:
         model, before = self.model, self.point.d
         transitions = [model.events.transitions[event.transition] for event in events if event.transition >= 0]
         x, d, dx, dd = self.point.x.copy(), self.point.d.copy(), self.x.copy(), self.d.copy()
-        projected: list[tuple[int, int]] = []
+        projected: list[tuple[Reset, float, Vector]] = []
+        motions = self._motions()
         for transition in transitions:
             d[transition.mode] = transition.target
             for reset in transition.resets:
@@ -188,16 +194,20 @@ class Work:
                 elif reset.kind == "discrete":
                     d[reset.index], dd[reset.index] = value, slope
                 else:
-                    projected.append((reset.target, reset.value))
-        values = [self._reset(number) for _, number in projected]
+                    projected.append((reset, value, slope))
         self.point = replace(self.point, x=x, d=d)
         self.x, self.d = dx, dd
         self.share()
-        if projected:
-            self._project([node for node, _ in projected], values)
-            solve_implicit(model, self.point)
-        self._stop_motions(before, later=events[0].round > 0)
+        self._project(projected)
         knocked = [event for event in events if event.transition < 0]
+        for hold in self._jolted(before, motions, limited=True):
+            mode = model.held.motions[hold].mode
+            names = model.flat_discretes[mode].names
+            self.point.d[mode] = next(
+                (names.index(one.after) for one in knocked if model.discrete_position[one.mode] == mode),
+                self.point.d[mode],
+            )
+        self._stop_motions(before, later=events[0].round > 0, jolted=self._jolted(before, motions, limited=False))
         for event in knocked:
             mode = model.discrete_position[event.mode]
             self.point.d[mode] = model.flat_discretes[mode].names.index(event.after)
@@ -208,11 +218,12 @@ class Work:
 
     def update(self) -> bool:
         """Evaluate the discrete equations once; return whether something changes. See events.c."""
-        model, rows = self.model, self.model.events.update_rows
+        rows = self.model.events.update_rows
         if not rows:
             return False
         values, total = self._total("updates")
-        x, d, projected = self.point.x.copy(), self.point.d.copy(), list[int]()
+        motions = self._motions()
+        x, d, projected = self.point.x.copy(), self.point.d.copy(), list[tuple[Reset, float, Vector]]()
         for k, row in enumerate(rows):
             reset = row.reset
             if reset.kind == "discrete":
@@ -220,15 +231,30 @@ class Work:
             elif values[k] != np.inf and reset.kind == "state":
                 x[reset.index], self.x[reset.index] = values[k] / reset.factor, total[k] / reset.factor
             elif values[k] != np.inf:
-                projected.append(k)
+                projected.append((reset, values[k], total[k]))
         if not (projected or (x != self.point.x).any() or (d != self.point.d).any()):
             return False
         self.point = replace(self.point, x=x, d=d)
         self.share()
-        if projected:
-            self._project([rows[k].reset.target for k in projected], [(values[k], total[k]) for k in projected])
-            solve_implicit(model, self.point)
+        self._project(projected)
+        self._stop_motions(d, later=False, jolted=self._jolted(d, motions, limited=False))
         return True
+
+    def _motions(self) -> Vector:
+        """Motions that modes may hold."""
+        if not self.model.held.motions:
+            return np.zeros(0)
+        nodes = [hold.motion for hold in self.model.held.motions]
+        return np.array(call(self.model, self.model.equations.variables, self.point))[nodes]
+
+    def _jolted(self, before: Vector, motions: Vector, *, limited: bool) -> list[int]:
+        """What is held, as before, and has got a new speed; see events.c."""
+        model, held = self.model, holding(self.model, self.point) if len(motions) else []
+        kept = [k for k in held if before[model.held.motions[k].mode] == model.held.motions[k].number]
+        now = self._motions() if kept else motions
+        moved = [k for k in kept if min(abs(now[k] - motions[k]), abs(now[k])) > _JOLT * max(abs(now[k]), 1.0)]
+        capacity = capacities(model, self.point).max(axis=1) if moved else ()
+        return [k for k in moved if (capacity[k] < UNLIMITED) == limited]
 
     def share(self) -> None:
         """Let elements share what they hold together, and solve the implicit equations."""
@@ -243,14 +269,16 @@ class Work:
             self.d[entries] = 0.0
             self.d[entries] = share_slopes(self.model, self.point, circuit, self.x.shape[1], self._total)
 
-    def _stop_motions(self, before: Vector, *, later: bool) -> None:
-        """Stop what modes have begun to hold since `before`, also where it stands still already.
+    def _stop_motions(self, before: Vector, *, later: bool, jolted: list[int]) -> None:
+        """Stop what modes have begun to hold since `before`, also where it stands still already, and what is `jolted`.
 
         In a `later` round nothing has come to a stop: what begins to be held was zero.
         """
         model, point = self.model, self.point
         held = holding(model, point)
-        entering = [k for k in held if before[model.held.motions[k].mode] != model.held.motions[k].number]
+        entering = [
+            k for k in held if k in jolted or before[model.held.motions[k].mode] != model.held.motions[k].number
+        ]
         if not entering:
             return
         hard = is_hard(model, point, entering)
@@ -300,14 +328,21 @@ class Work:
         value, slope = self._total("resets", [number])
         return float(value[0]), slope[0]
 
-    def _project(self, targets: list[int], values: list[tuple[float, Vector]]) -> None:
+    def _project(self, resets: list[tuple[Reset, float, Vector]]) -> None:
         """Change the states as little as possible until variables have their new values; see events.c."""
         model = self.model
-        nodes = [model.events.reset_nodes[k] for k in targets]
+        if not resets:
+            return
+        new: dict[int, tuple[float, Vector]] = {}
+        for reset, value, slope in sorted(resets, key=lambda one: one[0].factor == 0):
+            scale = reset.factor or 1.0
+            new.setdefault(model.events.reset_nodes[reset.target], (value / scale, slope / scale))
+        nodes = [*new]
         solve_implicit(model, self.point)
         present, slope = self._total("variables", nodes)
         back = np.linalg.pinv(slopes(model, self.point, "variables", nodes).x)
-        missing = np.array([value for value, _ in values]) - present
+        missing = np.array([value for value, _ in new.values()]) - present
         change, turn = self._total(f"projection {nodes}", None, lambda: projection(model, nodes), missing)
         self.point = replace(self.point, x=self.point.x + change)
-        self.x = self.x + turn + back @ (np.array([value for _, value in values]) - slope)
+        self.x = self.x + turn + back @ (np.array([slope for _, slope in new.values()]) - slope)
+        solve_implicit(model, self.point)
