@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -163,51 +163,72 @@ def simulate(
     given: dict[str, Any] = {"rtol": rtol, "atol": atol, "points": points, "on_chattering": on_chattering}
     end, chosen = plan(model, until, t0=t0, options=options, **given)
     chosen.check_memory(len(model.states) + len(model.implicit))
-    make = _loop(solver or "idas")
     begin = time.perf_counter()
     kind: StartKind = start or model.settings.get("start", "given")
     settings = {**model.settings, "start": kind, "on_chattering": chosen.on_chattering}
     model = as_asked(model if settings == model.settings else model.twin(settings=settings))
+    run = _Run(model, _loop(solver or "idas"), t0, end, kind, tuple(readings), progress, begin)
+    try:
+        return conserving(run(chosen), run)
+    except StepFailed as error:
+        solution = run.by_run_time(chosen, error) if solver is None else None
+        if solution is None:
+            raise
+        return solution
 
-    def attempt(options: Options) -> Solution:
-        loop = make(model, options, upper.initialize(model, t0, kind), end, progress)
-        asked = collector(model, readings, options.atol)
-        if readings:
-            loop.record.keeper.read = lambda steps: asked.feed(loop.dense(steps))
+
+@dataclass(frozen=True)
+class _Run:
+    """A run that is repeated with other options; the arguments are those of `simulate`, `begin` is on the clock."""
+
+    model: CompiledDae
+    loop: Any
+    t0: float
+    end: float
+    start: StartKind
+    readings: tuple[str, ...]
+    progress: Progress | None
+    begin: float
+
+    def __call__(self, options: Options) -> Solution:
+        model = self.model
+        loop = self.loop(model, options, upper.initialize(model, self.t0, self.start), self.end, self.progress)
+        numbers = collector(model, self.readings, options.atol)
+        if self.readings:
+            loop.record.keeper.read = lambda steps: numbers.feed(loop.dense(steps))
         try:
             loop.run()
         except SolveError as error:
-            error.run = _solution(loop, begin, kind) if loop.record.segments else None
+            error.run = self._solution(loop) if loop.record.segments else None
             raise
         except KeyboardInterrupt as interrupt:
-            raise Interrupted.after(_solution(loop, begin, kind) if loop.record.segments else None) from interrupt
+            raise Interrupted.after(self._solution(loop) if loop.record.segments else None) from interrupt
         for segment in loop.record.segments if model.held.ideal else ():
             refuse_contradiction(model, segment.point(-1))
-        run = _solution(loop, begin, kind)
-        if not readings:
-            return run
-        asked.feed(loop.dense(loop.record.keeper.steps))
-        return replace(run, readings=dict(zip(readings, asked.finish(run), strict=True)))
+        solution = self._solution(loop)
+        if not self.readings:
+            return solution
+        numbers.feed(loop.dense(loop.record.keeper.steps))
+        return replace(solution, readings=dict(zip(self.readings, numbers.finish(solution), strict=True)))
 
-    try:
-        return conserving(attempt(chosen), attempt)
-    except StepFailed as error:
-        if solver is None:
-            # Without a run-time, or if it also fails, the error of IDAS is raised.
-            with suppress(SolveError, ExportError, LanguageError, MissingExtra):
-                run = simulate(
-                    model,
-                    end,
-                    start=start,
-                    t0=t0,
-                    options=chosen,
-                    progress=progress,
-                    solver="native",
-                    readings=readings,
-                )
-                told = f"{error.what} The whole run was done by the compiled run-time instead (solver native)."
-                return replace(run, notices=(told, *run.notices))
-        raise
+    def by_run_time(self, options: Options, failure: StepFailed) -> Solution | None:
+        """Return the run by the compiled run-time instead; None without one, or if it also fails."""
+        with suppress(SolveError, ExportError, LanguageError, MissingExtra):
+            again = replace(self, loop=_loop("native"), begin=time.perf_counter())
+            run = conserving(again(options), again)
+            notice = f"{failure.what} The whole run was done by the compiled run-time instead (solver native)."
+            return replace(run, notices=(notice, *run.notices))
+        return None
+
+    def _solution(self, loop: Any) -> Solution:
+        """Return the results of a loop so far."""
+        record, elapsed = loop.record, time.perf_counter() - self.begin
+        steps, evaluations, integrations = loop.counts
+        statistics = Statistics(steps, evaluations, integrations, len(record.events), elapsed)
+        return Solution(
+            loop.model, loop.options, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
+            tuple(record.notices), self.start, dense=record.keeper.dense(loop),
+        )  # fmt: skip
 
 
 def quick_run(model: Model, until: float | str | None = None, **run: Any) -> Solution:
@@ -256,17 +277,6 @@ def _loop(solver: str) -> Any:
         f"There is no solver '{solver}'{did_you_mean(solver, get_args(Solver)) or '.'}",
         advice="There are idas (the reference) and native (the compiled run-time of FMUs).",
     )
-
-
-def _solution(loop: Any, begin: float, start: StartKind) -> Solution:
-    """Return the results of a loop so far."""
-    record, elapsed = loop.record, time.perf_counter() - begin
-    steps, evaluations, integrations = loop.counts
-    statistics = Statistics(steps, evaluations, integrations, len(record.events), elapsed)
-    return Solution(
-        loop.model, loop.options, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
-        tuple(record.notices), start, dense=record.keeper.dense(loop),
-    )  # fmt: skip
 
 
 def seconds(until: float | str | None, name: str = "until") -> float:

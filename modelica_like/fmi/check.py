@@ -28,7 +28,7 @@ _ALLOWANCE = 10.0
 _LEAST_RANGE = 1e-3
 _ROUNDING = 1e-10
 _TRUTH = 1e-9
-_TOLD = 5
+_NAMED = 5
 _LISTED = 12
 _FIXED = (("In fixed steps", "the FMU fails."), ("The error of fixed steps", "is not known"))
 _PART_NAME = r"(?:[_a-zA-Z]\w*|'[^'\\]+')(?:\[\d+(?:,\d+)*\])?"
@@ -137,21 +137,25 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
         return Check(f"{unknown}, because IDAS gave up: {error.what}")
     curves = compare_solutions(truth, run, list(nominals), ("IDAS", "FMU"), _LEAST_RANGE)
     if fixed_step:
-        shares = ", ".join(f"{d.signal} {d.relative:.2g}" for d in curves.deviations[:_LISTED])
-        rest = f"; {len(nominals) - _LISTED} others less" if len(nominals) > _LISTED else ""
-        message = (
-            f"Error of fixed steps of {fixed_step:g} s until t = {end:g} s, against IDAS, over the range: {shares}"
-        )
-        return Check(f"{message}{rest}.", curves)
+        return _fixed_error(curves, fixed_step, end)
     off = [d for d in curves.deviations if d.relative > _AGREEMENT and d.largest > _ROUNDING * nominals[d.signal]]
     if not off:
         return Check(curves=curves)
     usual = compare_solutions(truth, _idas(model, end, points, rtol), list(nominals), ("", ""), _LEAST_RANGE)
     beyond = [d for d in off if d.relative > _ALLOWANCE * usual[d.signal].relative]
     reason = "by more than its tolerance explains" if beyond else f"as its tolerance {rtol:g} lets it"
-    shares = ", ".join(f"{d.signal} by {d.relative:.2g}" for d in (beyond or off)[:_TOLD])
+    shares = ", ".join(f"{d.signal} by {d.relative:.2g}" for d in (beyond or off)[:_NAMED])
     message = f"Until t = {end:g} s the FMU differs from IDAS {reason}: {shares} of the range."
     return Check(message, curves, bool(beyond))
+
+
+def _fixed_error(curves: Curves, step: float, end: float) -> Check:
+    """Return the error of fixed steps by variable."""
+    shares = ", ".join(f"{d.signal} {d.relative:.2g}" for d in curves.deviations[:_LISTED])
+    others = len(curves.deviations) - _LISTED
+    rest = f"; {others} others less" if others > 0 else ""
+    message = f"Error of fixed steps of {step:g} s until t = {end:g} s, against IDAS, over the range: {shares}"
+    return Check(f"{message}{rest}.", curves)
 
 
 def communication_step(end: float, step: float, points: int) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from modelica_like.errors import FmuFailed, ValueOutOfRange
 from modelica_like.fmi.failures import tell_error
 from modelica_like.fmi.process import run_child, workplace
+from modelica_like.runs.collect import Number
 from modelica_like.runs.recorded import RecordedModel, RecordedSolution, RecordedVariable
 from modelica_like.runs.results import needed_outputs, settled
 from modelica_like.solve.recorder import TERMINATED, Ended
@@ -71,10 +72,20 @@ def run_fmu(
     _check_times(path.name, start, stop, step, timeout)
     run = _run(path, job, timeout)
     if readings:
-        intervals, needed = int(np.count_nonzero(np.diff(run.time))), needed_outputs(run, readings)
-        again = lambda times: _run(path, job | {"points": times * intervals, "outputs": needed}, timeout)  # noqa: E731
-        run.readings = settled(run, again, readings)
+        run.readings = _read(path, job, timeout, run, readings)
     return run
+
+
+def _read(
+    path: Path, job: dict[str, Any], timeout: float, run: RecordedSolution, readings: Sequence[str]
+) -> dict[str, Number]:
+    """Return readings of a run that is repeated with more results."""
+    intervals, needed = int(np.count_nonzero(np.diff(run.time))), needed_outputs(run, readings)
+
+    def again(times: int) -> RecordedSolution:
+        return _run(path, job | {"points": times * intervals, "outputs": needed}, timeout)
+
+    return settled(run, again, readings)
 
 
 def _check_times(name: str, start: float, stop: float | None, step: float | None, timeout: float) -> None:

@@ -123,25 +123,28 @@ class Kinks:
         sizes[: len(rates)] = model.equations.nominals
         jumps = np.flatnonzero(np.abs(sides[1] - sides[0]) > _JUMP * (sizes + np.abs(sides[0]) + np.abs(sides[1])))
         roots = self._roots(both, crossed, sides, size, sizes)
-        if jumps.size:
-            reason = NoGradient(
-                f"No gradient at t = {at.t:.9g} s: {self._named(int(jumps[0]))} jumps without an event.",
-                why="The jump moves with the parameter, and only the time of an event has a derivative.",
-                advice="Let it be an event: leave out events=False, or noEvent in Modelica text. An atan2, which jumps "
-                "at a half turn, makes none: keep it off that.",
-            )
-        elif roots.size:
-            reason = NoGradient(
-                f"No gradient at t = {at.t:.9g} s: the slope of {self._named(int(roots[0]))} has no bound there.",
-                why="No step is short enough for the derivative of what follows.",
-                advice="Round the law there, as sqrt(x) by x/(x**2 + small**2)**0.25.",
-            )
-        else:
+        if not jumps.size and not roots.size:
             return None
+        reason = self._jumps(at.t, int(jumps[0])) if jumps.size else self._has_no_slope(at.t, int(roots[0]))
         kink = self.slopes(at, number)
         if not kink.rate[0]:
             raise reason  # nothing tells which parameters move it
         return Coincidence(-kink.by[0] / kink.rate[0], SAME * size, reason)
+
+    def _jumps(self, time: float, rate: int) -> NoGradient:
+        return NoGradient(
+            f"No gradient at t = {time:.9g} s: {self._named(rate)} jumps without an event.",
+            why="The jump moves with the parameter, and only the time of an event has a derivative.",
+            advice="Let it be an event: leave out events=False, or noEvent in Modelica text. An atan2, which jumps "
+            "at a half turn, makes none: keep it off that.",
+        )
+
+    def _has_no_slope(self, time: float, rate: int) -> NoGradient:
+        return NoGradient(
+            f"No gradient at t = {time:.9g} s: the slope of {self._named(rate)} has no bound there.",
+            why="No step is short enough for the derivative of what follows.",
+            advice="Round the law there, as sqrt(x) by x/(x**2 + small**2)**0.25.",
+        )
 
     def _named(self, k: int) -> str:
         states = self.model.states

@@ -6,6 +6,7 @@ import json
 import threading
 import time as clock
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,7 @@ from modelica_like.fmi.cosimulation.solution import CosimSolution, Coupling, bon
 from modelica_like.fmi.cosimulation.system import Inputs, Master, Settings, System, check_system
 from modelica_like.fmi.inside import PLACE
 from modelica_like.fmi.process import run_child, workplace
+from modelica_like.runs.collect import Number
 from modelica_like.runs.results import needed_outputs, settled
 from modelica_like.simulation import seconds
 from modelica_like.solve.panels import Progress
@@ -84,30 +86,28 @@ def cosim(
         Interrupted: the run was interrupted. `run` of this and of a `SolveError` is the solution up to then.
         OSError: a file cannot be read.
     """
-    if not isinstance(system, System):
-        with opened(Path(system)) as loaded:
-            return cosim(
-                loaded, until, step=step, master=master, inputs=inputs, tolerance=tolerance, parameters=parameters,
-                fmu_tolerance=fmu_tolerance, outputs=outputs, interval=interval, timeout=timeout, progress=progress,
-                readings=readings,
-            )  # fmt: skip
-    check_system(system)
-    system = _with_parameters(system, parameters or {})
-    settings = _settings(system, until, step, master, inputs, tolerance)
-    if timeout <= 0:
-        raise ValueOutOfRange(f"{system.name}: the time limit must be positive, not {timeout:g} s.")
-    job = _job(system, settings) | {"interval": interval, "outputs": outputs, "fmu_tolerance": fmu_tolerance}
-    run = _solution(system, _tolerant(job), timeout, progress)
-    if readings:
-        made_here = {one.path for one in bond_columns(system)}  # recorded with every run
-        needed = [name for name in needed_outputs(run, readings) if name not in made_here]
+    with nullcontext(system) if isinstance(system, System) else opened(Path(system)) as loaded:
+        checked = _checked(loaded, parameters or {}, timeout)
+        settings = _settings(checked, until, step, master, inputs, tolerance)
+        job = _job(checked, settings) | {"interval": interval, "outputs": outputs, "fmu_tolerance": fmu_tolerance}
+        run = _solution(checked, _tolerant(job), timeout, progress)
+        if readings:
+            run.readings = _read(checked, job, timeout, run, readings)
+        return run
 
-        def again(times: int) -> CosimSolution:
-            finer = _finer(system.name, job, times, readings[0]) | {"outputs": needed}
-            return _solution(system, _tolerant(finer), timeout, None)
 
-        run.readings = settled(run, again, readings)
-    return run
+def _read(
+    system: System, job: dict[str, Any], timeout: float, run: CosimSolution, readings: Sequence[str]
+) -> dict[str, Number]:
+    """Return readings of a run that is repeated with shorter steps."""
+    always = {column.path for column in bond_columns(system)}  # recorded with every run
+    needed = [name for name in needed_outputs(run, readings) if name not in always]
+
+    def again(times: int) -> CosimSolution:
+        finer = _finer(system.name, job, times, readings[0]) | {"outputs": needed}
+        return _solution(system, _tolerant(finer), timeout, None)
+
+    return settled(run, again, readings)
 
 
 def _tolerant(job: dict[str, Any]) -> dict[str, Any]:
@@ -159,7 +159,11 @@ def _left(folder: Path, columns: str) -> tuple[dict[str, Any], Any]:
     return about, numbers[: len(numbers) // width * width].reshape(-1, width)
 
 
-def _with_parameters(system: System, given: Mapping[str, float]) -> System:
+def _checked(system: System, given: Mapping[str, float], timeout: float) -> System:
+    """Return a system that can run, with other parameters."""
+    check_system(system)
+    if timeout <= 0:
+        raise ValueOutOfRange(f"{system.name}: the time limit must be positive, not {timeout:g} s.")
     units = {unit.name: unit for unit in system.units}
     for name, value in given.items():
         unit, _, variable = name.partition(".")
