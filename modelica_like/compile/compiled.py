@@ -13,6 +13,7 @@ import casadi as ca
 from modelica_like import upper
 from modelica_like.compile.buffers import Along, BufferedFunction
 from modelica_like.compile.buffers import Vector as Vector
+from modelica_like.compile.cached import Cached, Key
 from modelica_like.compile.edges import Edges, find_edges
 from modelica_like.compile.groups import CompiledTransition as CompiledTransition
 from modelica_like.compile.groups import CompiledUpdate as CompiledUpdate
@@ -83,7 +84,7 @@ class CompiledDae:
     settings: dict[str, Any] = field(default_factory=dict)
     _make_energy: Callable[[], ca.Function] | None = None
     _make_start: Callable[[bool], StartSystem] | None = None
-    _cache: dict[Any, Any] = field(default_factory=dict)
+    _cache: dict[Key, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return self.summary.replace("ReducedDae", "CompiledDae", 1)
@@ -137,7 +138,7 @@ class CompiledDae:
     def edges(self) -> Edges:
         """Where slopes change without an event, and what repeats in guards."""
         return self.once(
-            "edges", lambda: find_edges(self.arguments, self.equations.ode, self.equations.alg, self.events.guards)
+            Cached.EDGES, lambda: find_edges(self.arguments, self.equations.ode, self.equations.alg, self.events.guards)
         )
 
     @cached_property
@@ -170,7 +171,7 @@ class CompiledDae:
     def arguments(self) -> dict[str, Any]:
         """Symbols for the arguments of the functions, the same for all twins: what is cached has them."""
         return self.once(
-            "arguments",
+            Cached.ARGUMENTS,
             lambda: {
                 name: ca.SX.sym(name, self.equations.ode.size1_in(k))
                 for k, name in enumerate(self.equations.ode.name_in())
@@ -181,7 +182,7 @@ class CompiledDae:
     def symbol_places(self) -> dict[int, tuple[int, int]]:
         """Number of the argument and row of each of its symbols, by hash."""
         return self.once(
-            "symbol_places",
+            Cached.SYMBOL_PLACES,
             lambda: {
                 symbol.element_hash(): (number, row)
                 for number, argument in enumerate(self.arguments.values())
@@ -264,14 +265,14 @@ class CompiledDae:
         twin.__dict__.update(self.__dict__, **changes)
         return twin
 
-    def once(self, key: Any, make: Callable[[], Made]) -> Made:
+    def once(self, key: Key, make: Callable[[], Made]) -> Made:
         """Return the result of `make`: computed on first use, cached with the model and its twins."""
         if key not in self._cache:
             self._cache[key] = make()
         return self._cache[key]
 
     def fast(
-        self, key: Any, make: Callable[[], ca.Function], results: tuple[int, ...] | None = None
+        self, key: Key, make: Callable[[], ca.Function], results: tuple[int, ...] | None = None
     ) -> BufferedFunction:
         """Return this thread's buffered function for a key, from the cache.
 
@@ -280,14 +281,14 @@ class CompiledDae:
             make: makes the function on first use.
             results: which results to compute; all by default.
         """
-        own = "buffer", get_ident(), key
-        if own not in self._cache:
-            self._cache[own] = BufferedFunction(make(), results)
-        return self._cache[own]
+        place = Cached.BUFFERED, get_ident(), key
+        if place not in self._cache:
+            self._cache[place] = BufferedFunction(make(), results)
+        return self._cache[place]
 
-    def along(self, key: Any, make: Callable[[], ca.Function]) -> Along:
+    def along(self, key: Key, make: Callable[[], ca.Function]) -> Along:
         """Return this thread's function at many points for a key, from the cache."""
-        return self.once(("along", get_ident(), key), lambda: Along(make()))
+        return self.once((Cached.ALONG, get_ident(), key), lambda: Along(make()))
 
     def function(self, inputs: Sequence[str], outputs: Sequence[str], **run: Any) -> ca.Function:
         """Return the whole simulation as a differentiable CasADi function of parameters.

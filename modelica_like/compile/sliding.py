@@ -15,6 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.compile.groups import with_functions
 from modelica_like.compile.soon import ahead, guards_soon, joined
@@ -74,7 +75,7 @@ def sliding(model: CompiledDae) -> CompiledDae:
     This is possible where two values change into each other under opposite conditions, without resets, and decide on
     the rate of what the condition compares. Without such modes it is the model itself.
     """
-    made = model.once("sliding", lambda: _sliding(model))
+    made = model.once(Cached.SLIDING, lambda: _sliding(model))
     return made.twin(p=model.p, u=model.u, settings=model.settings) if made is not model else model
 
 
@@ -83,7 +84,7 @@ def _sliding(model: CompiledDae) -> CompiledDae:
     if not borders:
         return model
     made = _Mix(model, borders).model()
-    made.once("sliding", lambda: made)
+    made.once(Cached.SLIDING, lambda: made)
     return made
 
 

@@ -10,6 +10,7 @@ from threading import get_ident
 
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.native.model import Instance, NativeModel
 from modelica_like.options import Options
@@ -62,7 +63,7 @@ def _strike(
 
 def _at(model: CompiledDae, point: Point) -> Instance:
     """Return this thread's instance with the parameters of a model, at the time of a point."""
-    instance = model.once(("asked", get_ident()), lambda: Instance(model, NativeModel.any_start(model)))
+    instance = model.once((Cached.INSTANCE, get_ident()), lambda: Instance(model, NativeModel.any_start(model)))
     instance.model = model
     instance.reset(point.t, inf, Options.rtol, Options.atol)
     return instance

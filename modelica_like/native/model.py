@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.compile.sliding import as_asked
 from modelica_like.errors import ModelicaLikeError, NotEnoughMemory, UnknownName, did_you_mean
@@ -63,7 +64,7 @@ class NativeModel:
     ) -> NativeModel:
         """Return the cached one of the same model, for any parameter values."""
         model, kind = as_asked(model), start or model.settings.get("start", "given")
-        key = "native", kind, fixed_step, model.settings.get("on_chattering") == "rest", plan and plan.choice
+        key = Cached.NATIVE, kind, fixed_step, model.settings.get("on_chattering") == "rest", plan and plan.choice
         if not (fixed_step or plan):
             _made(model).setdefault(kind, None)
         return model.once(key, lambda: NativeModel(model, kind, fixed_step, plan))
@@ -91,7 +92,7 @@ class NativeModel:
 
 def _made(model: CompiledDae) -> dict[StartKind, None]:
     """Kinds of start of which there is a model in the run-time."""
-    return model.once("native starts", dict)
+    return model.once(Cached.NATIVE_STARTS, dict)
 
 
 class Instance:

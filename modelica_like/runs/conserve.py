@@ -10,6 +10,7 @@ from itertools import accumulate
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import EnergyDrift, SingularAtStart
 from modelica_like.options import Options
@@ -76,7 +77,7 @@ def conserving(run: Solution, repeat: Callable[[Options], Solution]) -> Solution
         return run
     astray = first
     if run.options.on_energy_drift == "note":
-        return replace(run, notices=(*run.notices, f"{astray.told}."), _cache={})
+        return replace(run, notices=(*run.notices, f"{astray.told}."))
     step = min(run.options.max_step, astray.end - astray.begin)
     for _ in range(_ATTEMPTS):
         step /= _SHORTER
@@ -84,7 +85,7 @@ def conserving(run: Solution, repeat: Callable[[Options], Solution]) -> Solution
         left = find_astray(run)
         if left is None:
             notice = f"{first.told}: the run was repeated with steps of at most {step:.3g} s."
-            return replace(run, notices=(*run.notices, notice), _cache={})
+            return replace(run, notices=(*run.notices, notice))
         astray = left
     error = EnergyDrift(
         f"{astray.told}, also with steps of at most {step:.3g} s.",
@@ -217,7 +218,9 @@ def _changes(model: CompiledDae, point: Point, weights: Vector) -> Vector:
     many, because its last speed is the first one and all relative ones.
     """
     if model.implicit:
-        return np.linalg.norm(slopes(model, point, "energies", function=lambda: _energies(model)).x * weights, axis=1)
+        return np.linalg.norm(
+            slopes(model, point, Cached.ENERGIES, function=lambda: _energies(model)).x * weights, axis=1
+        )
 
     def make() -> ca.Function:
         energies, some = _energies(model), ca.SX.sym("changes", len(weights), _SIGNS)
@@ -225,7 +228,7 @@ def _changes(model: CompiledDae, point: Point, weights: Vector) -> Vector:
         changes = ca.jtimes(energies(*arguments), model.arguments["x"], some)
         return ca.Function("changes", [*arguments, some], [ca.densify(ca.sqrt(ca.sum2(changes**2) / _SIGNS))])
 
-    function = model.once("changes of energies", make)
+    function = model.once(Cached.ENERGY_CHANGES, make)
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(weights), _SIGNS))
     changed = function(point.t, point.x, point.z, model.p, model.u, point.d, weights[:, None] * signs)
     changes = np.array(changed).ravel()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from modelica_like.compile.buffers import Along
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import MissingValue
 from modelica_like.solve.dense import MOST_KEPT, Dense
@@ -221,14 +222,14 @@ class Curves:
         names: of the expressions, for errors.
     """
 
-    def __init__(self, model: CompiledDae, key: Any, expressions: Any, noise: float, names: Sequence[str]) -> None:
+    def __init__(self, model: CompiledDae, key: Hashable, expressions: Any, noise: float, names: Sequence[str]) -> None:
         self._model, self._noise, self._names = model, noise, names
 
         def make() -> Along:
             column = ca.densify(ca.vertcat(*expressions()))
             return Along(ca.Function("read", list(model.arguments.values()), [column], {"cse": True}))
 
-        self._function = model.once(("curves", key), make)
+        self._function = model.once((Cached.CURVES, key), make)
         self.sizes = np.zeros(self._function.rows[0])
 
     def at(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:

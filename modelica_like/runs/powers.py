@@ -14,6 +14,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.options import SMALLEST_ATOL, Options
@@ -124,7 +125,7 @@ def _together(model: CompiledDae, segments: list[Segment]) -> Results:
     whole[1::2, count:] *= 1.0 + _DIGITS * _SIGNS
     whole[2::2, count:] *= 1.0 - _DIGITS * _SIGNS
     d = np.array([segment.d for segment in segments]).T[:, np.append(owner, owner[some])]
-    function = model.along("energy terms", lambda: _terms(model))
+    function = model.along(Cached.TERMS, lambda: _terms(model))
     columns = function(whole[0], whole[1 : 1 + nx], whole[1 + nx :], model.p, model.u, d)[0]
     columns, whole = columns.reshape(-1, len(model.components), count + 3), whole[:, :count]
     terms, first, last = columns[..., :count], (ends - sizes)[owner], (ends - 1)[owner]
@@ -271,7 +272,7 @@ class Powers:
     def _bends(self, every: Results, ends: Places) -> Vector:
         """Return the part of slopes of powers in the integrals of the first two rules; shape (2, 4 components, m)."""
         model = self.model
-        function = model.along("slopes of powers", lambda: _slopes(model))
+        function = model.along(Cached.POWER_SLOPES, lambda: _slopes(model))
         x, z, d = (part[:, ends.ravel()] for part in (every.x, every.z, every.d))
         slopes = function(every.times[ends.ravel()], x, z, model.p, model.u, d)[0].reshape(-1, *ends.shape)
         squares = np.diff(every.times[ends], axis=0) ** 2

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.buffers import Along
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.solve.recorder import Segment
 
@@ -60,16 +61,16 @@ def variables(model: CompiledDae, segments: Sequence[Segment], rows: Sequence[in
         rows: positions of the variables; all if None.
     """
     if rows is None:
-        function = model.along("variables", lambda: model.equations.variables)
+        function = model.along(Cached.VARIABLES, lambda: model.equations.variables)
         parts = [function(t, x, z, model.p, model.u, d)[0] for t, x, z, d in blocks(segments)]
         return np.concatenate(parts, axis=1)
-    return _Expressions.of(model, "variables", model.equations.variables, tuple(rows)).read(model, segments)
+    return _Expressions.of(model, Cached.VARIABLES, model.equations.variables, tuple(rows)).read(model, segments)
 
 
 def energy_term(model: CompiledDae, segments: Sequence[Segment], component: int, column: int) -> Vector:
     """Evaluate one energy term of one component at all results, shape (n,)."""
     row = component + column * len(model.components)
-    return _Expressions.of(model, "energy", model.energy, (row,)).read(model, segments)[0]
+    return _Expressions.of(model, Cached.ENERGY, model.energy, (row,)).read(model, segments)[0]
 
 
 class _Expressions:
@@ -84,9 +85,9 @@ class _Expressions:
         self._function = Along(ca.Function("read", arguments, [ca.densify(results)], {"cse": True}))
 
     @staticmethod
-    def of(model: CompiledDae, name: str, function: ca.Function, rows: tuple[int, ...]) -> _Expressions:
-        key = "read", get_ident(), name, rows
-        whole = model.once(("read", name), lambda: ca.vec(function(*model.arguments.values())))
+    def of(model: CompiledDae, which: Cached, function: ca.Function, rows: tuple[int, ...]) -> _Expressions:
+        key = Cached.ROWS, get_ident(), which, rows
+        whole = model.once((Cached.COLUMN, which), lambda: ca.vec(function(*model.arguments.values())))
         return model.once(key, lambda: _Expressions(model, whole[list(rows)]))
 
     def read(self, model: CompiledDae, segments: Sequence[Segment]) -> Vector:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.language.transition import NAME_IN_NOTICE
@@ -48,14 +50,18 @@ class Solution(Trajectories):
     start: StartKind = "given"
     readings: Mapping[str, Any] = field(default_factory=dict, repr=False)
     dense: Callable[[], Dense] | None = field(default=None, repr=False)
-    _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
+    _balances: dict[tuple[float | None, float | None], EnergyBalance] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @property
     def time(self) -> Vector:
         """Times of the results in s: a regular grid, and both sides of every event."""
-        if "time" not in self._cache:
-            self._cache["time"] = np.concatenate([s.times for s in self.segments])
-        return self._cache["time"]
+        return self._time
+
+    @cached_property
+    def _time(self) -> Vector:
+        return np.concatenate([s.times for s in self.segments])
 
     @property
     def ended(self) -> Ended | None:
@@ -84,7 +90,7 @@ class Solution(Trajectories):
         model = self.model
         if path in model.position:
             row = model.position[path]
-            return self._all()[row] if self._small else variables(model, self.segments, [row])[0]
+            return self._all[row] if self._small else variables(model, self.segments, [row])[0]
         if path in model.discrete_position:
             row = model.discrete_position[path]
             return np.repeat([s.d[row] for s in self.segments], [len(s.times) for s in self.segments])
@@ -110,10 +116,9 @@ class Solution(Trajectories):
     def _small(self) -> bool:
         return len(self.time) * len(self.model.flat_variables) <= TOGETHER
 
+    @cached_property
     def _all(self) -> Vector:
-        if "variables" not in self._cache:
-            self._cache["variables"] = variables(self.model, self.segments, None)
-        return self._cache["variables"]
+        return variables(self.model, self.segments, None)
 
     def together(self, *keys: str | Any) -> dict[str, Vector]:
         """Return several trajectories by path, each of shape (len(time),); faster than one by one.
@@ -157,7 +162,7 @@ class Solution(Trajectories):
 
     def _values(self, now: Point) -> Values:
         segment = Segment(np.array([now.t]), now.x[:, None], now.z[:, None], now.d)
-        return Values(replace(self, segments=(segment,), _cache={}))
+        return Values(replace(self, segments=(segment,)))
 
     def energy(self, begin: float | None = None, end: float | None = None) -> EnergyBalance:
         """Return the energy balance of every component over the run, or over a part of it.
@@ -169,16 +174,15 @@ class Solution(Trajectories):
         Raises:
             ValueOutOfRange: a time is not within the run.
         """
-        key = "balance", begin, end
-        if key not in self._cache:
+        if (begin, end) not in self._balances:
             first, last = (self.time[k] if t is None else float(t) for k, t in ((0, begin), (-1, end)))
             segments = self.segments if (begin, end) == (None, None) else tuple(self._part(first, last))
             until = np.inf if last == self.time[-1] else last
             events = [event for event in self.events if first <= event.time < until]
             impacts = [impact for impact in self.impacts if first <= impact.time < until]
             dense = None if self.dense is None else self.dense()
-            self._cache[key] = energy_balance(self.model, segments, self.options, events, impacts, dense)
-        return self._cache[key]
+            self._balances[begin, end] = energy_balance(self.model, segments, self.options, events, impacts, dense)
+        return self._balances[begin, end]
 
     def _part(self, begin: float, end: float) -> Iterator[Segment]:
         """Yield the segments between two times."""
@@ -197,7 +201,7 @@ class Solution(Trajectories):
                 yield Segment(times[order], x[:, order], z[:, order], segment.d)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_cache": {}, "dense": None}
+        return vars(replace(self, dense=None))
 
     def __repr__(self) -> str:
         span = f"t = {self.time[0]:g} … {self.time[-1]:g} s"
@@ -238,7 +242,7 @@ def rate_along(model: CompiledDae, name: str, times: Any, x: Vector, z: Vector, 
         parts = model.motion.parts(model.equations.variables(*arguments)[row])
         return ca.Function("rate", arguments, [ca.densify(part) for part in parts])
 
-    parts = model.once(("rate", name), make)(np.reshape(times, (1, -1)), x, z, model.p, model.u, d)
+    parts = model.once((Cached.RATE, name), make)(np.reshape(times, (1, -1)), x, z, model.p, model.u, d)
     direct, by_z, drift, jacobian = (np.asarray(part.full()) for part in parts)
     if not model.implicit:
         return direct.ravel()

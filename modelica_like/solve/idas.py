@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.buffers import BufferedFunction
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.options import Options
@@ -93,7 +94,7 @@ def scaled_problem(model: CompiledDae, *, gentle: bool, scaled: bool) -> tuple[d
             there, and first steps are short for any span.
         scaled: if false, t = t0 + s: rates need no factor, which saves an eighth of the work in some models.
     """
-    return model.once(("scaled", gentle, scaled), lambda: _scaled_problem(model, gentle, scaled))
+    return model.once((Cached.SCALED, gentle, scaled), lambda: _scaled_problem(model, gentle, scaled))
 
 
 def _scaled_problem(model: CompiledDae, gentle: bool, scaled: bool) -> tuple[dict[str, Any], ca.Function]:
@@ -189,7 +190,7 @@ class Integrator:
         self.tolerances = self.options.rtol * factor, self.options.atol * factor * self.model.equations.nominals
 
     def _instance(self, grid: Grid, steps: int, gentle: bool, first: float, longest: float) -> BufferedFunction:
-        key = "idas", grid, self.rtol, self.options.atol, steps, gentle, first, self._seconds, longest
+        key = Cached.IDAS, grid, self.rtol, self.options.atol, steps, gentle, first, self._seconds, longest
         return self.model.fast(key, lambda: self._make(grid, steps, gentle, first, longest), results=(0, 1))
 
     def _longest(self, span: float, gentle: bool) -> float:
@@ -237,7 +238,7 @@ class Integrator:
             "step0": min(first, longest or first),
             "max_step_size": longest,
             "calc_ic": not gentle,
-            "linear_solver": self.model.once("linear solver", lambda: linear_solver(_pattern(self.model))),
+            "linear_solver": self.model.once(Cached.LINEAR_SOLVER, lambda: linear_solver(_pattern(self.model))),
         }
 
     def run(
@@ -298,7 +299,8 @@ class Integrator:
         longest = self._longest(p[1], gentle)
         instance, scaled = self._instance(grid, steps, gentle, first, longest), self._seconds is None
         known = self.model.fast(
-            ("known", gentle, scaled), lambda: scaled_problem(self.model, gentle=gentle, scaled=scaled)[1]
+            (Cached.SCALED_PARAMETERS, gentle, scaled),
+            lambda: scaled_problem(self.model, gentle=gentle, scaled=scaled)[1],
         )
         instance.forget()
         screen, sys.stderr = sys.stderr, io.StringIO()

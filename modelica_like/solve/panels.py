@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import StepFailed
@@ -112,7 +113,7 @@ class Panels:
     @property
     def felt(self) -> Any:
         """Marks of the entries of d that equations of motion read: events that change no other end no panel."""
-        return self.model.once("felt", lambda: _felt(self.model))
+        return self.model.once(Cached.FELT, lambda: _felt(self.model))
 
     def go_on(self, now: Point, limit: float, longest: float = np.inf) -> tuple[Vector, Vector]:
         """Integrate from a consistent point up to a time at most, in pieces that are not longer than asked for.

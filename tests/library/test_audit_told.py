@@ -104,7 +104,7 @@ def test_energy_that_appears_at_an_event_is_noticed() -> None:
 def test_an_impact_explains_what_vanishes_and_is_lost() -> None:
     run = simulate(Sampled(x=0.0), 2.0)
     impact = Impact(run.events[0].time, "", -8.0)
-    struck = replace(run, impacts=(impact,), _cache={})
+    struck = replace(run, impacts=(impact,))
     balance = struck.energy()
     assert balance.at_events < 1e-12
     assert "of it in impacts" in told(struck)

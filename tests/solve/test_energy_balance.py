@@ -196,7 +196,7 @@ def test_a_long_run_is_looked_at_in_pieces(monkeypatch: pytest.MonkeyPatch, boun
     run = simulate(load(EXAMPLES / "msl/rotational/CoupledClutches.toml"))
     whole = run.energy()
     monkeypatch.setattr(powers, bound, most)
-    parts = replace(run, _cache={}).energy()
+    parts = replace(run).energy()
     for row in whole:
         other = parts[row.component]
         for name in ("inflow", "source", "stored", "lost", "at_events"):
@@ -210,14 +210,14 @@ def test_where_nothing_can_be_integrated_again_the_results_count(monkeypatch: py
 
     expected = run.energy()
     monkeypatch.setattr(powers.Powers, "_finer", lambda *_: None)
-    balance = replace(run, _cache={}).energy()
+    balance = replace(run).energy()
     assert balance["spring"].lost == pytest.approx(expected["spring"].lost, rel=1e-4)
 
 
 def test_states_that_are_no_numbers_have_a_balance_of_none() -> None:
     run = simulate(Inertia(J=1.0), 1.0, start="rest", points=5)
     segment = replace(run.segments[0], x=run.segments[0].x * float("nan"))
-    assert np.isnan(replace(run, segments=(segment,), _cache={}).energy().stored)
+    assert np.isnan(replace(run, segments=(segment,)).energy().stored)
 
 
 class Flywheel(Component):

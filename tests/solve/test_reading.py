@@ -72,12 +72,12 @@ def test_whatever_is_read_and_in_whatever_blocks_it_is_what_each_result_gives(mo
     names = list(model.position)[:3]
     for together in (0, len(points) * len(every) - 1, len(points) * len(every)):
         monkeypatch.setattr(solution, "TOGETHER", together)
-        fresh = replace(run, _cache={})
+        fresh = replace(run)
         found = fresh.together(*names, "clutch.mode", "time")
         assert list(found) == [*names, "clutch.mode", "time"]
         np.testing.assert_allclose([found[name] for name in names], every[:3], rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(fresh["right.w"], every[model.position["right.w"]], rtol=1e-12, atol=1e-12)
-        assert ("variables" in fresh._cache) == (together == len(points) * len(every))
+        assert ("_all" in vars(fresh)) == (together == len(points) * len(every))
 
 
 def test_twins_of_a_model_read_by_the_same_symbols() -> None:

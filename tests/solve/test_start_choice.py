@@ -10,6 +10,7 @@ import pytest
 from fakes import fake_model
 from scipy.linalg import null_space
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import StartEntry
 from modelica_like.compile.start_system import StartSystem
 from modelica_like.errors import MissingStart
@@ -184,7 +185,7 @@ def test_numbers_decide_where_structure_chose_dependent_rows(
     monkeypatch: pytest.MonkeyPatch, columns: Any, regular: bool, generic: bool, plans: list[str]
 ) -> None:
     made: list[str] = []
-    model: Any = SimpleNamespace(once=lambda key, make: make() if key == ("start plan", "rest") else None)
+    model: Any = SimpleNamespace(once=lambda key, make: make() if key == (Cached.START_PLAN, "rest") else None)
     point: Any = SimpleNamespace()
     matrix = object() if generic else None
 

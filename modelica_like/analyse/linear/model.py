@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.linear.pictures import bode, mode_name, nyquist
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import extra_module
 from modelica_like.solve.initialize import Point, variable_slopes
@@ -294,7 +295,7 @@ class _Energies:
     """Stored energy and loss of every component for deviations of the states from a point, to second order."""
 
     def __init__(self, model: CompiledDae, point: Point) -> None:
-        self._second = model.once("curvature", lambda: _curvature(model))
+        self._second = model.once(Cached.CURVATURE, lambda: _curvature(model))
         self._point = point.t, point.x, point.z, model.p, model.u, point.d
         self._z_x = implicit_slopes(model, point)[0]
 

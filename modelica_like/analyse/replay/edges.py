@@ -16,6 +16,7 @@ from modelica_like.analyse.replay.guards import Guards
 from modelica_like.analyse.replay.holds import impact
 from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
 from modelica_like.native.holds import share
@@ -152,7 +153,9 @@ def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
         sizes = [sum(float(np.abs(row[: size.x]) @ nominals) for _, row in reading.parts) for reading in readings]
         read, whole = chain.carried(readings, np.pad(change, (0, size.theta))[:, None], begin, until)
         if until > last and hold in holding(model, chain.nodes[until]):
-            stop = slopes(model, chain.nodes[until], f"impact {[hold]}", None, lambda hold=hold: impact(model, [hold]))
+            stop = slopes(
+                model, chain.nodes[until], (Cached.IMPACT, hold), None, lambda hold=hold: impact(model, [hold])
+            )
             whole[: size.x] += stop.x @ whole[: size.x]
         behind = later.multipliers[until].T @ whole if until > last else 0.0
         if np.any(np.maximum(np.abs(read), np.abs(behind))[:, 0] > _ROUNDING * np.array(sizes)):

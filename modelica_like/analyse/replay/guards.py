@@ -7,6 +7,7 @@ from typing import Any
 
 import casadi as ca
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.flatten.conditions import JUST_TRUE
 from modelica_like.solve.initialize import Point
@@ -24,7 +25,7 @@ class Guards:
         self.state_events = [t for t in model.events.transitions if not t.timed]
         self.count = len(self.state_events)
         self.positions = {id(e): k for k, e in enumerate(self.state_events)}
-        self._at = model.fast("guards at", lambda: _clean(model, self.state_events))
+        self._at = model.fast(Cached.GUARDS, lambda: _clean(model, self.state_events))
 
     def at(self, point: Point) -> list[Vector]:
         """Return guards, their rates, and guards one time resolution later; inactive ones are -1."""

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import Circuit, CompiledDae
 from modelica_like.flatten.holds import TERMS
 from modelica_like.language.holding import UNLIMITED
@@ -113,5 +114,5 @@ def _turned(model: CompiledDae, point: Point, members: list[int], row: int, free
         weights = ca.MX.sym("weights", len(nodes))
         return ca.Function("dependence", [*symbols, weights], [ca.mtimes(slopes.T, weights)])
 
-    change = np.linalg.lstsq(motions[free].T, total(f"dependence {members}", None, make, parts)[1], rcond=None)[0]
+    change = np.linalg.lstsq(motions[free].T, total((Cached.SHARES, *members), None, make, parts)[1], rcond=None)[0]
     return np.asarray(-change / parts[free, None], np.float64)

@@ -11,6 +11,7 @@ import numpy as np
 from modelica_like.analyse.replay.holds import impact, projection, share_slopes
 from modelica_like.analyse.replay.when import Coincidence, Trigger, When, at_rest, either_first, event_time
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.cached import Cached, Key
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.groups import Reset
 from modelica_like.language.holding import UNLIMITED
@@ -165,7 +166,7 @@ class Work:
         return cls(model, point.copy(), np.eye(size.x, columns), np.eye(size.d, columns, size.x + size.fixed))
 
     def _total(
-        self, name: str, rows: Sequence[int] | None = None, function: Any = None, *constants: Vector,
+        self, name: str | Key, rows: Sequence[int] | None = None, function: Any = None, *constants: Vector,
         at: Point | None = None,
     ) -> tuple[Vector, Vector]:  # fmt: skip
         """Value of a function (see `slopes`) and its derivatives by (x, theta) before the event."""
@@ -296,7 +297,7 @@ class Work:
         if later and not hard:
             self.passing |= {k: self._at_rest(k) for k in stopped}
         if stopped:
-            self.x = self.x + self._total(f"impact {stopped}", None, lambda: impact(model, stopped), at=trial)[1]
+            self.x = self.x + self._total((Cached.IMPACT, *stopped), None, lambda: impact(model, stopped), at=trial)[1]
         self.point = struck.point
 
     def chances(self) -> tuple[Coincidence, ...]:
@@ -342,7 +343,7 @@ class Work:
         present, slope = self._total("variables", nodes)
         back = np.linalg.pinv(slopes(model, self.point, "variables", nodes).x)
         missing = np.array([value for value, _ in new.values()]) - present
-        change, turn = self._total(f"projection {nodes}", None, lambda: projection(model, nodes), missing)
+        change, turn = self._total((Cached.PROJECTION, *nodes), None, lambda: projection(model, nodes), missing)
         self.point = replace(self.point, x=self.point.x + change)
         self.x = self.x + turn + back @ (np.array([slope for _, slope in new.values()]) - slope)
         solve_implicit(model, self.point)

@@ -15,6 +15,7 @@ import numpy as np
 
 from modelica_like.analyse.replay.when import SAME, Coincidence
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.edges import kinks_of
 from modelica_like.errors import NoGradient
@@ -51,7 +52,7 @@ class Kinks:
     def __init__(self, model: CompiledDae, segments: Sequence[Segment] = (), integrands: Any = None) -> None:
         self.model = model
         column = ca.SX(0, 1) if integrands is None else ca.SX(integrands)
-        self._key = "kinks along", str(column)
+        self._key = Cached.KINKS, str(column)
         self._function: ca.Function = model.once(self._key, lambda: _with_integrands(model, column))
         self.count = int(self._function.size1_out(0))
         self._along = [(segment.times, self._over(segment)) for segment in segments if self.count]
@@ -68,7 +69,7 @@ class Kinks:
 
     def slopes(self, at: Point, number: int) -> Slopes:
         """Value, derivatives and rate of one of the functions at a point."""
-        return slopes(self.model, at, f"{self._key}", [number], lambda: self._function)
+        return slopes(self.model, at, self._key, [number], lambda: self._function)
 
     def passed(self, before: Vector, after: Vector) -> Any:
         """Which kinks lie between two points (or rows of points), but not at the first of them.

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.solve.initialize import Point, StartKind, StartPlan, call, start_plan
 from modelica_like.solve.initialize.slopes import Sizes, slopes
@@ -30,7 +31,7 @@ def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[ca.
     """
     size, plan, given = Sizes.of(model), start_plan(model, kind, point), (model.p, model.u, point.d)
     jacobians = [
-        model.once(("by parameters", name), lambda name=name: _by_parameters(model, name))(
+        model.once((Cached.BY_PARAMETERS, name), lambda name=name: _by_parameters(model, name))(
             point.t, point.x, point.z, *given
         )
         for name in ("discrete_starts", "start_values")
@@ -118,7 +119,7 @@ def _start_system(model: CompiledDae, plan: StartPlan, point: Point) -> tuple[An
         y = y + step
         if np.max(np.abs(step) / (1.0 + np.abs(y))) < 1e-13:
             break
-    return at(model.once(("start slopes", plan.kind), make), y)
+    return at(model.once((Cached.START_SLOPES, plan.kind), make), y)
 
 
 def _columns(matrix: Any) -> list[int]:

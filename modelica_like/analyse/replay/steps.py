@@ -5,7 +5,7 @@ Source: E. Hairer, G. Wanner: Solving Ordinary Differential Equations II, sectio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,7 @@ from modelica_like.analyse.replay.noise import rounding
 from modelica_like.analyse.replay.tableau import radau
 from modelica_like.analyse.replay.tolerances import ABSOLUTE, Tolerances
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.solve.initialize import Point
 
@@ -44,8 +45,8 @@ class StepFunctions:
         self.nq = int(quadratures.numel())
         self.size = STAGES * (self.nx + self.nz)
 
-    def _cached(self, key: Any, make: Any) -> Any:
-        return self.model.fast(("replay", self.name, self.tableau.nodes.size, key), make)
+    def _cached(self, key: Hashable, make: Any) -> Any:
+        return self.model.fast((Cached.REPLAY, self.name, self.tableau.nodes.size, key), make)
 
     @cached_property
     def _names(self) -> list[Any]:
@@ -175,7 +176,7 @@ class StepFunctions:
             entries = self._equations(*given.values())[1].nz[:]
             return ca.depends_on(entries, self._unknowns[0]), ca.depends_on(entries, given["t"])
 
-        return self.model.once("replay dependence", find)
+        return self.model.once(Cached.REPLAY_DEPENDENCE, find)
 
     def integrands(self, point: Point) -> Vector:
         """Return the integrands of the quadratures at a point."""

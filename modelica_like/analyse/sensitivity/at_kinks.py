@@ -17,6 +17,7 @@ from modelica_like.analyse.replay.edges import Edge
 from modelica_like.analyse.replay.kinks import arguments_of_kinks
 from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ModelicaLikeError, NoGradient
 from modelica_like.options import Options
@@ -56,7 +57,7 @@ def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
         # A guard at zero decides about the modes on one side, which edges judge by accelerations only.
         return ca.Function("arguments", given, [ca.densify(ca.SX(ca.vertcat(*arguments.values(), values[1])))])
 
-    key = f"arguments of kinks {texts}"
+    key = Cached.KINK_ARGUMENTS, texts
     function = model.once(key, make)
     if not function.size1_out(0):
         return []
@@ -93,7 +94,7 @@ def natural_size(chain: Replay, outputs: Sequence[Output], position: int) -> flo
     """
     model, texts = chain.model, _texts(outputs)
     given = [*model.arguments.values()]
-    fast = model.fast(f"equations and {texts}", lambda: ca.Function("sizes", given, [_equations(model, texts)]))
+    fast = model.fast((Cached.SIZES, texts), lambda: ca.Function("sizes", given, [_equations(model, texts)]))
     span = chain.nodes[-1].t - chain.nodes[0].t
     x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.equations.nominals
     z = np.max([np.abs(node.z) for node in chain.nodes], axis=0)
@@ -133,8 +134,8 @@ def _in_other_modes(chain: Replay, position: int) -> Iterator[Point]:
                 yield other
 
 
-def _texts(outputs: Sequence[Output]) -> list[str]:
-    return [output.path for output in leaves(outputs) if output.kind not in ("time", "duration")]
+def _texts(outputs: Sequence[Output]) -> tuple[str, ...]:
+    return tuple(output.path for output in leaves(outputs) if output.kind not in ("time", "duration"))
 
 
 def _equations(model: CompiledDae, texts: Sequence[str]) -> Any:

@@ -9,6 +9,7 @@ from modelica_like.analyse.replay.chain import Replay
 from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.sensitivity.values import slopes_of
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.edges import kinks_of
 from modelica_like.runs.readings import expression_of
@@ -31,7 +32,7 @@ def kinks_at(replay: Replay, path: str, node: Point) -> list[tuple[float, Vector
     those of a table in the equations of states, leave its rate as it is unless they jump.
     """
     model = replay.model
-    kinks, own = model.once(("kinks of", path), lambda: _kinks_of(model, path))
+    kinks, own = model.once((Cached.KINKS_OF, path), lambda: _kinks_of(model, path))
     rates, size = call(model, model.equations.ode, node), max(1.0, abs(node.t))
 
     def both(time: float) -> Vector:

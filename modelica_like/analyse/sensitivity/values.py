@@ -8,6 +8,7 @@ import numpy as np
 from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.runs.readings import expression_of
 from modelica_like.solve.initialize import Point
@@ -25,13 +26,13 @@ def value_at(replay: Replay, path: str, node: Point, jump: Jump | None = None) -
 
 def slopes_of(replay: Replay, path: str, node: Point) -> Slopes:
     """Value, derivatives and rate of a variable at a point."""
-    return slopes(replay.model, node, f"value of {path}", None, lambda: _function(replay.model, path))
+    return slopes(replay.model, node, (Cached.VALUE, path), None, lambda: _function(replay.model, path))
 
 
 def along(replay: Replay, path: str, points: list[Point]) -> Vector:
     """Values of a variable at points."""
     model = replay.model
-    fast = model.fast(("only", path), lambda: _function(model, path))
+    fast = model.fast((Cached.VALUE, path), lambda: _function(model, path))
     return np.array([fast(o.t, o.x, o.z, model.p, model.u, o.d)[0][0] for o in points])
 
 

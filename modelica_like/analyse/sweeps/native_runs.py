@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ModelicaLikeError, ValueOutOfRange
 from modelica_like.language.units import ONE
@@ -107,7 +108,7 @@ def _key(part: Part) -> str:
 def _with_expressions(model: CompiledDae, parts: Sequence[Part]) -> CompiledDae:
     """Return the model with the values of parts among its variables."""
     more = {_key(part): part for part in parts if part.kind not in ("change", "impact")}
-    return model.once(("expressions", tuple(more)), lambda: _with(model, more)) if more else model
+    return model.once((Cached.EXPRESSIONS, *more), lambda: _with(model, more)) if more else model
 
 
 def _with(model: CompiledDae, more: Mapping[str, Part]) -> CompiledDae:

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 
 _NAMED = 3
@@ -24,12 +25,12 @@ def settling(model: CompiledDae) -> dict[int, int]:
 
     Numbers of ticks and random numbers never settle.
     """
-    return model.once("settling", lambda: _set_by_ticks(model, "xzpu"))
+    return model.once(Cached.SETTLING, lambda: _set_by_ticks(model, "xzpu"))
 
 
 def memory(model: CompiledDae) -> dict[int, int]:
     """Return those entries of d that ticks set from the motion."""
-    return model.once("memory", lambda: _set_by_ticks(model, "xz"))
+    return model.once(Cached.MEMORY, lambda: _set_by_ticks(model, "xz"))
 
 
 def _set_by_ticks(model: CompiledDae, arguments: str) -> dict[int, int]:
@@ -63,7 +64,7 @@ def driving(model: CompiledDae) -> set[int]:
     """Return the entries of d on which derivatives or implicit equations depend."""
     functions = model.equations.ode, model.equations.alg
     make = lambda: {k for one in functions for k in np.flatnonzero(depends(one, "d").any(axis=0)).tolist()}  # noqa: E731
-    return model.once("driving", make)
+    return model.once(Cached.DRIVING, make)
 
 
 def sampled(model: CompiledDae, nodes: Iterable[int]) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, StartEntry, StartSystem, Vector
 from modelica_like.errors import MissingStart
 from modelica_like.flatten.generic import spread
@@ -98,7 +99,7 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
     Raises:
         MissingStart: the start values do not determine all states.
     """
-    plan = model.once(("start plan", kind), lambda: _Choice(model, kind).plan(None))
+    plan = model.once((Cached.START_PLAN, kind), lambda: _Choice(model, kind).plan(None))
     if plan.columns and not _is_regular(model, plan, point):
         matrix = _generic_matrix(model, plan.system, point)
         if matrix is not None:
@@ -112,12 +113,12 @@ def _is_regular(model: CompiledDae, plan: StartPlan, point: Point) -> bool:
     The last positive answer of each combination of modes is kept: a start often looks at two of them in turn.
     """
     function = plan.system.function
-    fast = model.fast(("start matrix", plan.kind), lambda: function, (1,))
+    fast = model.fast((Cached.START_MATRIX, plan.kind), lambda: function, (1,))
     x, y = point.x.copy(), np.zeros(function.size1_out(0))
     x[[k for k in plan.system.rates if k < len(x)]] = 0.0
     entries = fast(point.t, x, y, point.z, model.p, model.u, point.d)[0]
     entries = plan.entries(entries)
-    known: dict[bytes, Vector] = model.once(("regular start", plan.kind), dict)
+    known: dict[bytes, Vector] = model.once((Cached.REGULAR_STARTS, plan.kind), dict)
     modes = point.d.tobytes()
     if np.array_equal(known.get(modes, ()), entries):
         return True

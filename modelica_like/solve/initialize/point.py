@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, SingularAtStart
 from modelica_like.solve.initialize.singular import VANISHES, implicit_singular, is_regular, singular_block
@@ -52,7 +53,7 @@ def call(model: CompiledDae, function: Any, point: Point) -> Vector:
         The result, flat: columns one after the other.
     """
     # By identity: reading the name of a CasADi function costs as much as evaluating a small one.
-    fast = model.fast(id(function), lambda: function)
+    fast = model.fast((Cached.CALLED, id(function)), lambda: function)
     return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
 
@@ -71,7 +72,7 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
     """
     if not model.implicit:
         return
-    fast = model.fast("newton", lambda: newton_at(model, look=True))
+    fast = model.fast(Cached.NEWTON, lambda: newton_at(model, look=True))
     change = np.inf
     for _ in range(_MAX_NEWTON):
         new, condition = fast(point.t, point.x, point.z, model.p, model.u, point.d)
@@ -133,7 +134,7 @@ def polished(model: CompiledDae, times: Vector, x: Vector, z: Vector, d: Vector)
     """
     if not model.implicit:
         return z
-    everywhere = model.along("newton", lambda: newton_at(model, look=False))
+    everywhere = model.along(Cached.NEWTON, lambda: newton_at(model, look=False))
     d = np.broadcast_to(d if d.ndim > 1 else d[:, None], (len(d), len(times)))
     for _ in range(_POLISHING):
         new = everywhere(times, x, z, model.p, model.u, d)[0]
@@ -149,7 +150,7 @@ def polished(model: CompiledDae, times: Vector, x: Vector, z: Vector, d: Vector)
 def is_linear(model: CompiledDae) -> bool:
     """Whether the implicit equations are linear in z: then one step of Newton's method solves them."""
     slopes = model.equations.alg_jacobian
-    return model.once("linear", lambda: not slopes.jac_sparsity(0, slopes.index_in("z")).nnz())
+    return model.once(Cached.LINEAR, lambda: not slopes.jac_sparsity(0, slopes.index_in("z")).nnz())
 
 
 def _check_regular(model: CompiledDae, point: Point) -> None:
@@ -158,7 +159,7 @@ def _check_regular(model: CompiledDae, point: Point) -> None:
     Raises:
         SingularAtStart: it is.
     """
-    fast, size = model.fast("residual at", lambda: implicit_at(model)), len(model.implicit)
+    fast, size = model.fast(Cached.RESIDUAL, lambda: implicit_at(model)), len(model.implicit)
     residual, entries = fast(point.t, point.x, point.z, model.p, model.u, point.d)
     jacobian = entries.reshape(size, size).T
     if not (np.isfinite(residual).all() and is_regular(jacobian)):
@@ -171,7 +172,7 @@ def check_singular(model: CompiledDae, point: Point) -> None:
     Raises:
         SingularAtStart: one has no unique solution.
     """
-    fast = model.fast("regular", lambda: _regular(model))
+    fast = model.fast(Cached.REGULAR, lambda: _regular(model))
     if not fast(point.t, point.x, point.z, model.p, model.u, point.d)[0][0]:
         return
     determinants = call(model, model.equations.determinants, point)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from threading import get_ident
@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.buffers import BufferedFunction, Vector
+from modelica_like.compile.cached import Cached, Key
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import SingularAtStart, UnknownName, did_you_mean
 from modelica_like.solve.initialize.point import Point
@@ -96,7 +97,7 @@ def _filled(entries: Vector, shape: tuple[int, int], places: Any) -> Vector:
 
 
 def slopes(
-    model: CompiledDae, point: Point, name: str, rows: Sequence[int] | None = None,
+    model: CompiledDae, point: Point, name: str | Key, rows: Sequence[int] | None = None,
     function: Callable[[], ca.Function] | None = None, *constants: Vector,
 ) -> Slopes:  # fmt: skip
     """Differentiate a function of the model.
@@ -111,7 +112,7 @@ def slopes(
     """
 
     def make() -> tuple[list[Any], Any]:
-        made: ca.Function = model.functions[name] if function is None else function()
+        made: ca.Function = model.functions[str(name)] if function is None else function()
         # Linear equations are solved in numbers.
         symbols = [*model.arguments.values()] if made.is_a("SXFunction") else made.mx_in()
         value = made(*symbols)
@@ -154,7 +155,7 @@ def implicit_slopes(model: CompiledDae, point: Point, by: _Names = _ALL) -> list
     """
     symbols = [*model.arguments.values()]
     make = lambda: _Partials(symbols, model.equations.alg(*symbols), by)  # noqa: E731
-    _, z, *parts = model.once(("slopes of z", by, get_ident()), make)(model, point)
+    _, z, *parts = model.once((Cached.IMPLICIT_SLOPES, by, get_ident()), make)(model, point)
     _check_finite(model, point, [z, *parts], model.implicit)
     right = -np.hstack(parts)
     # Reactions whose split is undetermined make the equations for z singular; what depends on them is left out.
@@ -163,11 +164,11 @@ def implicit_slopes(model: CompiledDae, point: Point, by: _Names = _ALL) -> list
 
 
 def _total(
-    model: CompiledDae, point: Point, key: Any, make: Callable[[], tuple[list[Any], Any]], by: _Names,
+    model: CompiledDae, point: Point, key: Hashable, make: Callable[[], tuple[list[Any], Any]], by: _Names,
     *constants: Vector,
 ) -> list[Vector]:  # fmt: skip
     """Return value and derivatives of what `make` gives (symbols and expression), z following."""
-    partials = model.once(("slopes of", key, by, get_ident()), lambda: _Partials(*make(), by))
+    partials = model.once((Cached.SLOPES, key, by, get_ident()), lambda: _Partials(*make(), by))
     value, z, *parts = partials(model, point, *constants)
     if np.any(z):
         parts = [one + z @ follows for one, follows in zip(parts, implicit_slopes(model, point, by), strict=True)]

@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.errors import InitializationError
 from modelica_like.solve.initialize.kept import find_kept, solve_kept
@@ -48,9 +49,11 @@ def _equations(model: CompiledDae) -> Any:
 
 def moving_states(model: CompiledDae) -> list[int]:
     """Positions of the states on which something depends; the others, absolute angles, never settle."""
-    return model.once(
-        "moving", lambda: np.flatnonzero(ca.which_depends(_equations(model), model.arguments["x"], 1, False)).tolist()
-    )
+
+    def make() -> list[int]:
+        return np.flatnonzero(ca.which_depends(_equations(model), model.arguments["x"], 1, False)).tolist()
+
+    return model.once(Cached.MOVING, make)
 
 
 def mode_not_steady(model: CompiledDae, point: Point, transition: CompiledTransition) -> InitializationError:
