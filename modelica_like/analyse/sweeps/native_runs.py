@@ -120,10 +120,11 @@ def _with(model: CompiledDae, more: Mapping[str, Part]) -> CompiledDae:
     equations = replace(model.equations, variables=variables)
     like = model.flat_variables[0]
     further = [replace(like, path=path, unit=ONE, kind="local") for path in more]
-    twin = model.twin(equations=equations, flat_variables=(*model.flat_variables, *further), _cache={})
-    for name in ("position", "units", "functions"):
-        twin.__dict__.pop(name, None)
-    return twin
+    return replace(
+        model, equations=equations, flat_variables=(*model.flat_variables, *further), _cache={},
+        _make_energy=lambda: model.energy,
+        _make_start=lambda rest: model.rest_system if rest else model.start_system,
+    )  # fmt: skip
 
 
 def _readings(model: CompiledDae, extended: CompiledDae, part: Part) -> list[Reading]:
