@@ -99,7 +99,7 @@ class CompiledDae:
 
     @property
     def discrete_size(self) -> int:
-        """Length of d: modes and discrete values, approaches, switches and shares, rows of ideal elements."""
+        """Length of d: modes and discrete values, then what follows them, see `structure.discretes`."""
         return self.equations.ode.size1_in("d")
 
     @cached_property

@@ -99,11 +99,10 @@ class Dependencies(Following):
         """Modes depend on their start conditions, discrete values on their start, shares on all that decides modes."""
         rows: Rows = [set() for _ in range(self.model.discrete_size)]
         for circuit in self.model.held.circuits:
-            count = len(circuit.members)
-            rows[circuit.first : circuit.first + count * (1 + count)] = [self._everything] * (count * (1 + count))
+            rows[circuit.entries] = [self._everything] * (circuit.shares.end - circuit.first)
         if self.model.held.ideal:
-            entries = self.model.held.ideal.entries
-            rows[entries] = [self._everything] * (entries.stop - entries.start)
+            part = self.model.held.ideal.rows
+            rows[part.entries] = [self._everything] * (part.end - part.first)
         starts = sparsity_rows(self.model.starts.discretes)
         for k, discrete in enumerate(self.model.flat_discretes):
             rows[k] = {("discrete", k)} if not discrete.names else {d for d in starts[k] if d[0] in "tpu"}

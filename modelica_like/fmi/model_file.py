@@ -191,7 +191,7 @@ def _contents(
                 sizes["y"],
                 *flags,
                 model.discrete_position.get(TERMINAL, -1),
-                model.held.ideal.first if model.held.ideal else 0,
+                model.held.ideal.rows.first if model.held.ideal else 0,
                 model.edges.count,
                 model.edges.slopes,
                 model.edges.kinks,

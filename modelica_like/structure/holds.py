@@ -21,6 +21,7 @@ import numpy as np
 
 from modelica_like.flatten.holds import TERMS
 from modelica_like.flatten.model import FlatModel, evaluate
+from modelica_like.structure.discretes import Part
 from modelica_like.structure.system import System
 
 _DEPENDENT = 1e-9
@@ -69,22 +70,26 @@ class Circuit:
 
     Attributes:
         members: positions of the held motions.
-        first: position in d of the switches, one per member, and the shares behind them, row by row.
+        first: position in d of the switches, behind which the shares stand.
     """
 
     members: tuple[int, ...]
     first: int
 
     @property
+    def switches(self) -> Part:
+        """Of each member, whether its equation is replaced by the sharing of reactions."""
+        return Part(self.first, 1, len(self.members))
+
+    @property
+    def shares(self) -> Part:
+        """Shares of the members in the equation of each."""
+        return Part(self.switches.end, len(self.members), len(self.members))
+
+    @property
     def entries(self) -> slice:
         """Positions in d of switches and shares."""
-        count = len(self.members)
-        return slice(self.first, self.first + count * (1 + count))
-
-    def shares(self, d: Any) -> Any:
-        """Return the shares among the values of d; shape (members, members)."""
-        count = len(self.members)
-        return d[self.entries][count:].reshape(count, count)
+        return slice(self.first, self.shares.end)
 
 
 def add_approaches(system: System) -> tuple[HeldMotion, ...]:
@@ -154,7 +159,7 @@ def find_circuits(
     for core in _cores(rows):
         for members in _dependent([rows[k] for k in core]):
             circuits.append(Circuit(tuple(rigid[core[k]] for k in members), first))
-            first += len(members) * (1 + len(members))
+            first = circuits[-1].shares.end
     return circuits
 
 
@@ -299,7 +304,7 @@ def held_rates(model: FlatModel, ode: Any, values: Any, holds: tuple[HeldMotion,
         holds: the held motions, with their states.
         circuits: those that depend on each other.
     """
-    switched = {k: circuit.first + place for circuit in circuits for place, k in enumerate(circuit.members)}
+    switched = {k: circuit.switches.first + place for circuit in circuits for place, k in enumerate(circuit.members)}
     gain, rates, d = hold_terms(model, values)[:, 0], ca.SX(ode), model.d
     for k, hold in enumerate(holds):
         if not hold.rigid:

@@ -15,14 +15,15 @@ equation, by values that only events change and that follow the others in d:
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
 from modelica_like.flatten.model import FlatModel
+from modelica_like.structure.discretes import Part
 
 HEAD = 3
-"""Values before the combination."""
+"""Values of a row before the combination."""
 _BACK = 1e4
 """Rate in 1/s at which states come back to the condition: unknowns that are known within tolerances let them drift."""
 _CONDUCTANCE = 1e6
@@ -55,19 +56,20 @@ class IdealNetwork:
 
     Attributes:
         elements: the elements.
-        first: position in d of one row per element: whether its equation is replaced, an impulse, whether the norm or a
-            derivative replaces it, and the combination of equations.
-        width: length of a row.
+        rows: one per element: whether its equation is replaced, an impulse, whether the norm or a derivative replaces
+            it, and the combination of equations.
     """
 
     elements: tuple[IdealElement, ...]
-    first: int
-    width: int
+    rows: Part
 
-    @property
-    def entries(self) -> slice:
-        """Positions in d of all rows."""
-        return slice(self.first, self.first + len(self.elements) * self.width)
+    def by_norm(self, d: Any) -> Any:
+        """Return whether the norm replaces the equation of each element, among the values of d; shape (elements,)."""
+        return self.rows.of(d)[:, HEAD - 1]
+
+    def combinations(self, d: Any) -> Any:
+        """Return the combinations of equations among the values of d; shape (elements, equations)."""
+        return self.rows.of(d)[:, HEAD:]
 
 
 def find_ideals(model: FlatModel) -> list[IdealElement]:
@@ -94,8 +96,8 @@ def complete(reduced: ReducedDae, ideals: list[IdealElement], rows: list[int]) -
     """
     flat, size = reduced.flat, len(rows)
     elements = tuple(replace(ideal, row=rows.index(ideal.row)) for ideal in ideals)
-    network = IdealNetwork(elements, flat.d.numel(), HEAD + size)
-    table = ca.SX.sym("ideal", network.width, len(elements))
+    network = IdealNetwork(elements, Part(flat.d.numel(), len(elements), HEAD + size))
+    table = ca.SX.sym("ideal", network.rows.columns, network.rows.rows)
     rates = ca.jtimes(reduced.alg, reduced.x, reduced.ode) + ca.jtimes(reduced.alg, flat.time, ca.SX(1))
     rates += _BACK * reduced.alg
     missed = ca.substitute(reduced.alg, reduced.z, ca.SX.zeros(size))  # linear: what is left of it is the condition

@@ -35,12 +35,12 @@ def test_dependent_equations_are_replaced_by_as_many_others(seed: int) -> None:
         modes = [one.mode for one in ideal.elements]
         point.d[modes] = r.integers(0, 2, len(modes))
         share(model, point)
-        rows = point.d[ideal.entries].reshape(-1, ideal.width).copy()
+        rows = ideal.rows.of(point.d).copy()
         replaced, derivative = rows[:, 0] == 1, (rows[:, 0] == 1) & (rows[:, HEAD - 1] == 0)
         assert set(rows[:, [0, HEAD - 1]].ravel()) <= {0.0, 1.0}
 
         def matrix(chosen: Any, rows: np.ndarray = rows, point: Point = point) -> np.ndarray:
-            point.d[ideal.entries] = np.where(chosen[:, None], rows * (np.arange(ideal.width) != 1), 0.0).ravel()
+            point.d[ideal.rows.entries] = (chosen[:, None] * rows * (np.arange(ideal.rows.columns) != 1)).ravel()
             return model.equations.alg_jacobian(point.t, point.x, point.z, model.p, model.u, point.d).full()
 
         def rank(full: np.ndarray) -> int:
@@ -84,5 +84,5 @@ def test_a_current_that_is_rounding_of_another_one_gets_no_impulse(i: float, kep
     assert ideal is not None
     point.d[[one.mode for one in ideal.elements]] = 0.0
     share(model, point)
-    (row,) = [one for one in point.d[ideal.entries].reshape(-1, ideal.width) if one[0]]
+    (row,) = [one for one in ideal.rows.of(point.d) if one[0]]
     assert bool(row[1]) == kept

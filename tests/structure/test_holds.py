@@ -89,4 +89,4 @@ def test_only_rigid_motions_with_a_reaction_are_shared() -> None:
 def test_shares_are_behind_the_switches() -> None:
     d = np.arange(100.0)
     circuit = Circuit((4, 5, 7), 10)
-    assert circuit.shares(d).tolist() == [[13.0, 14.0, 15.0], [16.0, 17.0, 18.0], [19.0, 20.0, 21.0]]
+    assert circuit.shares.of(d).tolist() == [[13.0, 14.0, 15.0], [16.0, 17.0, 18.0], [19.0, 20.0, 21.0]]

@@ -72,25 +72,22 @@ def _following(model: CompiledDae, nodes: list[int]) -> tuple[Any, list[Any]]:
 
 
 def share_slopes(model: CompiledDae, point: Point, circuit: Circuit, columns: int, total: Total) -> Vector:
-    """Differentiate switches and shares of a circuit by (x, theta) before an event, shape (entries of d, columns).
+    """Differentiate the shares of a circuit by (x, theta) before an event, shape (entries, columns).
 
     A share is the part of an element in a dependence of the motions, over its capacity; a common factor is free.
     """
-    count = len(circuit.members)
-    by_share = np.zeros((count * (1 + count), columns))
-    entries = point.d[circuit.first : circuit.first + count * (1 + count)]
-    pivots = [k for k in range(count) if entries[k]]
+    by_share = np.zeros((*[len(circuit.members)] * 2, columns))
+    pivots = circuit.switches.of(point.d)[0].nonzero()[0].tolist()
     for pivot in pivots:
-        first = count + pivot * count
-        shares = entries[first : first + count]
-        places = [k for k in range(count) if shares[k] or k in pivots]
+        shares = circuit.shares.of(point.d)[pivot]
+        places = [k for k, share in enumerate(shares) if share or k in pivots]
         members = [circuit.members[k] for k in places]
         free = [n for n, k in enumerate(places) if k not in pivots and abs(shares[k]) > _ROUNDING]
         slopes = -shares[places, None] * _relative(model, point, members, total)
         row = places.index(pivot)
         slopes[free] += shares[[places[n] for n in free], None] * _turned(model, point, members, row, free, total)
-        by_share[[first + k for k in places]] = slopes
-    return by_share
+        by_share[pivot, places] = slopes
+    return by_share.reshape(-1, columns)
 
 
 def _relative(model: CompiledDae, point: Point, members: list[int], total: Total) -> Vector:

@@ -266,9 +266,8 @@ class Work:
     def differentiate_shares(self) -> None:
         """Derivatives of the shares at the present point."""
         for circuit in self.model.held.circuits:
-            entries = circuit.entries
-            self.d[entries] = 0.0
-            self.d[entries] = share_slopes(self.model, self.point, circuit, self.x.shape[1], self._total)
+            self.d[circuit.entries] = 0.0
+            self.d[circuit.shares.entries] = share_slopes(self.model, self.point, circuit, self.x.shape[1], self._total)
 
     def _stop_motions(self, before: Vector, *, later: bool, jolted: list[int]) -> None:
         """Stop what modes have begun to hold since `before`, also where it stands still already, and what is `jolted`.

@@ -115,11 +115,11 @@ def _give_way_together(
         }
         fired = [model.events.transitions[event.transition] for event, _ in triggers]
         those = [k for k, transition in enumerate(fired) if not transition.timed and transition.mode in modes]
-        shared = circuit.shares(before.d).any(axis=1)
+        shared = circuit.shares.of(before.d).any(axis=1)
         if len(those) < 2 or not shared.any():
             continue
         part = slopes(model, before, "guards", [fired[k].index for k in those])
-        by_split = np.array([circuit.shares(column)[shared].ravel() for column in part.theta[:, -len(before.d) :]])
+        by_split = np.array([circuit.shares.of(column)[shared].ravel() for column in part.theta[:, -len(before.d) :]])
         left, sizes, _ = np.linalg.svd(by_split)
         weights, rank = left[:, -1], int(np.sum(sizes > SAME * sizes.max(initial=0.0)))
         if rank != len(those) - 1 or not (np.all(weights > 0.0) or np.all(weights < 0.0)):

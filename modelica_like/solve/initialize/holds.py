@@ -56,7 +56,7 @@ def sharing(model: CompiledDae, point: Point) -> list[tuple[str, ...]]:
     """Components that share a held motion at a point, circuit by circuit."""
     found: list[tuple[str, ...]] = []
     for circuit in model.held.circuits:
-        shares = circuit.shares(point.d)
+        shares = circuit.shares.of(point.d)
         for row in shares[np.any(shares != 0.0, axis=1)]:
             parts = (model.held.motions[k].component for k, part in zip(circuit.members, row, strict=True) if part)
             found.append(tuple(dict.fromkeys(parts)))

@@ -7,7 +7,7 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import NoValidModes
 from modelica_like.solve.initialize.point import Point, call, largest
-from modelica_like.structure.ideal import HEAD, IdealElement
+from modelica_like.structure.ideal import IdealElement
 
 _DEPENDENT = 1e-9
 _SLOW = 1e3
@@ -35,11 +35,11 @@ def refuse_contradiction(model: CompiledDae, point: Point) -> None:
     network = model.held.ideal
     if network is None:
         return
-    rows = point.d[network.entries].reshape(len(network.elements), network.width)
-    if not rows[:, HEAD - 1].any():
+    by_norm = network.by_norm(point.d)
+    if not by_norm.any():
         return
     values = call(model, model.equations.variables, point)
-    for k in rows[:, HEAD - 1].nonzero()[0]:
+    for k in by_norm.nonzero()[0]:
         element = network.elements[k]
         node = _zero(element, point.d)
         if abs(values[node]) > _LOST * largest(model, np.abs(values), node):
@@ -72,8 +72,8 @@ def no_valid_modes(model: CompiledDae, point: Point, number: int) -> NoValidMode
     """Return the error of an ideal element, given by its number, whose impulse no mode ends."""
     assert model.held.ideal is not None
     network, (_, node, value) = model.held.ideal, _wrong(model, point, number)
-    row = point.d[network.entries].reshape(len(network.elements), network.width)[number]
-    parts = [one for one in network.elements if row[HEAD + one.row]]
+    combination = network.combinations(point.d)[number]
+    parts = [element for element in network.elements if combination[element.row]]
     modes = [f"{one.component} {model.flat_discretes[one.mode].names[int(point.d[one.mode])]}" for one in parts]
     unit = model.flat_variables[node].unit
     what = "a current would stop at once" if str(unit) == "A" else "voltages would jump"
