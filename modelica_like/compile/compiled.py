@@ -122,7 +122,7 @@ class CompiledDae:
     def units(self) -> dict[str, Unit]:
         """Coherent SI unit of every variable, parameter, mode and discrete value by its path."""
         named = (*self.flat_discretes, *self.flat_variables, *self.flat_derived, *self.flat_parameters)
-        return {one.path: one.unit for one in named}
+        return {item.path: item.unit for item in named}
 
     @cached_property
     def derived_position(self) -> dict[str, int]:
@@ -210,14 +210,14 @@ class CompiledDae:
     @cached_property
     def following(self) -> dict[str, tuple[str, ...]]:
         """Variables of every state that follows the motion, by its name."""
-        weights = [one.path for one in self.flat_discretes if one.hidden and not one.names]
+        weights = [discrete.path for discrete in self.flat_discretes if discrete.hidden and not discrete.names]
         names = [name for name in self.states if not name.startswith("der(") and name not in self.position]
         return {name: tuple(w[len(name) + 1 :] for w in weights if w.startswith(f"{name}.")) for name in names}
 
     @cached_property
     def rising(self) -> tuple[tuple[int, int], ...]:
         """Positions of pairs of parameters of which the second must exceed the first: columns of tables that rise."""
-        return tuple((k - one.above, k) for k, one in enumerate(self.flat_parameters) if one.above)
+        return tuple((k - parameter.above, k) for k, parameter in enumerate(self.flat_parameters) if parameter.above)
 
     def with_parameters(self, values: dict[str, Any]) -> CompiledDae:
         """Return the same model with other parameter values, without compiling it again.
@@ -234,29 +234,29 @@ class CompiledDae:
         inputs = {self.flat_variables[k].path: n for n, k in enumerate(self.inputs)}
         for path, value in values.items():
             if path in self.parameter_position:
-                one = self.flat_parameters[self.parameter_position[path]]
-                if not one.tunable:
+                parameter = self.flat_parameters[self.parameter_position[path]]
+                if not parameter.tunable:
                     raise LanguageError(
                         f"{path} cannot change after compilation.",
                         advice="Set it in the model and build the model again.",
                     )
-                p[self.parameter_position[path]] = one.checked(to_si(value, one.unit, path), value)
+                p[self.parameter_position[path]] = parameter.checked(to_si(value, parameter.unit, path), value)
             elif path in inputs:
                 unit = self.flat_variables[self.inputs[inputs[path]]].unit
                 u[inputs[path]] = to_si(value, unit, path)
             elif path in self.derived_position:
                 raise LanguageError(f"{path} follows from other parameters.", advice="Set those.")
             else:
-                known = [*self.parameter_position, *inputs]
+                paths = [*self.parameter_position, *inputs]
                 advice = f"Write {self.renamed[path]}." if path in self.renamed else ""
-                near = "." if advice else did_you_mean(path, known) or "."
+                near = "." if advice else did_you_mean(path, paths) or "."
                 raise UnknownName(f"{self.name} has no parameter '{path}'{near}", advice=advice)
         for below, above in self.rising:
             if not p[below] < p[above]:
                 names = [f"{self.flat_parameters[k].path} = {p[k]:g}" for k in (above, below)]
                 raise ValueOutOfRange(f"{' is not above '.join(names)}: this column of the table must rise.")
-        for one, number in zip(self.flat_derived, self.equations.derived(p).full().ravel(), strict=True):
-            one.checked(float(number), f"{number:g}")
+        for parameter, number in zip(self.flat_derived, self.equations.derived(p).full().ravel(), strict=True):
+            parameter.checked(float(number), f"{number:g}")
         return self.twin(p=p, u=u)
 
     def twin(self, **changes: Any) -> CompiledDae:

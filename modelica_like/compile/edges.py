@@ -63,8 +63,9 @@ def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, gu
     smooth = _different([*Narrow(arguments, rates).edges(_operations(arguments, equations, NARROW))])
     edges = kinks + smooth + of_guards
     slopes = len(edges) - len(of_guards)
-    phases = _different([one for _, (one, *_) in _operations(arguments, ca.vertcat(*edges, guards(*given)), _WAVES)])
-    result = ca.densify(ca.vertcat(ca.SX(0, 1), *edges, *(one / PHASE_STEP for one in phases)))
+    waves = _operations(arguments, ca.vertcat(*edges, guards(*given)), _WAVES)
+    phases = _different([phase for _, (phase, *_) in waves])
+    result = ca.densify(ca.vertcat(ca.SX(0, 1), *edges, *(phase / PHASE_STEP for phase in phases)))
     function = ca.Function("edges", list(arguments.values()), [result], list(arguments), ["edges"])
     in_time = ca.depends_on(ca.vertcat(ca.SX(0, 1), *kinks), arguments["t"])
     return Edges(function, len(edges), slopes, len(kinks), len(phases), in_time)
@@ -72,7 +73,7 @@ def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, gu
 
 def kinks_of(arguments: dict[str, Any], expressions: Any) -> list[Any]:
     """Return what is zero where the slope of expressions may change or jump while time, states and unknowns move."""
-    return _different([_edge(*one) for one in _operations(arguments, expressions, _EDGES) if not _never_turns(*one)])
+    return _different([_edge(*pair) for pair in _operations(arguments, expressions, _EDGES) if not _never_turns(*pair)])
 
 
 def _never_turns(code: int, operands: list[Any]) -> bool:
@@ -97,7 +98,8 @@ def _edge(code: int, operands: list[Any]) -> Any:
 def _different(expressions: list[Any]) -> list[Any]:
     if not expressions:
         return []
-    return list({one.element_hash(): one for one in ca.vertsplit(ca.cse(ca.vertcat(*expressions)))}.values())
+    column = ca.cse(ca.vertcat(*expressions))
+    return list({expression.element_hash(): expression for expression in ca.vertsplit(column)}.values())
 
 
 def _operations(arguments: dict[str, Any], expressions: Any, codes: frozenset[int]) -> Iterator[tuple[int, list[Any]]]:
@@ -106,7 +108,7 @@ def _operations(arguments: dict[str, Any], expressions: Any, codes: frozenset[in
     count, code = function.n_instructions(), function.instruction_id
     if not any(code(k) in codes for k in range(count)):
         return
-    held, moves, symbols = dict[int, Any](), dict[int, bool](), [ca.vertsplit(one) for one in arguments.values()]
+    held, moves, symbols = dict[int, Any](), dict[int, bool](), [ca.vertsplit(symbol) for symbol in arguments.values()]
     for k in range(count):
         if (kind := code(k)) == ca.OP_OUTPUT:
             continue
@@ -116,8 +118,8 @@ def _operations(arguments: dict[str, Any], expressions: Any, codes: frozenset[in
         elif kind == ca.OP_INPUT:
             held[place], moves[place] = symbols[reads[0]][reads[1]], reads[0] < _FIXED
         else:
-            operands = [held[one] for one in reads]
-            moving = any(moves[one] for one in reads)
+            operands = [held[read] for read in reads]
+            moving = any(moves[read] for read in reads)
             if moving and kind in codes:
                 yield kind, operands
             held[place] = ca.SX.unary(kind, *operands) if len(operands) == 1 else ca.SX.binary(kind, *operands)

@@ -65,8 +65,8 @@ def _springs(reduced: ReducedDae, kinematic: Iterable[int]) -> set[int]:
     forces = _force_rows(system).difference(kinematic)
     read = {column for k, (row, column) in enumerate(_entries(slopes.sparsity())) if row in forces and k not in by_mode}
     states, moving = (
-        {column for _, column in _entries(ca.jacobian_sparsity(one, bases))}
-        for one in (reduced.x, ca.vertcat(reduced.ode, reduced.alg))
+        {column for _, column in _entries(ca.jacobian_sparsity(expressions, bases))}
+        for expressions in (reduced.x, ca.vertcat(reduced.ode, reduced.alg))
     )
     return {relative[k] for k in read - (states - moving)}
 
@@ -100,19 +100,19 @@ def _kinematic_rows(system: System) -> dict[int, Row]:
     for row, level in _entries(ca.jacobian_sparsity(system.residual, system.everything)):
         used.setdefault(row, set()).add(level)
     by_mode = {*ca.jacobian_sparsity(system.residual, system.model.d).row()}
-    found: dict[int, Row] = {}
+    rows: dict[int, Row] = {}
     for row, some in used.items():
         orders = {system.levels[level].order for level in some}
         if row not in by_mode and orders in ({0}, {1}) and all(system.levels[level].chain in moves for level in some):
             residual = system.residual[row]
-            found[row] = {system.levels[k].chain: ca.jacobian(residual, system.symbols[k]) for k in sorted(some)}
+            rows[row] = {system.levels[k].chain: ca.jacobian(residual, system.symbols[k]) for k in sorted(some)}
             if orders == {0} and ca.depends_on(residual, system.model.time):
-                found[row][_TIME] = ca.jacobian(residual, system.model.time)
+                rows[row][_TIME] = ca.jacobian(residual, system.model.time)
             elif orders == {1}:
-                slopes = (found[row][system.levels[k].chain] * system.symbols[k] for k in sorted(some))
+                slopes = (rows[row][system.levels[k].chain] * system.symbols[k] for k in sorted(some))
                 if not (rest := ca.simplify(residual - sum(slopes, ca.SX(0)))).is_zero():
-                    found[row][_TIME] = rest
-    return found
+                    rows[row][_TIME] = rest
+    return rows
 
 
 def _without_inertia(
@@ -149,21 +149,21 @@ def _numbered(system: System, rows: list[Row]) -> list[dict[int, _Coefficient]]:
 def _eliminated(rows: list[dict[int, _Coefficient]], free: set[int]) -> Iterable[dict[int, _Coefficient]]:
     """Gaussian elimination of the free rates; what remains does not contain them."""
     left = dict(enumerate(rows))
-    having: dict[int, set[int]] = {one: set() for one in free}
+    having: dict[int, set[int]] = {rate: set() for rate in free}
     for number, row in left.items():
-        for one in free.intersection(row):
-            having[one].add(number)
+        for rate in free.intersection(row):
+            having[rate].add(number)
     # Those in few equations first, and the shortest equation for each: the rows stay sparse.
-    for one in sorted(free, key=lambda one: (len(having[one]), one)):
-        some = sorted(k for k in having[one] if k in left and one in left[k])
-        largest = max((abs(left[k][one].number) for k in some), default=0.0)
-        usable = [k for k in some if abs(left[k][one].number) > _SMALL * largest]
+    for rate in sorted(free, key=lambda rate: (len(having[rate]), rate)):
+        some = sorted(k for k in having[rate] if k in left and rate in left[k])
+        largest = max((abs(left[k][rate].number) for k in some), default=0.0)
+        usable = [k for k in some if abs(left[k][rate].number) > _SMALL * largest]
         if usable:
             chosen = min(usable, key=lambda k: len(left[k]))
             pivot = left.pop(chosen)
             for k in some:
                 if k != chosen:
-                    _subtract(left[k], pivot, one)
+                    _subtract(left[k], pivot, rate)
                     for other in free.intersection(pivot):
                         having[other].add(k)
         else:  # only by structure
@@ -172,12 +172,12 @@ def _eliminated(rows: list[dict[int, _Coefficient]], free: set[int]) -> Iterable
     return left.values()
 
 
-def _subtract(row: dict[int, _Coefficient], pivot: dict[int, _Coefficient], one: int) -> None:
+def _subtract(row: dict[int, _Coefficient], pivot: dict[int, _Coefficient], column: int) -> None:
     """Take a multiple of one row from another, so that a coefficient vanishes."""
-    own = row.pop(one)
-    value, number = own.value / pivot[one].value, own.number / pivot[one].number
+    leading = row.pop(column)
+    value, number = leading.value / pivot[column].value, leading.number / pivot[column].number
     for k, other in pivot.items():
-        if k != one:
+        if k != column:
             before = row.pop(k, _Coefficient(ca.SX(0), 0.0))
             after = before.number - number * other.number
             if abs(after) > _SMALL * abs(before.number):

@@ -17,7 +17,7 @@ def energy_terms(reduced: ReducedDae) -> Any:
         the magnitudes of the powers through its connectors, the scale of rounding of the power in.
     """
     flat = reduced.flat
-    variable = {one.path: k for k, one in enumerate(flat.variables)}
+    variable = {entry.path: k for k, entry in enumerate(flat.variables)}
     rows: list[Any] = []
     for instance in flat.instances:
         template = instance.template
@@ -27,5 +27,5 @@ def energy_terms(reduced: ReducedDae) -> Any:
         p, d = flat.q[list(instance.parameters)], flat.d[list(instance.discretes)]
         stored, loss, source, *powers = ca.vertsplit(template.energy(ca.vertcat(*slots), p, d, flat.time))
         rows.append((stored, loss, source, sum(powers), sum(map(ca.fabs, powers))))
-    stored, loss, source, inflow, passing = (ca.vertcat(*one) for one in zip(*rows, strict=True))
+    stored, loss, source, inflow, passing = (ca.vertcat(*terms) for terms in zip(*rows, strict=True))
     return ca.horzcat(stored, loss, source, inflow, reduced.total_derivative(stored), passing)

@@ -54,17 +54,17 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         flat_variables=tuple(flat.variables),
         flat_parameters=tuple(flat.parameters),
         flat_derived=tuple(flat.derived),
-        flat_discretes=tuple(_plain(one) for one in flat.discretes),
+        flat_discretes=tuple(_plain(discrete) for discrete in flat.discretes),
         inputs=tuple(flat.inputs),
         equations=build.equations(),
         events=build.events(),
         held=Held(reduced.holds, build.function("hold_terms", terms), reduced.circuits, reduced.ideal),
         starts=build.starts(),
-        p=np.array([one.value for one in flat.parameters], float),
+        p=np.array([parameter.value for parameter in flat.parameters], float),
         u=_input_values(flat),
         components=tuple(flat.components),
         places=_places(flat),
-        renamed={f"{path}.{name}": to for path, one in flat.components.items() for name, to in one.renamed.items()},
+        renamed={f"{path}.{name}": to for path, c in flat.components.items() for name, to in c.renamed.items()},
         terminals=_terminals(flat),
         motion_sources=_motion_sources(flat),
         summary=str(reduced),
@@ -77,44 +77,44 @@ def compile(reduced: ReducedDae) -> CompiledDae:
 def _settings(root: Any) -> dict[str, Any]:
     if not isinstance(root, Assembly):
         return {}
-    own = inside(root)
-    return {**own.simulate, **({"display": own.display} if own.display else {})}
+    record = inside(root)
+    return {**record.simulate, **({"display": record.display} if record.display else {})}
 
 
 def _discrete_starts(flat: FlatModel) -> Any:
-    starts = [ca.SX(one.start) for one in flat.discretes]
+    starts = [ca.SX(discrete.start) for discrete in flat.discretes]
     return ca.vertcat(*starts, ca.SX.zeros(flat.d.numel() - len(starts)))
 
 
 def _places(flat: FlatModel) -> dict[str, Source]:
     """Source places of the parts of netlists."""
-    found = {path: one.place_of() for path, one in flat.components.items()}
-    return {path: source for path, source in found.items() if source.file}
+    places = {path: component.place_of() for path, component in flat.components.items()}
+    return {path: source for path, source in places.items() if source.file}
 
 
 def _terminals(flat: FlatModel) -> tuple[CompiledTerminal, ...]:
     """Adaptors that are not driven inside, with the variables of their terminals."""
     inputs = {flat.variables[k].path for k in flat.inputs}
-    found: list[CompiledTerminal] = []
-    for path, one in flat.components.items():
-        if one.terminal is not None and path:
-            members = tuple((name, f"{path}.{name}") for name in one.terminal_members())
-            if all(full in inputs for name, full in members if isinstance(one.fields[name], Input)):
-                found.append(CompiledTerminal(path, one.terminal.kind, members))
-    return tuple(found)
+    terminals: list[CompiledTerminal] = []
+    for path, component in flat.components.items():
+        if component.terminal is not None and path:
+            members = tuple((name, f"{path}.{name}") for name in component.terminal_members())
+            if all(full in inputs for name, full in members if isinstance(component.fields[name], Input)):
+                terminals.append(CompiledTerminal(path, component.terminal.kind, members))
+    return tuple(terminals)
 
 
 def _motion_sources(flat: FlatModel) -> tuple[str, ...]:
     """Components whose power from outside depends on the torque or force at their connectors."""
-    kinds = {one.path: one for one in flat.variables}
-    found: list[str] = []
+    kinds = {variable.path: variable for variable in flat.variables}
+    sources: list[str] = []
     for instance in flat.instances:
         prefix = f"{instance.path}." if instance.path else ""
         slots = [kinds[prefix + slot.path] for slot in instance.template.energy_slots]
         rows = zip(*instance.template.energy.sparsity_jac(0, 0).get_triplet(), strict=True) if slots else ()
         if any(row == _SOURCE_POWER and slots[k].kind == "flow" and str(slots[k].unit) in _EFFORTS for row, k in rows):
-            found.append(instance.path)
-    return tuple(found)
+            sources.append(instance.path)
+    return tuple(sources)
 
 
 def _plain(discrete: FlatDiscrete) -> FlatDiscrete:
@@ -134,8 +134,8 @@ class _Builder:
         self.reduced = reduced
         flat = reduced.flat
         self.arguments = [flat.time, reduced.x, reduced.z, flat.p, reduced.u, flat.d]
-        self.place = {one.path: k for k, one in enumerate(flat.discretes)}
-        self.variable = {one.path: k for k, one in enumerate(flat.variables)}
+        self.place = {discrete.path: k for k, discrete in enumerate(flat.discretes)}
+        self.variable = {variable.path: k for k, variable in enumerate(flat.variables)}
         self.keeping = Keeping(reduced)
 
     def function(self, name: str, expression: Any) -> ca.Function:
@@ -151,7 +151,7 @@ class _Builder:
             alg_jacobian=self.function("alg_jacobian", ca.jacobian(reduced.alg, reduced.z)),
             variables=self.function("variables", reduced.values[: len(flat.variables)]),
             derived=ca.Function("derived", [flat.p], [ca.densify(ca.SX(flat.formulas))], ["p"], ["derived"]),
-            determinants=self.function("determinants", ca.vertcat(*(one[2] for one in reduced.determinants))),
+            determinants=self.function("determinants", ca.vertcat(*(value for *_, value in reduced.determinants))),
             singular=tuple((names, origins) for names, origins, _ in reduced.determinants),
             implicit_blocks=reduced.implicit_blocks,
             differentiated=reduced.differentiated,
@@ -164,7 +164,7 @@ class _Builder:
         guards, moments, transitions, resets, targets = self.transitions()
         delays, delay_parts = self.delays()
         news, update_rows = updates(
-            reduced, partial(self._resets, targets=targets), self._kept, [one[0] for one in delay_parts]
+            reduced, partial(self._resets, targets=targets), self._kept, [part[0] for part in delay_parts]
         )
         return EventTables(
             guards=self.function("guards", guards),
@@ -202,38 +202,38 @@ class _Builder:
         moments: list[Any] = []
         resets: list[Any] = []
         targets: list[int] = []
-        found: list[CompiledTransition] = []
+        transitions: list[CompiledTransition] = []
         for number, instance in enumerate(flat.instances):
             prefix = f"{instance.path}." if instance.path else ""
             for form in instance.template.transitions:
-                own, store = (columns["moments"], moments) if form.timed else (columns["guards"], guards)
-                store.append(own[number][form.index])
+                values, store = (columns["moments"], moments) if form.timed else (columns["guards"], guards)
+                store.append(values[number][form.index])
                 changes: list[Reset] = []
                 for path, position in form.resets:
-                    values = columns["resets"][number][position], *self._kept(prefix + path)
+                    news = columns["resets"][number][position], *self._kept(prefix + path)
                     changes += self._resets(prefix + path, len(resets), targets)
-                    resets += values
+                    resets += news
                 numbers = {"mode": self.place[prefix + form.mode], "index": len(store) - 1, "resets": tuple(changes)}
-                found.append(CompiledTransition(**{**vars(form), **numbers}))
-        for one in reduced.choices:
-            changes = [Reset(kind, place, 1.0, k, 0) for k, (kind, place, _) in enumerate(one.resets, len(resets))]
-            resets += [value for *_, value in one.resets]
-            why, source = f"the states of {one.told} would become singular", one.origin.source
-            found.append(
-                CompiledTransition(one.mode, (0,), 0, False, len(guards), tuple(changes), source, "", why, fails=False)
+                transitions.append(CompiledTransition(**{**vars(form), **numbers}))
+        for choice in reduced.choices:
+            changes = [Reset(kind, place, 1.0, k, 0) for k, (kind, place, _) in enumerate(choice.resets, len(resets))]
+            resets += [value for *_, value in choice.resets]
+            why, source = f"the states of {choice.told} would become singular", choice.origin.source
+            transitions.append(
+                CompiledTransition(choice.mode, (0,), 0, False, len(guards), (*changes,), source, "", why, fails=False)
             )
-            guards.append(one.guard)
-        return ca.vertcat(*guards), ca.vertcat(*moments), tuple(found), ca.vertcat(*resets), targets
+            guards.append(choice.guard)
+        return ca.vertcat(*guards), ca.vertcat(*moments), tuple(transitions), ca.vertcat(*resets), targets
 
     def delays(self) -> tuple[Any, tuple[tuple[int, ...], ...]]:
         """Return values and times of the delays of all instances, and the places of their numbers in d."""
         flat = self.reduced.flat
         columns = evaluate(flat, "delays", self.reduced.values)
-        found: list[tuple[int, ...]] = []
+        places: list[tuple[int, ...]] = []
         for instance in flat.instances:
             prefix = f"{instance.path}." if instance.path else ""
-            found += [tuple(self.place[prefix + name] for name in one) for one in instance.template.delay_parts]
-        return ca.vertcat(*(columns[k] for k in sorted(columns))), tuple(found)
+            places += [tuple(self.place[prefix + name] for name in names) for names in instance.template.delay_parts]
+        return ca.vertcat(*(columns[k] for k in sorted(columns))), tuple(places)
 
     def _kept(self, path: str) -> list[Any]:
         """Return the values of what keeps its value where a variable gets a new one."""
@@ -283,12 +283,12 @@ class _Builder:
         """
         flat, values = self.reduced.flat, ca.SX(self.reduced.values)
         largest: dict[str, Any] = {}
-        for one in self.reduced.holds:
-            unit = str(flat.variables[one.motion].unit)
+        for hold in self.reduced.holds:
+            unit = str(flat.variables[hold.motion].unit)
             if unit not in largest:
-                nominal = flat.variables[one.motion].nominal
+                nominal = flat.variables[hold.motion].nominal
                 same = [k for k, variable in enumerate(flat.variables) if str(variable.unit) == unit]
                 largest[unit] = ca.fmax(nominal, ca.mmax(ca.fabs(self.reduced.values[same])))
-            motion = self.reduced.values[one.motion]
-            values[one.motion] = ca.if_else(ca.fabs(motion) > ROUNDING * ca.fmax(largest[unit], _SMALLEST), motion, 0)
+            motion = self.reduced.values[hold.motion]
+            values[hold.motion] = ca.if_else(ca.fabs(motion) > ROUNDING * ca.fmax(largest[unit], _SMALLEST), motion, 0)
         return values

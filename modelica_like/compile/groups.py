@@ -173,6 +173,6 @@ def with_functions(group: _Group, functions: dict[str, ca.Function], **tables: A
         functions: by name; those of other groups do not count.
         tables: other fields to change.
     """
-    given = {one.name: getattr(group, one.name) for one in fields(group)}
-    own = {name: value.name() for name, value in given.items() if isinstance(value, ca.Function)}
-    return replace(group, **{name: functions[key] for name, key in own.items() if key in functions}, **tables)
+    given = {item.name: getattr(group, item.name) for item in fields(group)}
+    names = {name: value.name() for name, value in given.items() if isinstance(value, ca.Function)}
+    return replace(group, **{name: functions[key] for name, key in names.items() if key in functions}, **tables)

@@ -48,7 +48,7 @@ class Narrow:
         self._rates: dict[int, Any] = {arguments["t"].element_hash(): ca.SX(1)}
         for state, rate in zip(_split(arguments["x"]), _split(rates), strict=True):
             self._rates[state.element_hash()] = rate
-        self._implicit = {one.element_hash() for one in _split(arguments["z"])}
+        self._implicit = {symbol.element_hash() for symbol in _split(arguments["z"])}
 
     def edges(self, operations: Iterable[tuple[int, list[Any]]]) -> Iterator[Any]:
         """Yield edges of operations of `NARROW`, each given by its code and operands."""
@@ -72,10 +72,11 @@ class Narrow:
 
     def _of_exponential(self, turns: Any, exponent: Any) -> Iterator[Any]:
         moving, size = self._moving(turns), 1 + ca.fabs(turns)
-        slopes = [_slopes(turns, one) for one in moving]
+        slopes = [_slopes(turns, symbol) for symbol in moving]
         tops = [_distance(slope, slope, bend, size) for slope, bend in self._bends(turns)]
-        if not tops and not any(one.element_hash() in self._implicit for one in moving):  # whose rates are not known
-            rate = sum(slope * self._rates[one.element_hash()] for one, (slope, _) in zip(moving, slopes, strict=True))
+        names = [symbol.element_hash() for symbol in moving]
+        if not tops and self._implicit.isdisjoint(names):  # their rates are not known
+            rate = sum(slope * self._rates[name] for name, (slope, _) in zip(names, slopes, strict=True))
             tops = [rate] if self._moving(rate) else []
         yield from [*tops, (exponent + _COUNTS_FROM) / (ca.fabs(exponent) + _COUNTS_FROM)] if tops else []
 
@@ -87,24 +88,24 @@ class Narrow:
 
     def _of_steps(self, arguments: list[Any]) -> Iterator[Any]:
         """Yield the middles of steps that are not all where their symbols are zero."""
-        moving = [self._moving(one) for one in arguments]
+        moving = [self._moving(argument) for argument in arguments]
         aside = set[int]()
-        for one, symbols in zip(arguments, moving, strict=True):
-            if not ca.substitute(one, ca.vertcat(*symbols), ca.SX.zeros(len(symbols))).is_zero():
+        for argument, symbols in zip(arguments, moving, strict=True):
+            if not ca.substitute(argument, ca.vertcat(*symbols), ca.SX.zeros(len(symbols))).is_zero():
                 aside.update(symbol.element_hash() for symbol in symbols)
-        for one, symbols in zip(arguments, moving, strict=True):
+        for argument, symbols in zip(arguments, moving, strict=True):
             if any(symbol.element_hash() in aside for symbol in symbols):
-                yield one
+                yield argument
 
     def _bends(self, expression: Any) -> Iterator[tuple[Any, Any]]:
         """Yield first and second derivatives by each moving symbol in which an expression is not linear."""
-        for slope, bend in (_slopes(expression, one) for one in self._moving(expression)):
+        for slope, bend in (_slopes(expression, symbol) for symbol in self._moving(expression)):
             if not bend.is_zero():
                 yield slope, bend
 
     def _moving(self, expression: Any) -> list[Any]:
         keys = self._rates.keys() | self._implicit
-        return [one for one in ca.symvar(expression) if one.element_hash() in keys]
+        return [symbol for symbol in ca.symvar(expression) if symbol.element_hash() in keys]
 
 
 def _slopes(expression: Any, symbol: Any) -> tuple[Any, Any]:

@@ -75,34 +75,34 @@ def sliding(model: CompiledDae) -> CompiledDae:
     This is possible where two values change into each other under opposite conditions, without resets, and decide on
     the rate of what the condition compares. Without such modes it is the model itself.
     """
-    made = model.once(Cached.SLIDING, lambda: _sliding(model))
-    return made.twin(p=model.p, u=model.u, settings=model.settings) if made is not model else model
+    slid = model.once(Cached.SLIDING, lambda: _sliding(model))
+    return slid.twin(p=model.p, u=model.u, settings=model.settings) if slid is not model else model
 
 
 def _sliding(model: CompiledDae) -> CompiledDae:
     borders = _borders(model)
     if not borders:
         return model
-    made = _Mix(model, borders).model()
-    made.once(Cached.SLIDING, lambda: made)
-    return made
+    slid = _Mix(model, borders).model()
+    slid.once(Cached.SLIDING, lambda: slid)
+    return slid
 
 
 # -- which modes -----------------------------------------------------------------------------------------------------
 
 
 def _borders(model: CompiledDae) -> list[Border]:
-    samples, found = _samples(model), list[tuple[Any, Border]]()
+    samples, borders = _samples(model), list[tuple[Any, Border]]()
     for pair in _pairs(model, samples):
         guard = samples[:, model.events.transitions[pair.there].index]
         turned = replace(pair, first=pair.second, second=pair.first, there=pair.back, back=pair.there)
         ways = (pair, guard), (turned, -guard)
-        alike = [(border, one) for values, border in found for one, own in ways if _same(own, values)]
-        for border, one in alike:
-            border.append(one)
+        alike = [(border, turn) for values, border in borders for turn, signed in ways if _same(signed, values)]
+        for border, turn in alike:
+            border.append(turn)
         if not alike:
-            found.append((guard, [pair]))
-    return [border for _, border in found]
+            borders.append((guard, [pair]))
+    return [border for _, border in borders]
 
 
 def _same(values: Any, others: Any) -> bool:
@@ -111,18 +111,20 @@ def _same(values: Any, others: Any) -> bool:
 
 
 def _pairs(model: CompiledDae, samples: Any) -> Iterator[Pair]:
-    held = {(one.mode, one.number) for one in model.held.motions}
-    numbers = {k: len(one.names) for k, one in enumerate(model.flat_discretes)}
+    held = {(hold.mode, hold.number) for hold in model.held.motions}
+    numbers = {k: len(discrete.names) for k, discrete in enumerate(model.flat_discretes)}
     plain = [
-        k for k, one in enumerate(model.events.transitions) if not (one.timed or one.resets or one.fails or one.notice)
+        k
+        for k, transition in enumerate(model.events.transitions)
+        if not (transition.timed or transition.resets or transition.fails or transition.notice)
     ]
     for there, back in combinations(plain, 2):
-        one, other = model.events.transitions[there], model.events.transitions[back]
-        mode, first, second = one.mode, other.target, one.target
-        if mode != other.mode or first not in one.sources or second not in other.sources or first == second:
+        forth, other = model.events.transitions[there], model.events.transitions[back]
+        mode, first, second = forth.mode, other.target, forth.target
+        if mode != other.mode or first not in forth.sources or second not in other.sources or first == second:
             continue
-        opposite = _same(samples[:, one.index], -samples[:, other.index])
-        if opposite and held.isdisjoint(((mode, first), (mode, second))) and _decides(model, mode, one.index):
+        opposite = _same(samples[:, forth.index], -samples[:, other.index])
+        if opposite and held.isdisjoint(((mode, first), (mode, second))) and _decides(model, mode, forth.index):
             yield Pair(mode, first, second, there, back, numbers[mode])
             numbers[mode] += 1
 
@@ -174,20 +176,20 @@ class _Mix:
 
     def __init__(self, model: CompiledDae, borders: list[Border]) -> None:
         self.base = model
-        self.pairs = [(one, k) for k, border in enumerate(borders) for one in border]
+        self.pairs = [(pair, k) for k, border in enumerate(borders) for pair in border]
         self.arguments = list(model.arguments.values())
         self.t, self.x, self.z, *_, self.d = self.arguments
-        self.slides = [functools.reduce(ca.logic_or, [self._slides(one) for one in border]) for border in borders]
+        self.slides = [functools.reduce(ca.logic_or, [self._slides(pair) for pair in border]) for border in borders]
         modes = ca.SX(self.d)
-        for one, _ in self.pairs:
-            modes[one.mode] = ca.if_else(self._slides(one), one.first, modes[one.mode])
+        for pair, _ in self.pairs:
+            modes[pair.mode] = ca.if_else(self._slides(pair), pair.first, modes[pair.mode])
         slides = functools.reduce(ca.logic_or, self.slides)
-        for mode, value in self._following([*self.arguments[:-1], modes], [one.mode for one, _ in self.pairs]):
+        for mode, value in self._following([*self.arguments[:-1], modes], [pair.mode for pair, _ in self.pairs]):
             modes[mode] = ca.if_else(slides, value, modes[mode])
         self.first = [*self.arguments[:-1], modes]
         # Only where it slides: a branch that is not taken may be undefined.
         self.seconds = [
-            self._with({one.mode: ca.if_else(self._slides(one), one.second, modes[one.mode]) for one in border})
+            self._with({pair.mode: ca.if_else(self._slides(pair), pair.second, modes[pair.mode]) for pair in border})
             for border in borders
         ]
         self.alg = model.equations.alg(*self.first)
@@ -197,7 +199,7 @@ class _Mix:
         self.rates = self._motion(ode).rate(ca.vertcat(*self.borders))
         self.shares = self._shares()
         self.motion = self._motion(self._mixed(model.equations.ode))
-        others = [self._with({one.mode: self._other(one) for one in border}) for border in borders]
+        others = [self._with({pair.mode: self._other(pair) for pair in border}) for border in borders]
         self.across = [
             (self._motion(self.motion.ode + model.equations.ode(*other) - ode)).rate(border)
             for other, border in zip(others, self.borders, strict=True)
@@ -206,12 +208,12 @@ class _Mix:
     def _motion(self, ode: Any) -> Motion:
         return Motion(self.t, self.x, self.z, ode, self.alg)
 
-    def _slides(self, one: Pair) -> Any:
-        return self.d[one.mode] == one.number
+    def _slides(self, pair: Pair) -> Any:
+        return self.d[pair.mode] == pair.number
 
-    def _other(self, one: Pair) -> Any:
-        mode = self.first[-1][one.mode]
-        return ca.if_else(mode == one.first, one.second, ca.if_else(mode == one.second, one.first, mode))
+    def _other(self, pair: Pair) -> Any:
+        mode = self.first[-1][pair.mode]
+        return ca.if_else(mode == pair.first, pair.second, ca.if_else(mode == pair.second, pair.first, mode))
 
     def _following(self, arguments: list[Any], modes: Iterable[int]) -> list[tuple[int, Any]]:
         """Return positions in d and values of the discrete variables on which modes have an effect."""
@@ -243,7 +245,7 @@ class _Mix:
         rows = [ca.if_else(slides, change[k, :], ca.SX.eye(len(columns))[k, :]) for k, slides in enumerate(self.slides)]
         # The border is approached, so that errors of the integrator do not add up.
         back = [rate + border / _RETURN for rate, border in zip(ca.vertsplit(self.rates), self.borders, strict=True)]
-        wanted = ca.vertcat(*(ca.if_else(slides, -one, 0) for one, slides in zip(back, self.slides, strict=True)))
+        wanted = ca.vertcat(*(ca.if_else(slides, -rate, 0) for rate, slides in zip(back, self.slides, strict=True)))
         return ca.vertsplit(ca.solve(ca.densify(ca.vertcat(*rows)), wanted))
 
     def _mixed(self, function: ca.Function) -> Any:
@@ -259,30 +261,30 @@ class _Mix:
         moving = {row for name in ("t", "x", "z") for row, _ in _uses(self.base.events.guards, name)}
         plain, mixed = self.base.events.guards(*self.first), self._joined()
         values = ca.vertcat(*((mixed if row in moving else plain)[row] for row in range(plain.numel())))
-        now, soon = (ca.vertsplit(one) for one in (values, guards_soon(self.t, self.motion.rate, values)))
+        now, soon = (ca.vertsplit(column) for column in (values, guards_soon(self.t, self.motion.rate, values)))
         return self._crossing(now, soon)
 
     def _joined(self) -> Any:
         first, *others = (self._relations(arguments) for arguments in (self.first, *self.seconds))
         mixed = iter(
-            one + sum(share * (other - one) for share, other in zip(self.shares, those, strict=True))
-            for one, *those in zip(first, *others, strict=True)
+            relation + sum(share * (other - relation) for share, other in zip(self.shares, those, strict=True))
+            for relation, *those in zip(first, *others, strict=True)
         )
         return joined(self.base.events.guards(*self.first), lambda _: next(mixed))
 
     def _relations(self, arguments: list[Any]) -> list[Any]:
-        found: list[Any] = []
-        joined(self.base.events.guards(*arguments), lambda relation: found.append(relation) or relation)
-        return found
+        relations: list[Any] = []
+        joined(self.base.events.guards(*arguments), lambda relation: relations.append(relation) or relation)
+        return relations
 
     def _crossing(self, now: list[Any], soon: list[Any]) -> tuple[Any, Any]:
         """Replace the guards of the pairs, and add those of sliding."""
         later, rates = ahead(self.t), self.motion.rate
-        for one, k in self.pairs:
+        for pair, k in self.pairs:
             border, rate, across, share = self.borders[k], rates(self.borders[k]), self.across[k], self.shares[k]
             size = ca.fabs(across)
             near = _NEAR * later * (ca.fabs(rate) + ca.if_else(size < _LARGE, size, 0))
-            there, back = (self.base.events.transitions[number].index for number in (one.there, one.back))
+            there, back = (self.base.events.transitions[number].index for number in (pair.there, pair.back))
             for guards, follow in ((now, lambda e: e), (soon, lambda e: e + later * rates(e))):
                 s, v, w, a = (follow(e) for e in (border, rate, across, share))
                 if guards is soon:
@@ -294,12 +296,12 @@ class _Mix:
 
     def _updates(self) -> Any:
         """Booleans and counts that follow a sliding mode have the values of the first one; samples are mixed."""
-        plain, mixed, found = self.base.events.updates(*self.first), self._mixed(self.base.events.updates), list[Any]()
+        plain, mixed, rows = self.base.events.updates(*self.first), self._mixed(self.base.events.updates), list[Any]()
         for row, update in enumerate(self.base.events.update_rows):
-            one = self.base.flat_discretes[update.reset.index] if update.reset.kind == "discrete" else None
-            whole = one is not None and (one.hidden or one.kind != "number")
-            found.append((plain if whole else mixed)[row])
-        return ca.vertcat(*found)
+            discrete = self.base.flat_discretes[update.reset.index] if update.reset.kind == "discrete" else None
+            whole = discrete is not None and (discrete.hidden or discrete.kind != "number")
+            rows.append((plain if whole else mixed)[row])
+        return ca.vertcat(*rows)
 
     # -- the model --
 
@@ -308,10 +310,10 @@ class _Mix:
         base, rate = self.base, self.motion.rate
         transitions = self._transitions()
         # Guards are in the order of their transitions.
-        order = [one.index for one in transitions if not one.timed]
+        order = [transition.index for transition in transitions if not transition.timed]
         places = {index: place for place, index in enumerate(order)}
-        transitions = tuple(one if one.timed else replace(one, index=places[one.index]) for one in transitions)
-        guards, soon = (one[order] for one in self._guards())
+        transitions = tuple(t if t.timed else replace(t, index=places[t.index]) for t in transitions)
+        guards, soon = (guards[order] for guards in self._guards())
         written = {name: self._mixed(base.functions[name]) for name in _MIXED} | {"updates": self._updates()}
         written |= {name: base.functions[name](*self.first) for name in _PLAIN}
         written |= {"guards": guards, "guard_rates": rate(guards), "guards_soon": soon}
@@ -329,29 +331,30 @@ class _Mix:
         return ca.Function(name, self.arguments, [ca.cse(result)], list(self.base.arguments), [name])
 
     def _discretes(self) -> Any:
-        found = list(self.base.flat_discretes)
-        for one, _ in self.pairs:
-            names = found[one.mode].names
-            found[one.mode] = replace(found[one.mode], names=(*names, f"{names[one.first]}{SLIDES}{names[one.second]}"))
-        return tuple(found)
+        discretes = list(self.base.flat_discretes)
+        for pair, _ in self.pairs:
+            names = discretes[pair.mode].names
+            both = f"{names[pair.first]}{SLIDES}{names[pair.second]}"
+            discretes[pair.mode] = replace(discretes[pair.mode], names=(*names, both))
+        return tuple(discretes)
 
     def _transitions(self) -> tuple[CompiledTransition, ...]:
         """First comes what has jumped across a border, then what begins to slide, then what passes the border."""
         begin, end, count = list[CompiledTransition](), list[CompiledTransition](), self.base.events.guards.size1_out(0)
         others = list(self.base.events.transitions)
-        for k, (one, _) in enumerate(self.pairs):
-            there, back = others[one.there], others[one.back]
-            both, at = {one.first, one.second}, count + _MORE * k
-            begin += [replace(there, sources=(one.first, one.number), index=at)]
-            begin += [replace(back, sources=(one.second, one.number), index=at + 1)]
-            for side, (source, way) in enumerate(((one.first, there), (one.second, back))):
+        for k, (pair, _) in enumerate(self.pairs):
+            there, back = others[pair.there], others[pair.back]
+            both, at = {pair.first, pair.second}, count + _MORE * k
+            begin += [replace(there, sources=(pair.first, pair.number), index=at)]
+            begin += [replace(back, sources=(pair.second, pair.number), index=at + 1)]
+            for side, (source, way) in enumerate(((pair.first, there), (pair.second, back))):
                 why = ": ".join(filter(None, (way.because, _ALONG)))
-                begin.append(replace(way, sources=(source,), target=one.number, index=at + 2 + side, because=why))
-            end += [replace(back, sources=(one.number,), index=at + 4, because=_AWAY)]
-            end += [replace(there, sources=(one.number,), index=at + 5, because=_AWAY)]
+                begin.append(replace(way, sources=(source,), target=pair.number, index=at + 2 + side, because=why))
+            end += [replace(back, sources=(pair.number,), index=at + 4, because=_AWAY)]
+            end += [replace(there, sources=(pair.number,), index=at + 5, because=_AWAY)]
             for number, other in enumerate(others):
-                if other.mode == one.mode and number not in (one.there, one.back) and both & {*other.sources}:
-                    others[number] = replace(other, sources=(*other.sources, one.number))
+                if other.mode == pair.mode and number not in (pair.there, pair.back) and both & {*other.sources}:
+                    others[number] = replace(other, sources=(*other.sources, pair.number))
         return *begin, *others, *end
 
 

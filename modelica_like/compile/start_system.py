@@ -48,10 +48,10 @@ def start_system(reduced: ReducedDae, rest: bool) -> StartSystem:
     flat, system = reduced.flat, reduced.system
     resting = rest_order(reduced) if rest else []
     count = len(flat.nodes)
-    order = tuple((count + k if one.node is None else one.node, one.state) for k, one in enumerate(resting))
+    order = tuple((count + k if rest.node is None else rest.node, rest.state) for k, rest in enumerate(resting))
     nodes = tuple(dict.fromkeys([*(s.node for s in flat.starts), *(node for node, state in order if state is None)]))
     of_nodes = [placed[0] for node in nodes if node < count and (placed := system.node_level[node]) is not None]
-    needed = _needed(reduced, {*of_nodes, *(level for one in resting for level in one.levels)})
+    needed = _needed(reduced, {*of_nodes, *(level for rest in resting for level in rest.levels)})
     y = column(system.symbols[level] for level, _ in needed)
     explicit = ca.vertcat(*(system.symbols[level] - expression for level, expression in needed))
     wanted = ca.vertcat(*(system.node_values[k] if k < count else resting[k - count].value for k in nodes))
@@ -68,9 +68,9 @@ def start_system(reduced: ReducedDae, rest: bool) -> StartSystem:
 def _guesses(reduced: ReducedDae, resting: list[int]) -> tuple[int, ...]:
     """Numbers of the guesses of variables at rest; of equal variables, the first by name comes first."""
     placed, guessed = reduced.system.node_level, dict[int, list[tuple[str, int]]]()
-    for k, one in enumerate(reduced.flat.starts):
-        if one.strength == "guess" and (place := placed[one.node]) is not None:
-            guessed.setdefault(place[0], []).append((reduced.flat.node_name(one.node), k))
+    for k, start in enumerate(reduced.flat.starts):
+        if start.strength == "guess" and (place := placed[start.node]) is not None:
+            guessed.setdefault(place[0], []).append((reduced.flat.node_name(start.node), k))
     levels = [place[0] for node in resting if (place := placed[node]) is not None]
     return tuple(k for level in levels for _, k in sorted(guessed.get(level, ())))
 
@@ -116,16 +116,16 @@ def rest_order(reduced: ReducedDae) -> list[Resting]:
     first: dict[int, tuple[str, int]] = {}
     for node, placed in enumerate(system.node_level):
         if placed is not None and (placed[0] in stores or system.derivative(placed[0]) is not None):
-            one = reduced.flat.node_name(node), node
-            first[placed[0]] = min(one, first.get(placed[0], one))
+            candidate = reduced.flat.node_name(node), node
+            first[placed[0]] = min(candidate, first.get(placed[0], candidate))
 
     def rank(level: int) -> tuple[Any, ...]:
-        one = system.levels[level]
+        about = system.levels[level]
         # Relative motions are those that prefer to be states.
-        relative = -one.preference if one.order == 0 else one.preference
+        relative = -about.preference if about.order == 0 else about.preference
         # A state is free to be zero; another position may be a way that no angle leads to.
-        follows = one.order == 0 and reduced.node_states[first[level][1]] is None
-        return level not in stores, one.order == 0, relative, follows, first[level][0]
+        follows = about.order == 0 and reduced.node_states[first[level][1]] is None
+        return level not in stores, about.order == 0, relative, follows, first[level][0]
 
     others = (level for level in sorted(first.keys() - springs, key=rank) if level not in system.inputs)
     named = (Resting(*first[level], _state(reduced, first[level][1])) for level in others)
@@ -144,13 +144,13 @@ def _between_springs(
         name, node = named.get(level, (system.levels[level].name, None))
         rates.append(Resting(name, node, states.get(level), system.symbols[level], (level,)))
     rows = (Resting(name, None, None, value, levels) for name, value, levels in coupled.rows)
-    return [*sorted(rates, key=lambda one: one.name), *sorted(rows, key=lambda one: one.name)]
+    return [*sorted(rates, key=lambda resting: resting.name), *sorted(rows, key=lambda resting: resting.name)]
 
 
 def _storing(reduced: ReducedDae) -> list[int]:
     """Variables that occur in the stored energy of a component."""
-    variable = {one.path: k for k, one in enumerate(reduced.flat.variables)}
-    found: list[int] = []
+    variable = {entry.path: k for k, entry in enumerate(reduced.flat.variables)}
+    nodes: list[int] = []
     for instance in reduced.flat.instances:
         template = instance.template
         prefix = f"{instance.path}." if instance.path else ""
@@ -158,8 +158,8 @@ def _storing(reduced: ReducedDae) -> list[int]:
             continue
         used = zip(*template.energy.sparsity_jac(0, 0).get_triplet(), strict=True)
         slots = (template.energy_slots[slot] for row, slot in used if row == _STORED)
-        found += [variable[prefix + slot.path] for slot in slots if slot.order == 0]
-    return found
+        nodes += [variable[prefix + slot.path] for slot in slots if slot.order == 0]
+    return nodes
 
 
 def _state(reduced: ReducedDae, node: int) -> int | None:

@@ -51,14 +51,14 @@ def updates(
     """
     flat = reduced.flat
     rows = _rows(reduced, resets, keeping)
-    own = [row for row in rows if row.entry is not None]
-    old = {row.entry: row.kept for row in own}
+    discrete = [row for row in rows if row.entry is not None]
+    old = {row.entry: row.kept for row in discrete}
     before = [(flat.d[k], old[of if of in old else k]) for k, of in flat.pres.items()]
-    values = _replaced([ca.if_else(row.active, row.value, row.kept) for row in (*own, *rows)], before)
-    values, results = values[: len(own)], values[len(own) :]
-    symbols = [flat.d[row.entry] for row in own]
-    _solve_delays([k for k, row in enumerate(own) if row.entry in delayed], symbols, values)
-    order = _order(flat, own, symbols, values)
+    values = _replaced([ca.if_else(row.active, row.value, row.kept) for row in (*discrete, *rows)], before)
+    values, results = values[: len(discrete)], values[len(discrete) :]
+    symbols = [flat.d[row.entry] for row in discrete]
+    _solve_delays([k for k, row in enumerate(discrete) if row.entry in delayed], symbols, values)
+    order = _order(flat, discrete, symbols, values)
     if order:
         _, results = ca.substitute_inplace([symbols[k] for k in order], [values[k] for k in order], results, False)
     results = _replaced(results, [(symbol, flat.d[entry]) for entry, symbol in old.items()])
@@ -67,13 +67,13 @@ def updates(
 
 def _solve_delays(those: list[int], symbols: list[Any], values: list[Any]) -> None:
     """Solve for delayed values at the start that depend on each other linearly, as in z == u + a * delay(z, T)."""
-    own, new = ca.vertcat(*(symbols[k] for k in those)), ca.vertcat(*(values[k] for k in those))
-    if not those or not ca.depends_on(new, own) or any(ca.which_depends(new, own, 2, True)):
+    unknowns, new = ca.vertcat(*(symbols[k] for k in those)), ca.vertcat(*(values[k] for k in those))
+    if not those or not ca.depends_on(new, unknowns) or any(ca.which_depends(new, unknowns, 2, True)):
         return
-    others = ca.substitute(new, own, ca.SX.zeros(own.shape))
-    solved = ca.solve(ca.SX.eye(len(those)) - ca.jacobian(new, own), others)
-    for k, one in zip(those, ca.vertsplit(solved), strict=True):
-        values[k] = one
+    others = ca.substitute(new, unknowns, ca.SX.zeros(unknowns.shape))
+    solved = ca.solve(ca.SX.eye(len(those)) - ca.jacobian(new, unknowns), others)
+    for k, solution in zip(those, ca.vertsplit(solved), strict=True):
+        values[k] = solution
 
 
 def _rows(
@@ -82,24 +82,24 @@ def _rows(
     """All updates, those of `pre` without an equation and of `initial()` last."""
     flat = reduced.flat
     columns = evaluate(flat, "updates", reduced.values)
-    found: list[_Row] = []
+    rows: list[_Row] = []
 
     def add(path: str, active: Any, value: Any, source: Source, at_start: bool) -> None:
-        for target, new in zip(resets(path, len(found)), [value, *keeping(path)], strict=True):
+        for target, new in zip(resets(path, len(rows)), [value, *keeping(path)], strict=True):
             entry = target.index if target.kind == "discrete" else None
             kept = ca.SX(np.inf) if entry is None else ca.SX.sym("old")
-            found.append(_Row(CompiledUpdate(target, at_start, source), path, active, new, kept, entry))
+            rows.append(_Row(CompiledUpdate(target, at_start, source), path, active, new, kept, entry))
 
     for number, instance in enumerate(flat.instances):
         prefix = f"{instance.path}." if instance.path else ""
         for row, form in enumerate(instance.template.update_forms):
             parts = columns[number][2 * row : 2 * row + 2]
             add(prefix + form.target, parts[0], parts[1], form.source, form.at_start)
-    determined = {row.entry for row in found}
+    determined = {row.entry for row in rows}
     for k, of in flat.pres.items():
         if k == of or of not in determined:
             add(flat.discretes[k].path, _ALWAYS, ca.SX(0) if k == of else flat.d[of], Source(""), False)
-    return found
+    return rows
 
 
 def _replaced(expressions: Sequence[Any], pairs: Sequence[tuple[Any, Any]]) -> list[Any]:
@@ -142,10 +142,10 @@ def _loop(flat: FlatModel, rows: list[_Row], needs: list[set[int]], left: set[in
         what = "Before the start, a delayed value is the one at the start, which depends on itself here."
         advice = "Delay a state, or what follows from the delayed value linearly."
         return StructureError(what, where=where, advice=advice)
-    own = [rows[k].path for k in reversed(way[1:]) if not flat.discretes[cast(int, rows[k].entry)].hidden]
+    loop = [rows[k].path for k in reversed(way[1:]) if not flat.discretes[cast(int, rows[k].entry)].hidden]
     return StructureError(
-        f"{own[0]} determines itself at an event." if len(own) == 1
-        else f"Discrete variables determine each other in a loop: {' → '.join([*own, own[0]])}.",
+        f"{loop[0]} determines itself at an event." if len(loop) == 1
+        else f"Discrete variables determine each other in a loop: {' → '.join([*loop, loop[0]])}.",
         where=where,
         advice="Use a value from before the event, pre(…), at one place of the loop.",
     )  # fmt: skip

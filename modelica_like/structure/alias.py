@@ -137,8 +137,8 @@ class _Elimination:
         self.remaining.discard(number)
         if not terms:
             causes = [number]
-            for one in causes:
-                for node, _ in self.model.linear[one].terms:
+            for linear in causes:
+                for node, _ in self.model.linear[linear].terms:
                     cause = self.cause.get(self.find(node)[0])
                     if cause is not None and cause not in causes:
                         causes.append(cause)

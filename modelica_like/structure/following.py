@@ -283,27 +283,27 @@ def _set_preference(system: System, chains: Sequence[int], preference: int) -> N
         system.levels[level].preference = preference
 
 
-def write_choice(one: Following, system: System, states: list[int], level_values: Any) -> Choice:
+def write_choice(following: Following, system: System, states: list[int], level_values: Any) -> Choice:
     """Write a choice out, over states and implicit unknowns.
 
     Args:
-        one: what is chosen.
+        following: what is chosen.
         system: the equations.
         states: levels that are states; of the sums and their derivatives, further constraints may determine some.
         level_values: of all levels, over states and implicit unknowns.
     """
-    model, levels, count = system.model, list(one.group.levels), len(one.group.rows)
-    basis, upper = ca.qr(ca.horzcat(one.slopes.T, ca.reshape(model.d[one.weights], len(levels), -1)))
+    model, levels, count = system.model, list(following.group.levels), len(following.group.rows)
+    basis, upper = ca.qr(ca.horzcat(following.slopes.T, ca.reshape(model.d[following.weights], len(levels), -1)))
     left, weights = prod(ca.vertsplit(ca.diag(upper)[count:])), basis[:, count:]
-    targets, values = [("discrete", k) for k in one.weights], [ca.vec(weights)]
-    for order in range(one.group.count):
-        sums = [system.chains[chain][order] for chain in one.chains]
+    targets, values = [("discrete", k) for k in following.weights], [ca.vec(weights)]
+    for order in range(following.group.count):
+        sums = [system.chains[chain][order] for chain in following.chains]
         targets += [("state", states.index(level) if level in states else -1) for level in sums]
-        values.append(ca.mtimes(weights.T, _measured(system, one.group, levels)))
+        values.append(ca.mtimes(weights.T, _measured(system, following.group, levels)))
         levels = [above for level in levels if (above := system.derivative(level)) is not None]
     arguments = [system.everything, model.p, model.d, model.time]
     written = ca.Function("choice", arguments, [_LEAST - left**2, ca.vertcat(*values)])
     guard, values = written(level_values, *arguments[1:])
     pairs = zip(targets, ca.vertsplit(values), strict=True)
     resets = tuple((kind, place, value) for (kind, place), value in pairs if place >= 0)
-    return Choice(one.mode, one.moved, guard, resets, one.origin)
+    return Choice(following.mode, following.moved, guard, resets, following.origin)

@@ -225,8 +225,8 @@ def _groups(together: Any) -> list[list[int]]:
         if k in seen:
             continue
         group = [k]
-        for one in group:
-            group += [int(n) for n in np.flatnonzero(together[one]) if n not in group]
+        for member in group:
+            group += [int(n) for n in np.flatnonzero(together[member]) if n not in group]
         seen.update(group)
         groups += [sorted(group)] if len(group) > 1 else []
     return groups

@@ -71,9 +71,9 @@ class System:
     def everything(self) -> Any:
         """The column of all symbols."""
         # Symbols are only added; joining tens of thousands of them takes long.
-        known = self._joined.numel()
-        if known < len(self.symbols):
-            self._joined = ca.vertcat(self._joined, *self.symbols[known:])
+        count = self._joined.numel()
+        if count < len(self.symbols):
+            self._joined = ca.vertcat(self._joined, *self.symbols[count:])
         return self._joined
 
     @property
