@@ -61,10 +61,10 @@ class Batch:
         self, model: CompiledDae, readings: Sequence[Reading], options: Options, span: tuple[float, float],
         start: StartKind | None = None,
     ) -> None:  # fmt: skip
-        asked = {**model.settings, "on_chattering": options.on_chattering}
-        self._native = NativeModel.of(model.twin(settings=asked), start)
+        settings = {**model.settings, "on_chattering": options.on_chattering}
+        self._native = NativeModel.of(model.twin(settings=settings), start)
         self._options, self._span = options, span
-        rows = [(_KINDS.index(one.kind), one.place, *one.change, 0, one.moment) for one in readings]
+        rows = [(_KINDS.index(reading.kind), reading.place, *reading.change, 0, reading.moment) for reading in readings]
         self._readings = np.array(rows, _RECORD)
 
     def run(self, parameters: Vector, inputs: Vector, stop: ctypes.c_int | None = None) -> tuple[Vector, Any]:
@@ -80,8 +80,8 @@ class Batch:
         """
         runs, options = len(parameters), self._options
         values, failed = np.empty((runs, len(self._readings))), np.ones(runs, np.uint8)
-        numbers = [np.ascontiguousarray(one, float) for one in (parameters, inputs)]
-        places = (one.ctypes.data for one in (self._readings, *numbers, values, failed))
+        numbers = [np.ascontiguousarray(values, float) for values in (parameters, inputs)]
+        places = (array.ctypes.data for array in (self._readings, *numbers, values, failed))
         counts = options.max_events, runs, len(self._readings)
         stops = ctypes.pointer(ctypes.c_int(0) if stop is None else stop)
         arguments = BatchArguments(*self._span, options.rtol, options.atol, *counts, *places, stops)

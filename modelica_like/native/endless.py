@@ -36,8 +36,8 @@ SWITCHING = "Modes still switch after {} rounds at one instant"
 """Why modes are told to chatter."""
 
 
-def chattering(model: CompiledDae, events: Sequence[Event], why: str, asked: OnChattering) -> Chattering:
-    """Return the error of a run whose last events switch without end, whatever was `asked` to prevent that."""
+def chattering(model: CompiledDae, events: Sequence[Event], why: str, on_chattering: OnChattering) -> Chattering:
+    """Return the error of a run whose last events switch without end, whatever `on_chattering` was to prevent that."""
     counts: dict[str, list[Event]] = {}
     for event in events[-_CHATTER_EVENTS:]:
         counts.setdefault(event.mode, []).append(event)
@@ -45,15 +45,15 @@ def chattering(model: CompiledDae, events: Sequence[Event], why: str, asked: OnC
     names = " ⇄ ".join(dict.fromkeys(name for event in those for name in (event.before, event.after)))
     first, last = f"{those[0].time:.9g}", f"{those[-1].time:.9g}"
     when = f"at t = {last} s" if first == last else f"in t = {first}…{last} s"
-    owner, _, own = mode.rpartition(".")
-    hint = _STICK if own.startswith("relation[") else _HINT
+    owner, _, name = mode.rpartition(".")
+    hint = _STICK if name.startswith("relation[") else _HINT
     if hysteresis := model.flat_discretes[model.discrete_position[mode]].hysteresis:
         hint = f"{owner or model.name}: set {hysteresis}, or smooth what drives it."
     return Chattering(
         f"{mode} switched {len(those)} times {when} ({names}).",
         where=list(dict.fromkeys(event.source for event in those))[:3],
-        why=f"{why}.{_CANNOT[asked]}",
-        advice=hint + (_GO_ON if asked == "stop" else ""),
+        why=f"{why}.{_CANNOT[on_chattering]}",
+        advice=hint + (_GO_ON if on_chattering == "stop" else ""),
     )  # fmt: skip
 
 

@@ -91,54 +91,56 @@ def error_of(failure: Failure) -> ModelicaLikeError:
     return WORDED[failure.code](failure.what, advice=failure.sentence.partition(". ")[2])
 
 
-def _starts_contradict(one: Failure) -> ModelicaLikeError:
-    starts = one.model.starts.entries
-    position, factor = starts[one.place].state or (0, 1.0)
+def _starts_contradict(failure: Failure) -> ModelicaLikeError:
+    starts = failure.model.starts.entries
+    position, factor = starts[failure.place].state or (0, 1.0)
     others = ((k, entry.state) for k, entry in enumerate(starts) if entry.strength == "fixed" and entry.state)
     earlier, of_earlier = next((k, state[1]) for k, state in others if state[0] == position)
-    values = one.numbers[0] * of_earlier, one.numbers[1] * factor
-    return same_motion(one.model, (earlier, values[0]), (one.place, values[1]))
+    values = failure.numbers[0] * of_earlier, failure.numbers[1] * factor
+    return same_motion(failure.model, (earlier, values[0]), (failure.place, values[1]))
 
 
-def _start_not_met(one: Failure) -> ModelicaLikeError:
-    return not_met(one.model, call(one.model, one.model.equations.variables, one.point), one.place, one.numbers[0])
+def _start_not_met(failure: Failure) -> ModelicaLikeError:
+    model = failure.model
+    values = call(model, model.equations.variables, failure.point)
+    return not_met(model, values, failure.place, failure.numbers[0])
 
 
-def _start_not_found(one: Failure) -> ModelicaLikeError:
+def _start_not_found(failure: Failure) -> ModelicaLikeError:
     try:
-        return not_found(one.model, one.start, one.point)
+        return not_found(failure.model, failure.start, failure.point)
     except (SolveError, InitializationError) as error:  # singular equations are the reason
         return error
 
 
-def _step_too_small(one: Failure) -> ModelicaLikeError:
-    return Integrator(one.model, one.options).failure(one.what, one.point)
+def _step_too_small(failure: Failure) -> ModelicaLikeError:
+    return Integrator(failure.model, failure.options).failure(failure.what, failure.point)
 
 
-def _ever_faster(one: Failure) -> ModelicaLikeError:
-    return _endless(one, "Events follow each other ever faster")
+def _ever_faster(failure: Failure) -> ModelicaLikeError:
+    return _endless(failure, "Events follow each other ever faster")
 
 
-def _still_switching(one: Failure) -> ModelicaLikeError:
-    return _endless(one, SWITCHING.format(int(one.numbers[0])))
+def _still_switching(failure: Failure) -> ModelicaLikeError:
+    return _endless(failure, SWITCHING.format(int(failure.numbers[0])))
 
 
-def _endless(one: Failure, why: str) -> Chattering:
-    if one.events:
-        return chattering(one.model, one.events, why, one.options.on_chattering)
-    where = [one.transition.source] if one.place >= 0 else ()
-    return Chattering(one.what, where=where, advice=one.sentence.partition(". ")[2])
+def _endless(failure: Failure, why: str) -> Chattering:
+    if failure.events:
+        return chattering(failure.model, failure.events, why, failure.options.on_chattering)
+    where = [failure.transition.source] if failure.place >= 0 else ()
+    return Chattering(failure.what, where=where, advice=failure.sentence.partition(". ")[2])
 
 
-def _not_settled(one: Failure) -> ModelicaLikeError:
-    rounds = int(one.numbers[1])
-    return not_settled(one.model, one.point, rounds) or _endless(one, SWITCHING.format(rounds))
+def _not_settled(failure: Failure) -> ModelicaLikeError:
+    rounds = int(failure.numbers[1])
+    return not_settled(failure.model, failure.point, rounds) or _endless(failure, SWITCHING.format(rounds))
 
 
-def _out_of_range(one: Failure) -> ModelicaLikeError:
-    parameter = one.model.flat_parameters[one.model.parameter_position[one.name]]
-    most = "least" if one.code is Code.BELOW_LEAST else "most"
-    return out_of_range(f"{one.numbers[0]:g}", one.name, str(parameter.unit), most, one.numbers[1])
+def _out_of_range(failure: Failure) -> ModelicaLikeError:
+    parameter = failure.model.flat_parameters[failure.model.parameter_position[failure.name]]
+    most = "least" if failure.code is Code.BELOW_LEAST else "most"
+    return out_of_range(f"{failure.numbers[0]:g}", failure.name, str(parameter.unit), most, failure.numbers[1])
 
 
 def _new_value_contradicts(failure: Failure) -> ModelicaLikeError:
@@ -169,9 +171,9 @@ def _of_resets(model: CompiledDae, kind: str, place: int) -> list[Source]:
     return list(dict.fromkeys(source for number, source in places if number == place))
 
 
-def _no_real(one: Failure) -> ModelicaLikeError:
-    what = "an array" if one.code is Code.OF_ARRAY else "no real number"
-    return NoGradient(f"{one.name} is {what}: it has no derivatives.")
+def _no_real(failure: Failure) -> ModelicaLikeError:
+    what = "an array" if failure.code is Code.OF_ARRAY else "no real number"
+    return NoGradient(f"{failure.name} is {what}: it has no derivatives.")
 
 
 def _not_asked(_: Failure) -> ModelicaLikeError:
@@ -181,8 +183,8 @@ def _not_asked(_: Failure) -> ModelicaLikeError:
 def limit_passed(model: CompiledDae, now: Point, transition: CompiledTransition) -> LimitPassed:
     """Return the error of a transition that ends the run; its notice tells values of the present point."""
     owner, dot, _ = model.flat_discretes[transition.mode].path.rpartition(".")
-    told = NAME_IN_NOTICE.sub(lambda name: _told(model, now, owner + dot + name[1]), transition.notice)
-    return LimitPassed(f"At {now.t:.9g} s {owner or model.name} {told}.")
+    notice = NAME_IN_NOTICE.sub(lambda name: _told(model, now, owner + dot + name[1]), transition.notice)
+    return LimitPassed(f"At {now.t:.9g} s {owner or model.name} {notice}.")
 
 
 def _told(model: CompiledDae, now: Point, path: str) -> str:
@@ -200,25 +202,25 @@ WRITTEN: dict[Code, Callable[[Failure], ModelicaLikeError]] = {
     Code.STARTS_CONTRADICT: _starts_contradict,
     Code.START_NOT_MET: _start_not_met,
     Code.START_NOT_FOUND: _start_not_found,
-    Code.START_NOT_SETTLED: lambda one: unsettled(one.model, one.before, one.point.d),
-    Code.NOT_STEADY: lambda one: not_steady(one.model, one.point),
-    Code.MODE_NOT_STEADY: lambda one: mode_not_steady(one.model, one.point, one.transition),
-    Code.MEMORY_NOT_STEADY: lambda one: memory_not_steady(one.model, one.point, one.before),
-    Code.UNKNOWN_SINGULAR: lambda one: implicit_singular(one.model, one.point),
-    Code.BLOCK_SINGULAR: lambda one: singular_block(one.model, one.point, one.place),
-    Code.IMPLICIT_SINGULAR: lambda one: implicit_singular(one.model, one.point),
-    Code.NOT_SOLVED: lambda one: not_solved(one.model, one.point),
-    Code.RATE_NOT_FINITE: lambda one: rate_not_finite(one.model, one.point, one.place),
+    Code.START_NOT_SETTLED: lambda f: unsettled(f.model, f.before, f.point.d),
+    Code.NOT_STEADY: lambda f: not_steady(f.model, f.point),
+    Code.MODE_NOT_STEADY: lambda f: mode_not_steady(f.model, f.point, f.transition),
+    Code.MEMORY_NOT_STEADY: lambda f: memory_not_steady(f.model, f.point, f.before),
+    Code.UNKNOWN_SINGULAR: lambda f: implicit_singular(f.model, f.point),
+    Code.BLOCK_SINGULAR: lambda f: singular_block(f.model, f.point, f.place),
+    Code.IMPLICIT_SINGULAR: lambda f: implicit_singular(f.model, f.point),
+    Code.NOT_SOLVED: lambda f: not_solved(f.model, f.point),
+    Code.RATE_NOT_FINITE: lambda f: rate_not_finite(f.model, f.point, f.place),
     Code.STEP_TOO_SMALL: _step_too_small,
-    Code.LIMIT_PASSED: lambda one: limit_passed(one.model, one.point, one.transition),
+    Code.LIMIT_PASSED: lambda f: limit_passed(f.model, f.point, f.transition),
     Code.EVER_FASTER: _ever_faster,
     Code.NOT_SETTLED: _not_settled,
     Code.STILL_SWITCHING: _still_switching,
-    Code.STAYS_TRUE: lambda one: stays_true(one.model, one.point, one.transition),
+    Code.STAYS_TRUE: lambda f: stays_true(f.model, f.point, f.transition),
     Code.TWO_NEW_VALUES: _two_new_values,
     Code.NEW_VALUE_CONTRADICTS: _new_value_contradicts,
-    Code.NO_VALID_MODES: lambda one: no_valid_modes(one.model, one.point, one.place),
-    Code.CONTRADICTS: lambda one: contradiction(one.model, one.point, one.place),
+    Code.NO_VALID_MODES: lambda f: no_valid_modes(f.model, f.point, f.place),
+    Code.CONTRADICTS: lambda f: contradiction(f.model, f.point, f.place),
     Code.BELOW_LEAST: _out_of_range,
     Code.ABOVE_MOST: _out_of_range,
     Code.OF_ARRAY: _no_real,

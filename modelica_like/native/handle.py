@@ -137,10 +137,10 @@ class Native:
                 restored.
         """
         self._read(self._references[1], self.outputs)  # after events that come first
-        found = np.zeros((len(self.outputs), self._by.size))
+        slopes = np.zeros((len(self.outputs), self._by.size))
         whole, of = self._library.instance(self._address), self._references[1]
-        self._instance.check(self._library.gradient(whole, of.ctypes.data, of.size, found.ctypes.data))
-        return found
+        self._instance.check(self._library.gradient(whole, of.ctypes.data, of.size, slopes.ctypes.data))
+        return slopes
 
     @property
     def time(self) -> float:
@@ -170,10 +170,10 @@ class Native:
         self._read(self._references[1], self.outputs)
 
     def _at_states(self, given: Vector | None) -> Vector:
-        found = np.zeros(self._instance.native.sizes[0])
+        states = np.zeros(self._instance.native.sizes[0])
         place = None if given is None else given.ctypes.data
-        self._instance.check(self._library.states(self._address, place, found.ctypes.data))
-        return found
+        self._instance.check(self._library.states(self._address, place, states.ctypes.data))
+        return states
 
     def copy(self) -> Copy:
         """Return a copy of the state, to restore any number of times."""

@@ -55,7 +55,7 @@ class NativeModel:
         weakref.finalize(self, self.library.close, self.address)
         self.start: StartKind = twin.settings.get("start", "given")
         self.plan = tables.plan
-        self.variables = {one.name: one for one in face.variables}
+        self.variables = {variable.name: variable for variable in face.variables}
         self.name, self.sizes = model.name, (len(model.states), len(model.implicit), model.discrete_size)
 
     @staticmethod
@@ -82,12 +82,12 @@ class NativeModel:
         Raises:
             UnknownName: there is no such variable.
         """
-        found: list[FmuVariable] = []
+        variables: list[FmuVariable] = []
         for name in names:
             if name not in self.variables:
                 raise UnknownName(f"{self.name} has no variable '{name}'{did_you_mean(name, self.variables) or '.'}")
-            found.append(self.variables[name])
-        return np.array([one.reference for one in found], np.uint32)
+            variables.append(self.variables[name])
+        return np.array([variable.reference for variable in variables], np.uint32)
 
 
 def _made(model: CompiledDae) -> dict[StartKind, None]:
@@ -127,14 +127,14 @@ class Instance:
 
     def _failure(self, events: Sequence[Event], options: Options) -> Failure:
         places, model = POINT(), as_asked(self.model)
-        told, nx, nd = self.library.failure(self.address, places).contents, len(model.states), model.discrete_size
+        failure, nx, nd = self.library.failure(self.address, places).contents, len(model.states), model.discrete_size
         sizes = nx + len(model.implicit), nd, nd, len(model.p), len(model.u)
         x, d, before, p, u = (np.array(place[:size], float) for place, size in zip(places, sizes, strict=True))
-        reference = told.place if told.place >= 0 else None
+        reference = failure.place if failure.place >= 0 else None
         return Failure(
-            model.twin(p=p, u=u), self.native.start, Code(told.code), int(told.place),
-            next((name for name, one in self.native.variables.items() if one.reference == reference), ""),
-            tuple(told.numbers), Point(self.time, x[:nx], x[nx:], d), before,
+            model.twin(p=p, u=u), self.native.start, Code(failure.code), int(failure.place),
+            next((name for name, variable in self.native.variables.items() if variable.reference == reference), ""),
+            tuple(failure.numbers), Point(self.time, x[:nx], x[nx:], d), before,
             self.library.message(self.address).decode(), events, options,
         )  # fmt: skip
 
@@ -180,13 +180,13 @@ class Instance:
     def at(self, function: Callable[..., int], point: Point, *arguments: Any) -> int:
         """Call a function of the run-time that goes to a point, and return its code."""
         arrays = [np.ascontiguousarray(part, dtype=float) for part in (point.x, point.z, point.d)]
-        return function(self.address, *(_at(one) for one in arrays), *arguments)
+        return function(self.address, *(_at(array) for array in arrays), *arguments)
 
     def counts(self) -> tuple[int, int, int, int]:
         """Steps, rejected steps, evaluations of the equations, and mode changes since the reset."""
-        found = np.zeros(4)
-        self.library.counts(self.address, _at(found))
-        steps, rejected, evaluations, events = (int(one) for one in found)
+        counts = np.zeros(4)
+        self.library.counts(self.address, _at(counts))
+        steps, rejected, evaluations, events = (int(count) for count in counts)
         return steps, rejected, evaluations, events
 
 

@@ -23,9 +23,9 @@ def note_rest(record: Recorder, options: Options, span: float) -> None:
     for first, last in zip(times, times[_CHATTER_INSTANTS - 1 :], strict=False):
         if last - first < _CHATTER_WINDOW * span and first > rested + _CHATTER_WINDOW * span:
             rested = last
-            parts = dict.fromkeys(one.component for one in record.impacts if first <= one.time <= last)
-            told = f"{last:.9g} s on, {', '.join(parts) or 'the model'}"
-            record.notices.append(f"From {told} rests in contact: impacts followed each other ever faster.")
+            parts = dict.fromkeys(impact.component for impact in record.impacts if first <= impact.time <= last)
+            place = f"{last:.9g} s on, {', '.join(parts) or 'the model'}"
+            record.notices.append(f"From {place} rests in contact: impacts followed each other ever faster.")
 
 
 def note_sharing(record: Recorder, model: CompiledDae, now: Point) -> None:

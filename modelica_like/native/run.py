@@ -186,7 +186,7 @@ class EngineLoop:
 
     def _note(self, events: Vector) -> None:
         for row in events.tolist():
-            transition, mode, before, after, number = (int(one) for one in row[1:6])
+            transition, mode, before, after, number = (int(number) for number in row[1:6])
             self.record.note(self.model, row[0], mode, (before, after), transition, number)
 
 

@@ -143,8 +143,8 @@ class Output:
 
 def _numbers(model: CompiledDae, mode: str, names: Sequence[str]) -> tuple[int, ...]:
     """Return the numbers of names of a mode; -1 of an empty one."""
-    known = model.flat_discretes[model.discrete_position[mode]].names
-    return tuple(known.index(name) if name else -1 for name in names)
+    all_names = model.flat_discretes[model.discrete_position[mode]].names
+    return tuple(all_names.index(name) if name else -1 for name in names)
 
 
 def leaves(outputs: Sequence[Output]) -> list[Output]:
@@ -161,7 +161,7 @@ def by_output(outputs: Sequence[Output], values: Sequence[Any]) -> list[list[Any
 def joined(outputs: Sequence[Output], numbers: Sequence[Any]) -> list[Any]:
     """Return the numbers of outputs from those of their leaves, which are floats or have the shape (runs,)."""
     pairs = zip(outputs, by_output(outputs, numbers), strict=True)
-    return [np.ravel(one.formula()(np.array(of))[0].full()) if one.operands else of[0] for one, of in pairs]
+    return [np.ravel(output.formula()(np.array(of))[0].full()) if output.operands else of[0] for output, of in pairs]
 
 
 def listed(names: str | Sequence[str], what: str) -> list[str]:

@@ -202,7 +202,7 @@ def along(run: Any, *texts: str) -> tuple[Fitted, str]:
 
 def needed_outputs(run: RecordedSolution, readings: Sequence[str]) -> list[str]:
     """Return modes, which tell where values jump, and what readings may name, energies of parts included."""
-    owners = [(one.path, one.path.rpartition(".")[0]) for one in run.model.flat_variables]
+    owners = [(variable.path, variable.path.rpartition(".")[0]) for variable in run.model.flat_variables]
     named = [path for path, owner in owners if any((owner or path) in name for name in readings)]
     return [*named, *run.model.discrete_position]
 

@@ -105,8 +105,8 @@ def _scaled_problem(model: CompiledDae, gentle: bool, scaled: bool) -> tuple[dic
     ode, alg = ca.cse([speed * model.equations.ode(*inner), model.equations.alg(*inner)])
     parameters = ca.vertcat(t0, span, p, u, d)
     (ode, alg), symbols, fixed = ca.extract_parametric([ode, alg], parameters)
-    known = ca.Function("known", [parameters], [ca.densify(ca.vertcat(parameters, *fixed))])
-    return {"t": s, "x": x, "z": z, "p": ca.vertcat(parameters, *symbols), "ode": ode, "alg": alg}, known
+    of_parameters = ca.Function("known", [parameters], [ca.densify(ca.vertcat(parameters, *fixed))])
+    return {"t": s, "x": x, "z": z, "p": ca.vertcat(parameters, *symbols), "ode": ode, "alg": alg}, of_parameters
 
 
 def linear_solver(pattern: ca.Sparsity) -> str:
@@ -123,7 +123,7 @@ def linear_solver(pattern: ca.Sparsity) -> str:
 
 def _pattern(model: CompiledDae) -> ca.Sparsity:
     """Return the pattern of the Jacobian of a step by states and implicit unknowns."""
-    blocks = [[one.jac_sparsity(0, k) for k in (1, 2)] for one in (model.equations.ode, model.equations.alg)]
+    blocks = [[function.jac_sparsity(0, k) for k in (1, 2)] for function in (model.equations.ode, model.equations.alg)]
     pattern = ca.vertcat(*(ca.horzcat(*row) for row in blocks))
     return pattern + ca.Sparsity.diag(pattern.size1())
 
@@ -298,7 +298,7 @@ class Integrator:
         first = self._first_step(start, p[1]) if gentle else self.first
         longest = self._longest(p[1], gentle)
         instance, scaled = self._instance(grid, steps, gentle, first, longest), self._seconds is None
-        known = self.model.fast(
+        parameters = self.model.fast(
             (Cached.SCALED_PARAMETERS, gentle, scaled),
             lambda: scaled_problem(self.model, gentle=gentle, scaled=scaled)[1],
         )
@@ -307,7 +307,7 @@ class Integrator:
         why = ""
         try:
             with self.interrupts:
-                x, z = instance(start.x, start.z, known(p)[0])
+                x, z = instance(start.x, start.z, parameters(p)[0])
         except RuntimeError as error:
             why = f"{sys.stderr.getvalue()} {error}"
             x, z = instance.latest()

@@ -102,7 +102,7 @@ class Panels:
         self._length, self._span = ((end - begin) / count for count in _FIRST)
         if not self._guarded:
             self._span = np.inf
-        self._switched = sorted({one.mode for one in model.events.transitions if self.felt[one.mode]})
+        self._switched = sorted({t.mode for t in model.events.transitions if self.felt[t.mode]})
         self._known: dict[bytes, _Segment] = {}
         self._modes, self._segment = b"", _Segment(begin, self._length)
         self._graded = self._cut = self._begins = False
@@ -210,7 +210,7 @@ class Panels:
         shape = count, _LOOKS + 1, len(self.model.states)
         pieces = np.lib.stride_tricks.as_strided(looks, shape, (_LOOKS * stride, stride, width), writeable=False)
         relative, absolute = self.integrator.tolerances
-        relative, absolute = (one * max(1.0, _FINEST / relative) for one in (relative, absolute))
+        relative, absolute = (tolerance * max(1.0, _FINEST / relative) for tolerance in (relative, absolute))
         weights = 0.5 * relative * (np.abs(pieces[:, 0]) + np.abs(pieces[:, -1])) + absolute
         # Term by term: a product of matrices would depend on the processor.
         between = sum(_BETWEEN[:, k, None] * pieces[:, 2 * k, None] for k in range(_PARTS + 1))
@@ -300,5 +300,5 @@ def _felt(model: CompiledDae) -> Any:
     if model.edges.in_time:
         felt[model.events.moments.jac_sparsity(0, model.events.moments.index_in("d")).get_triplet()[1]] = 1
     if looked_at:
-        felt[[one.mode for one in model.events.transitions if not one.timed]] = 1
+        felt[[transition.mode for transition in model.events.transitions if not transition.timed]] = 1
     return felt

@@ -108,9 +108,9 @@ class Recorder:
         mode = model.flat_discretes[number]
         before, after = (mode.names[k] for k in change)
         # Break-away in an impact has no transition; the first one of the mode gives its place.
-        known = transition
-        if known < 0:
-            known = next(k for k, one in enumerate(model.events.transitions) if one.mode == number)
+        place = transition
+        if place < 0:
+            place = next(k for k, candidate in enumerate(model.events.transitions) if candidate.mode == number)
         self.ended |= transition >= 0 and model.events.transitions[transition].ends
-        source, segment = model.events.transitions[known].source, len(self.segments)
+        source, segment = model.events.transitions[place].source, len(self.segments)
         self.events.append(Event(time, mode.path, before, after, source, transition, segment, round))

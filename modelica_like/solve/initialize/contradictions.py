@@ -11,15 +11,15 @@ from modelica_like.solve.initialize.point import Point, check_singular, solve_im
 
 def _valued(model: CompiledDae, entry: StartEntry, value: float) -> str:
     """Tell a start value, or the initial equation that asks for it."""
-    told = model.flat_variables[entry.node].description
-    return told if told.startswith(INITIAL_EQUATION) else f"{start_name(model, entry)} = {value:g}"
+    description = model.flat_variables[entry.node].description
+    return description if description.startswith(INITIAL_EQUATION) else f"{start_name(model, entry)} = {value:g}"
 
 
 def same_motion(model: CompiledDae, first: tuple[int, float], second: tuple[int, float]) -> ContradictingStart:
     """Return the error of two start values (number in `starts`, and value) of one state."""
-    told = [_valued(model, model.starts.entries[number], value) for number, value in (first, second)]
+    values = [_valued(model, model.starts.entries[number], value) for number, value in (first, second)]
     return ContradictingStart(
-        f"{told[0]} and {told[1]} contradict each other: they are the same motion.",
+        f"{values[0]} and {values[1]} contradict each other: they are the same motion.",
         advice="Remove one of the two start values.",
     )
 
@@ -59,12 +59,12 @@ def not_met(model: CompiledDae, present: Vector, number: int, value: float) -> C
     starts = model.starts.entries
     entry = starts[number]
     fixed = [e for e in starts if e.strength == "fixed" and e is not entry and _coupled(model, entry, e)]
-    partners, told = [_valued(model, e, present[e.node]) for e in fixed[:2]], _valued(model, entry, value)
+    partners, start = [_valued(model, e, present[e.node]) for e in fixed[:2]], _valued(model, entry, value)
     wrong = "contradict each other" if partners else "cannot be met"
     sides = f"left minus right{' of the last one' * bool(partners)}"
-    name = sides if told.startswith(INITIAL_EQUATION) else start_name(model, entry)
+    name = sides if start.startswith(INITIAL_EQUATION) else start_name(model, entry)
     return ContradictingStart(
-        f"{' and '.join([*partners, told])} {wrong}: {name} would be {present[entry.node]:g}.",
+        f"{' and '.join([*partners, start])} {wrong}: {name} would be {present[entry.node]:g}.",
         where=[o.source for o in model.equations.differentiated if o.source.file][:3],
         advice="Remove one of the start values, or make one a guess.",
     )

@@ -45,19 +45,19 @@ def capacities(model: CompiledDae, point: Point) -> Any:
 
 def holding(model: CompiledDae, point: Point) -> list[int]:
     """Positions of the held motions at a point."""
-    asked = [k for k, one in enumerate(model.held.motions) if point.d[one.mode] == one.number]
-    if not asked:
+    holds = [k for k, hold in enumerate(model.held.motions) if point.d[hold.mode] == hold.number]
+    if not holds:
         return []
     gains = terms(model, point)[:, 0]
-    return [k for k in asked if gains[k] != 0.0]
+    return [k for k in holds if gains[k] != 0.0]
 
 
 def sharing(model: CompiledDae, point: Point) -> list[tuple[str, ...]]:
     """Components that share a held motion at a point, circuit by circuit."""
-    found: list[tuple[str, ...]] = []
+    groups: list[tuple[str, ...]] = []
     for circuit in model.held.circuits:
         shares = circuit.shares.of(point.d)
         for row in shares[np.any(shares != 0.0, axis=1)]:
             parts = (model.held.motions[k].component for k, part in zip(circuit.members, row, strict=True) if part)
-            found.append(tuple(dict.fromkeys(parts)))
-    return found
+            groups.append(tuple(dict.fromkeys(parts)))
+    return groups

@@ -74,7 +74,7 @@ def no_valid_modes(model: CompiledDae, point: Point, number: int) -> NoValidMode
     network, (_, node, value) = model.held.ideal, _wrong(model, point, number)
     combination = network.combinations(point.d)[number]
     parts = [element for element in network.elements if combination[element.row]]
-    modes = [f"{one.component} {model.flat_discretes[one.mode].names[int(point.d[one.mode])]}" for one in parts]
+    modes = [f"{e.component} {model.flat_discretes[e.mode].names[int(point.d[e.mode])]}" for e in parts]
     unit = model.flat_variables[node].unit
     what = "a current would stop at once" if str(unit) == "A" else "voltages would jump"
     return NoValidModes(

@@ -53,8 +53,8 @@ def find_kept(model: CompiledDae, point: Point, states: list[int], jacobian: Mat
         if _lies_in(conserved, row) and not _lies_in(_orthonormal(rows), row):
             held.append(model.held.motions[k].motion)
             rows = np.vstack([rows, row])
-    known = _orthonormal(rows)
-    others = _orthonormal(conserved - conserved @ known.T @ known)
+    basis = _orthonormal(rows)
+    others = _orthonormal(conserved - conserved @ basis.T @ basis)
     missing = -call(model, model.equations.variables, point)[held] if held else np.zeros(0)
     return Kept(tuple(held), missing, np.vstack([rows, others]))
 

@@ -16,8 +16,8 @@ _NAMED = 3
 
 def clocks(model: CompiledDae) -> dict[int, int]:
     """Return the entries of d that count the ticks of clocks, and the numbers of their new values among the resets."""
-    ticks = (one for one in model.events.transitions if one.timed and one.target in one.sources)
-    return {reset.index: reset.value for one in ticks for reset in one.resets if reset.kind == "discrete"}
+    ticks = (t.resets for t in model.events.transitions if t.timed and t.target in t.sources)
+    return {reset.index: reset.value for resets in ticks for reset in resets if reset.kind == "discrete"}
 
 
 def settling(model: CompiledDae) -> dict[int, int]:
@@ -41,29 +41,29 @@ def _set_by_ticks(model: CompiledDae, arguments: str) -> dict[int, int]:
     of_d = depends(updates, "d")
     moving = np.any([depends(updates, name).any(axis=1) for name in arguments], axis=0)
     # The `pre` of a memory is that memory, before.
-    own = {
+    rows = {
         row.reset.index: k
         for k, row in enumerate(model.events.update_rows)
         if row.reset.kind == "discrete" and of_d[k, [*ticks]].any() and not model.flat_discretes[row.reset.index].hidden
     }
-    found: dict[int, int] = {}
-    while more := {e: k for e, k in own.items() if e not in found and (moving[k] or of_d[k, [*found]].any())}:
-        found |= more
-    return dict(sorted(found.items()))
+    entries: dict[int, int] = {}
+    while more := {e: k for e, k in rows.items() if e not in entries and (moving[k] or of_d[k, [*entries]].any())}:
+        entries |= more
+    return dict(sorted(entries.items()))
 
 
 def depends(function: ca.Function, name: str) -> Any:
     """Return which results of a function of the model depend on which entries of an argument, as booleans."""
     pattern = function.jac_sparsity(0, function.index_in(name))
-    found = np.zeros(pattern.shape, bool)
-    found[pattern.row(), pattern.get_col()] = True
-    return found
+    table = np.zeros(pattern.shape, bool)
+    table[pattern.row(), pattern.get_col()] = True
+    return table
 
 
 def driving(model: CompiledDae) -> set[int]:
     """Return the entries of d on which derivatives or implicit equations depend."""
     functions = model.equations.ode, model.equations.alg
-    make = lambda: {k for one in functions for k in np.flatnonzero(depends(one, "d").any(axis=0)).tolist()}  # noqa: E731
+    make = lambda: {k for function in functions for k in np.flatnonzero(depends(function, "d").any(axis=0)).tolist()}  # noqa: E731
     return model.once(Cached.DRIVING, make)
 
 

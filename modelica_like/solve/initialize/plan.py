@@ -118,15 +118,15 @@ def _is_regular(model: CompiledDae, plan: StartPlan, point: Point) -> bool:
     x[[k for k in plan.system.rates if k < len(x)]] = 0.0
     entries = fast(point.t, x, y, point.z, model.p, model.u, point.d)[0]
     entries = plan.entries(entries)
-    known: dict[bytes, Vector] = model.once((Cached.REGULAR_STARTS, plan.kind), dict)
+    regulars: dict[bytes, Vector] = model.once((Cached.REGULAR_STARTS, plan.kind), dict)
     modes = point.d.tobytes()
-    if np.array_equal(known.get(modes, ()), entries):
+    if np.array_equal(regulars.get(modes, ()), entries):
         return True
     regular = _regular(plan.matrix(entries), entries)
     if regular:
-        if len(known) >= _KNOWN:
-            known.clear()
-        known[modes] = entries
+        if len(regulars) >= _KNOWN:
+            regulars.clear()
+        regulars[modes] = entries
     return regular
 
 
@@ -178,11 +178,11 @@ def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> An
 
 def direct_starts(model: CompiledDae) -> dict[int, int]:
     """Return the number of the first fixed start value of every state that has one, by state."""
-    found: dict[int, int] = {}
+    starts: dict[int, int] = {}
     for number, entry in enumerate(model.starts.entries):
         if entry.strength == "fixed" and entry.state is not None:
-            found.setdefault(entry.state[0], number)
-    return found
+            starts.setdefault(entry.state[0], number)
+    return starts
 
 
 class _Choice:
@@ -212,8 +212,8 @@ class _Choice:
         if self.kind == "steady" or not (self.free or general):
             return StartPlan(self.kind, self.system, direct)
         # Where modes do not determine reactions, redundant implicit equations and as many reactions are left out.
-        own = self._begin(matrix, still)
-        kept = self._keep(len(own) < self.own)
+        implicit = self._begin(matrix, still)
+        kept = self._keep(len(implicit) < self.own)
         by_modes = [] if still else self._at_rest_by_modes()
         rows = [k for k in general if self._accept(self.model.starts.entries[k].node)]
         taken = set(rows)
@@ -231,10 +231,10 @@ class _Choice:
         if still and len(zero) == len(self.free) and not rows:
             # All states are known, and what is implicit follows in any mode.
             return StartPlan(self.kind, self.system, direct, dependent=tuple(dependent), zero=tuple(zero))
-        known = {*zero, *kept}
-        columns = [column for column in self.columns if column not in known]
+        fixed = {*zero, *kept}
+        columns = [column for column in self.columns if column not in fixed]
         nodes = [*(self.model.starts.entries[k].node for k in rows), *resting]
-        wanted = [*own, *(self.row_of[node] for node in nodes)]
+        wanted = [*implicit, *(self.row_of[node] for node in nodes)]
         lists = (rows, dependent, resting, zero, columns, wanted)
         return StartPlan(self.kind, self.system, direct, *map(tuple, lists))
 

@@ -59,8 +59,9 @@ def call(model: CompiledDae, function: Any, point: Point) -> Vector:
 
 def largest(model: CompiledDae, sizes: Vector, node: int) -> float:
     """Return the largest size of the variables in the unit of one, at least its nominal value."""
-    own = model.flat_variables[node]
-    return max(own.nominal, *(float(sizes[k]) for k, one in enumerate(model.flat_variables) if one.unit == own.unit))
+    variable = model.flat_variables[node]
+    alike = (k for k, other in enumerate(model.flat_variables) if other.unit == variable.unit)
+    return max(variable.nominal, *(float(sizes[k]) for k in alike))
 
 
 def solve_implicit(model: CompiledDae, point: Point) -> None:

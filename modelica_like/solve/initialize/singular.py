@@ -49,10 +49,10 @@ def implicit_singular(model: CompiledDae, point: Place) -> SingularAtStart:
 
     begin, whole = 0, jacobian(model.p)
     for number, block in enumerate(model.equations.implicit_blocks):
-        own = slice(begin, begin + sum(name in block[0] for name in model.implicit))
-        if not is_regular(whole[own, own]):
-            return _singular(model, point, number, block, lambda p, own=own: is_regular(jacobian(p)[own, own]))
-        begin = own.stop
+        part = slice(begin, begin + sum(name in block[0] for name in model.implicit))
+        if not is_regular(whole[part, part]):
+            return _singular(model, point, number, block, lambda p, part=part: is_regular(jacobian(p)[part, part]))
+        begin = part.stop
     return SingularAtStart(
         f"The equations for {', '.join(model.implicit)} have no finite value at t = {point.t:.9g} s.",
         advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
@@ -68,17 +68,17 @@ def _singular(
     owners = dict.fromkeys(origin.path for origin in origins)
     holding = [path for path in owners if _holds(model, point.d, path)]
     held = [name for name in names if name.rpartition(".")[0] in holding]
-    told = held if len(holding) > 1 and held else [name for name in names if name in model.implicit] or names
+    unknowns = held if len(holding) > 1 and held else [name for name in names if name in model.implicit] or names
     why, advice = _reason(model, holding, held, alone=len(origins) == 1)
     if zeros := [] if len(holding) > 1 else _zeros(model, owners, regular):
         why = f"{_and(zeros)} {'is' if len(zeros) == 1 else 'are'} zero, so these unknowns are undetermined."
         advice = f"Give {'it' if len(zeros) == 1 else 'one of them'} another value."
-    elif moved := [name for some in model.following.values() for name in some if name in told]:
+    elif moved := [name for some in model.following.values() for name in some if name in unknowns]:
         advice = (
             f"At the start, give guesses of {_and(dict.fromkeys(moved))} near the motion, and start values to what "
             "moves there. On the way, the mechanism can go on in two ways from here."
         )
-    shown = ", ".join(told[:6]) + (", …" if len(told) > 6 else "")
+    shown = ", ".join(unknowns[:6]) + (", …" if len(unknowns) > 6 else "")
     return SingularAtStart(
         f"The Jacobian is singular at t = {point.t:.9g} s in block {number + 1} ({shown}).",
         where=tuple(dict.fromkeys(origin.source for origin in origins)),
@@ -89,13 +89,13 @@ def _singular(
 
 def _zeros(model: CompiledDae, owners: Container[str], regular: Callable[[Vector], bool]) -> list[str]:
     """Parameters of the components that are zero, if another value makes the block regular."""
-    found: list[str] = []
-    for k, one in enumerate(model.flat_parameters):
-        if model.p[k] == 0.0 and one.path.rpartition(".")[0] in owners:
+    zeros: list[str] = []
+    for k, parameter in enumerate(model.flat_parameters):
+        if model.p[k] == 0.0 and parameter.path.rpartition(".")[0] in owners:
             p = model.p.copy()
             p[k] = _ANOTHER
-            found += [one.path] if regular(p) else []
-    return found
+            zeros += [parameter.path] if regular(p) else []
+    return zeros
 
 
 def is_regular(matrix: Any) -> bool:
@@ -111,7 +111,7 @@ def is_regular(matrix: Any) -> bool:
 
 
 def _holds(model: CompiledDae, d: Vector, path: str) -> bool:
-    return any(one.component == path and d[one.mode] == one.number for one in model.held.motions)
+    return any(hold.component == path and d[hold.mode] == hold.number for hold in model.held.motions)
 
 
 def _reason(model: CompiledDae, holding: list[str], held: list[str], *, alone: bool) -> tuple[str, str]:

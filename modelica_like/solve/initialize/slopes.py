@@ -78,15 +78,15 @@ class _Partials:
 
     def __init__(self, symbols: list[Any], value: Any, by: _Names) -> None:
         t, x, z, *theta = symbols[:6]
-        known = {"x": x, "t": t, "theta": ca.vertcat(*theta)}
-        outputs = [ca.densify(value), *(ca.jacobian(value, one) for one in (z, *(known[name] for name in by)))]
+        columns = {"x": x, "t": t, "theta": ca.vertcat(*theta)}
+        outputs = [ca.densify(value), *(ca.jacobian(value, column) for column in (z, *(columns[name] for name in by)))]
         self._fast = BufferedFunction(ca.Function("slopes", symbols, outputs))
         patterns = [self._fast.function.sparsity_out(k) for k in range(len(outputs))]
-        self._patterns = [(one.shape, np.array(one.find(), int)) for one in patterns]
+        self._patterns = [(pattern.shape, np.array(pattern.find(), int)) for pattern in patterns]
 
     def __call__(self, model: CompiledDae, point: Point, *constants: Vector) -> list[Vector]:
-        found = self._fast(point.t, point.x, point.z, model.p, model.u, point.d, *constants)
-        return [_filled(entries, *pattern) for entries, pattern in zip(found, self._patterns, strict=True)]
+        results = self._fast(point.t, point.x, point.z, model.p, model.u, point.d, *constants)
+        return [_filled(entries, *pattern) for entries, pattern in zip(results, self._patterns, strict=True)]
 
 
 def _filled(entries: Vector, shape: tuple[int, int], places: Any) -> Vector:
@@ -112,10 +112,10 @@ def slopes(
     """
 
     def make() -> tuple[list[Any], Any]:
-        made: ca.Function = model.functions[str(name)] if function is None else function()
+        differentiated: ca.Function = model.functions[str(name)] if function is None else function()
         # Linear equations are solved in numbers.
-        symbols = [*model.arguments.values()] if made.is_a("SXFunction") else made.mx_in()
-        value = made(*symbols)
+        symbols = [*model.arguments.values()] if differentiated.is_a("SXFunction") else differentiated.mx_in()
+        value = differentiated(*symbols)
         return symbols, value if rows is None else value[list(rows), :]
 
     key = name, None if rows is None else tuple(rows)
@@ -171,7 +171,7 @@ def _total(
     partials = model.once((Cached.SLOPES, key, by, get_ident()), lambda: _Partials(*make(), by))
     value, z, *parts = partials(model, point, *constants)
     if np.any(z):
-        parts = [one + z @ follows for one, follows in zip(parts, implicit_slopes(model, point, by), strict=True)]
+        parts = [part + z @ follows for part, follows in zip(parts, implicit_slopes(model, point, by), strict=True)]
     return [value, *parts]
 
 
@@ -201,8 +201,8 @@ def columns_of(model: CompiledDae, names: Iterable[str]) -> list[int]:
     return _found(model, names, model.fixed_position, "input or parameter")
 
 
-def _found(model: CompiledDae, names: Iterable[str], known: Mapping[str, int], what: str) -> list[int]:
-    missing = next((name for name in names if name not in known), None)
+def _found(model: CompiledDae, names: Iterable[str], positions: Mapping[str, int], what: str) -> list[int]:
+    missing = next((name for name in names if name not in positions), None)
     if missing is not None:
-        raise UnknownName(f"{model.name} has no {what} '{missing}'{did_you_mean(missing, known) or '.'}")
-    return [known[name] for name in names]
+        raise UnknownName(f"{model.name} has no {what} '{missing}'{did_you_mean(missing, positions) or '.'}")
+    return [positions[name] for name in names]

@@ -35,7 +35,7 @@ def not_steady(model: CompiledDae, point: Point) -> InitializationError:
 
 def unsettled(model: CompiledDae, old: Vector, modes: Vector) -> InitializationError:
     """Return the error of modes that keep changing."""
-    changing = [one.path for one, a, b in zip(model.flat_discretes, old, modes, strict=False) if a != b]
+    changing = [discrete.path for discrete, a, b in zip(model.flat_discretes, old, modes, strict=False) if a != b]
     return InitializationError(
         f"The modes at the start do not settle: {', '.join(changing)} and the start values keep changing each other.",
         advice="Give start values of states, which no mode changes.",
@@ -69,7 +69,7 @@ def mode_not_steady(model: CompiledDae, point: Point, transition: CompiledTransi
 
 def memory_not_steady(model: CompiledDae, point: Point, before: Vector) -> InitializationError:
     """Return the error of a point at rest that does not stay so when clocks tick: it names what ticks change."""
-    changed = [k for k, one in enumerate(model.flat_discretes) if point.d[k] != before[k] and not one.hidden]
+    changed = [k for k, discrete in enumerate(model.flat_discretes) if point.d[k] != before[k] and not discrete.hidden]
     moving = [k for k in changed if k in driving(model)] or changed
     # A number of samples changes with them.
     kept = [k for k in moving if model.flat_discretes[k].kind == "number"] or moving
