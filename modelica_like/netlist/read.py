@@ -110,10 +110,10 @@ class _Loader:
             document.name, connect=document.connect, series=document.series, free=document.free,
             description=document.description,
         )  # fmt: skip
-        own = inside(assembly)
-        own.origin, own.simulate, own.display = str(chain[-1]), document.simulate, document.display
+        record = inside(assembly)
+        record.origin, record.simulate, record.display = str(chain[-1]), document.simulate, document.display
         if document.sizing:
-            own.sizing = str(chain[-1].parent / document.sizing)
+            record.sizing = str(chain[-1].parent / document.sizing)
         task = _Task(document, assembly, chain, self)
         task.run()
         if task.errors:

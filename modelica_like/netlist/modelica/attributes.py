@@ -91,8 +91,8 @@ def _check_limits(member: Member, basic: Basic, values: list[Expr]) -> None:
         limit = _read(basic.given.inner.get(key))
         limits = elements(limit) if limit is not None else []
         limits = len(values) * limits if len(limits) == 1 else limits
-        for value, one in zip(values, limits, strict=False):
-            if value.kind == one.kind == "number" and sign * value.args[0] < sign * one.args[0]:
+        for value, bound in zip(values, limits, strict=False):
+            if value.kind == bound.kind == "number" and sign * value.args[0] < sign * bound.args[0]:
                 what = f"{member.declaration.name} = {value.args[0]:g} is out of range: it must be {words}"
                 place = (member.given.text or member.text).place(member.given.line or member.declaration.line)
-                raise ValueOutOfRange(f"{what} {one.args[0]:g}.", where=place)
+                raise ValueOutOfRange(f"{what} {bound.args[0]:g}.", where=place)

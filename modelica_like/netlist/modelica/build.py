@@ -101,10 +101,10 @@ class _Builder:
             self._attempt(place, self._member, name, member)
         if self.errors:
             raise raise_together_or_one(self.errors)
-        own, found = inside(component), self.statements
-        own.text, own.statements, own.initial = text.path, tuple(found.equations), tuple(found.initial)
-        own.happenings = tuple(found.happenings)
-        own.instants = frozenset(name for name, instant in found.outputs.items() if instant)
+        record, statements = inside(component), self.statements
+        record.text, record.statements = text.path, tuple(statements.equations)
+        record.initial, record.happenings = tuple(statements.initial), tuple(statements.happenings)
+        record.instants = frozenset(name for name, instant in statements.outputs.items() if instant)
         self._connect()
         if self.errors:
             raise raise_together_or_one(self.errors)

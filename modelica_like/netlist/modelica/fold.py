@@ -162,9 +162,9 @@ def _matrix(rows: tuple[Expr, ...], line: int) -> Expr:
         if len({len(block) for block in blocks}) > 1:
             raise Unfit("The parts of a matrix that stand side by side have different numbers of rows")
         lines += [tuple(item for part in parts for item in part) for parts in zip(*blocks, strict=True)]
-    if len({len(one) for one in lines}) > 1:
+    if len({len(row) for row in lines}) > 1:
         raise Unfit("The rows of a matrix have different lengths")
-    return Expr("array", tuple(Expr("array", one, line) for one in lines), line)
+    return Expr("array", tuple(Expr("array", row, line) for row in lines), line)
 
 
 def _promoted(item: Expr) -> list[tuple[Expr, ...]]:
@@ -181,7 +181,7 @@ def choice(kept: list[Expr], otherwise: Expr, line: int) -> Expr:
         Unfit: the values have different sizes.
     """
     values = [*kept[1::2], otherwise]
-    sizes = {len(one.args) if one.kind == "array" else None for one in values}
+    sizes = {len(value.args) if value.kind == "array" else None for value in values}
     if len(sizes) > 1:
         raise Unfit("The values of an 'if' have different sizes")
     if otherwise.kind != "array":
@@ -195,7 +195,7 @@ def choice(kept: list[Expr], otherwise: Expr, line: int) -> Expr:
 
 def elements(items: Expr) -> list[Expr]:
     """Return the elements of an array of any dimensions, row by row."""
-    return [one for item in items.args for one in elements(item)] if items.kind == "array" else [items]
+    return [element for item in items.args for element in elements(item)] if items.kind == "array" else [items]
 
 
 def _related(kind: str, left: Expr, right: Expr) -> bool:
@@ -248,14 +248,14 @@ def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
         raise Unfit(f"{name} has {wanted} argument{'s' if wanted > 1 else ''}, not {len(args)}")
     if name in ("mod", "rem", "div") and args[-1].kind == "number" and args[-1].args[0] == 0:
         raise Unfit(f"{name} by 0 has no value")
-    known = _FUNCTIONS[name]
+    of_numbers = _FUNCTIONS[name]
 
-    def made(one: tuple[Expr, ...]) -> Expr:
-        if any(map(is_condition, one)):
+    def make(items: tuple[Expr, ...]) -> Expr:
+        if any(map(is_condition, items)):
             raise Unfit(f"{name} needs numbers, and a condition is none")
-        return _computed(known, one, line) if _all_known(one) else call(name, one, line)
+        return _computed(of_numbers, items, line) if _all_known(items) else call(name, items, line)
 
-    return each(name, args, line, made)
+    return each(name, args, line, make)
 
 
 def kept(name: str, args: tuple[Expr, ...], line: int) -> Expr:
@@ -264,26 +264,26 @@ def kept(name: str, args: tuple[Expr, ...], line: int) -> Expr:
     Raises:
         Unfit: arrays differ in size.
     """
-    return each(name, args, line, lambda one: one[0] if _all_known(one) else call(name, one, line))
+    return each(name, args, line, lambda items: items[0] if _all_known(items) else call(name, items, line))
 
 
-def each(name: str, args: tuple[Expr, ...], line: int, made: Callable[[tuple[Expr, ...]], Expr]) -> Expr:
+def each(name: str, args: tuple[Expr, ...], line: int, make: Callable[[tuple[Expr, ...]], Expr]) -> Expr:
     """Return what is made of arguments; of arrays what is made of their elements.
 
     Raises:
         Unfit: arrays differ in size.
     """
-    lengths = {len(one.args) for one in args if one.kind == "array"}
+    lengths = {len(arg.args) for arg in args if arg.kind == "array"}
     if not lengths:
-        return made(args)
+        return make(args)
     if len(lengths) > 1:
         raise Unfit(f"{name} has arrays of {' and '.join(map(str, sorted(lengths)))} elements")
-    rows = (tuple(one.args[k] if one.kind == "array" else one for one in args) for k in range(lengths.pop()))
-    return Expr("array", tuple(each(name, row, line, made) for row in rows), line)
+    rows = (tuple(arg.args[k] if arg.kind == "array" else arg for arg in args) for k in range(lengths.pop()))
+    return Expr("array", tuple(each(name, row, line, make) for row in rows), line)
 
 
 def _all_known(args: tuple[Expr, ...]) -> bool:
-    return all(one.kind == "number" for one in args)
+    return all(arg.kind == "number" for arg in args)
 
 
 def call(name: str, args: tuple[Expr, ...], line: int) -> Expr:

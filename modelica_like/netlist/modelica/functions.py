@@ -18,10 +18,10 @@ _DEEPEST = 30
 
 
 def _filled(value: Expr, shape: tuple[Expr, ...], line: int) -> Expr:
-    for one in reversed(shape):
-        if one.kind != "number":
+    for size in reversed(shape):
+        if size.kind != "number":
             raise fold.Unfit("The size of an array must be known")
-        value = Expr("array", (value,) * fold.count(one.args[0]), line)
+        value = Expr("array", (value,) * fold.count(size.args[0]), line)
     return value
 
 
@@ -162,9 +162,9 @@ class _Call:
         if not scalar:
             return self._one(taken, outputs[0], line)
 
-        def of(one: tuple[Expr, ...]) -> Expr:
+        def of(values: tuple[Expr, ...]) -> Expr:
             return _Call(self.resolver, self.text)._one(
-                {**taken, **dict(zip(scalar, one, strict=True))}, outputs[0], line
+                {**taken, **dict(zip(scalar, values, strict=True))}, outputs[0], line
             )
 
         return fold.each(self.text.name, tuple(taken[name] for name in scalar), line, of)
@@ -176,11 +176,11 @@ class _Call:
         for name in self.declared:
             if name not in self.local:
                 self.local[name] = self._start(name, line)
-        own = self.text
+        outer_text = self.text
         for statement, text in self.inside.algorithm:
             self.text = text
             self.run([statement])
-        self.text = own
+        self.text = outer_text
         self._check(output)
         return self.local[output]
 
@@ -255,7 +255,7 @@ class _Call:
             raise ModelicaTextError(f"{name} is an input and cannot be assigned.", where=self.text.place(target.line))
         places, whole = list[int](), self.local[name]
         for dimension, subscript in enumerate(subscripts):
-            open_size = [one.kind for one in self.declared[name].dimensions[dimension : dimension + 1]] == ["all"]
+            open_size = [size.kind for size in self.declared[name].dimensions[dimension : dimension + 1]] == ["all"]
             places.append(self.place(whole, subscript, open_size=open_size))
             whole = whole.args[places[-1]] if places[-1] < len(whole.args) else fold.number(0)
         self.local[name] = _replaced(self.local[name], places, value)

@@ -53,7 +53,7 @@ class Given:
             ModelicaTextError: the weaker one is final.
         """
         if weaker.final and (self.value is not None or self.inner or self.redeclared):
-            places = [one.text.place(one.line) for one in (self, weaker) if one.text is not None]
+            places = [modifier.text.place(modifier.line) for modifier in (self, weaker) if modifier.text is not None]
             raise ModelicaTextError(f"{name} is final: it cannot be changed from outside.", where=places)
         inner = dict(weaker.inner)
         for key, entry in self.inner.items():
@@ -197,10 +197,10 @@ class Instance:
         self.algorithm += [(statement, text) for statement in text.algorithm]
         return names | declared.keys()
 
-    def _extend(self, one: Extends, text: ClassText, outer: Given, depth: int) -> set[str]:
-        base = self.find(one.base, text)
+    def _extend(self, clause: Extends, text: ClassText, outer: Given, depth: int) -> set[str]:
+        base = self.find(clause.base, text)
         if isinstance(base, ClassText):
-            inner = given(one.modification, (self, text), one.line)
+            inner = given(clause.modification, (self, text), clause.line)
             redeclared = {k: v for k, v in inner.inner.items() if isinstance(v.redeclared, ClassText)}
             self._replaced = redeclared | self._replaced
             names = self._collect(base, outer.over(inner), depth + 1)
@@ -208,25 +208,25 @@ class Instance:
             return names
         if isinstance(base, Known):
             what = f"{text.name} extends {base.path}, for which a component of its own stands here"
-            raise refused(what, text, one.line, "Write it as a part, and connect its ends.")
-        if ".Icons." not in f".{one.base}" and not one.base.endswith(".Icon"):
-            raise unknown_class(one.base, text, one.line)
+            raise refused(what, text, clause.line, "Write it as a part, and connect its ends.")
+        if ".Icons." not in f".{clause.base}" and not clause.base.endswith(".Icon"):
+            raise unknown_class(clause.base, text, clause.line)
         return set()
 
     def _declare(self, declaration: Declaration, text: ClassText, outer: Given) -> None:
         for word in ("inner", "outer", "stream"):
             if word in declaration.prefixes:
                 raise refused(f"'{word}' before {declaration.name}", text, declaration.line)
-        own = given(declaration.modification, (self, text), declaration.line)
-        own.final = "final" in declaration.prefixes
+        entered = given(declaration.modification, (self, text), declaration.line)
+        entered.final = "final" in declaration.prefixes
         bound = declaration.constrained
         constraint = Given() if bound is None else given(bound, (self, text), declaration.line)
         outside = outer.inner.get(declaration.name, Given())
-        entry = outside.over(own.over(constraint, declaration.name), declaration.name)
+        entry = outside.over(entered.over(constraint, declaration.name), declaration.name)
         new = outside.redeclared
         if isinstance(new, Declaration):
             # Modifications of the declaration hold for what takes its place, unless `constrainedby` has others.
-            kept = own if bound is None else constraint
+            kept = entered if bound is None else constraint
             scope = outside.scope or (self, text)
             rest = replace(outside, redeclared=None, final=False)
             entry = given(new.modification, scope, new.line).over(rest.over(kept), declaration.name)

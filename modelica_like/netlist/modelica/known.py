@@ -31,7 +31,7 @@ def library_part(
     owner: Instance,
     name: str,
     member: Member,
-    known: Known,
+    entry: Known,
     given: Given,
     driven: set[str],
     notes: Notes,
@@ -43,7 +43,7 @@ def library_part(
         owner: instance that declares it.
         name: of the part, with its index.
         member: the declaration.
-        known: its class.
+        entry: its class.
         given: its modification.
         driven: its connected signals.
         notes: collects remarks.
@@ -52,19 +52,19 @@ def library_part(
     Raises:
         ModelicaTextError, UnknownName: a parameter does not exist here, or has a value that is not supported.
     """
-    part = _Part(owner, name, member, known, given, notes)
+    part = _Part(owner, name, member, entry, given, notes)
     component = part.make(driven)
     initial += part.initial
     return component
 
 
 class _Part:
-    def __init__(self, owner: Instance, name: str, member: Member, known: Known, given: Given, notes: Notes) -> None:
+    def __init__(self, owner: Instance, name: str, member: Member, entry: Known, given: Given, notes: Notes) -> None:
         self.owner, self.name, self.member, self.known, self.given, self.notes = (
             owner,
             name,
             member,
-            known,
+            entry,
             given,
             notes,
         )

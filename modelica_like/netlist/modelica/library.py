@@ -106,9 +106,9 @@ def known_classes() -> dict[str, Known]:
 def by_component() -> dict[str, Known]:
     """Return the class that a component is written as, by the component's name: the first of the table."""
     classes: dict[str, Known] = {}
-    for known in known_classes().values():
-        if not known.by:
-            classes.setdefault(known.component, known)
+    for entry in known_classes().values():
+        if not entry.by:
+            classes.setdefault(entry.component, entry)
     return classes
 
 

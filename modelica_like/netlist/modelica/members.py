@@ -122,14 +122,14 @@ def _other_size(owner: Instance, member: Member, value: Expr) -> str:
     # A colon takes the size of the value.
     open_sizes = [*shape, *(0 for _ in dimensions)]
     wanted = tuple(
-        one if dimension.kind == "all" else resolver.count(dimension)
-        for dimension, one in zip(dimensions, open_sizes, strict=False)
+        size if dimension.kind == "all" else resolver.count(dimension)
+        for dimension, size in zip(dimensions, open_sizes, strict=False)
     )
     if 0 in wanted and shape == wanted[: wanted.index(0) + 1]:  # nothing is in it, so further sizes are not known
         return ""
     if shape == wanted:
         return ""
-    size, other = (", ".join(map(str, one)) for one in (wanted, shape))
+    size, other = (", ".join(map(str, sizes)) for sizes in (wanted, shape))
     return f"has the size {size}, and its value {f'the size {other}' if shape else 'is no array'}"
 
 
@@ -137,7 +137,7 @@ def _shape(value: Expr) -> tuple[int, ...] | None:
     """Return the size of an array in each dimension, None if its rows differ."""
     if value.kind != "array":
         return ()
-    inner = {_shape(one) for one in value.args}
+    inner = {_shape(item) for item in value.args}
     row = inner.pop() if inner else ()
     return None if inner or row is None else (len(value.args), *row)
 
@@ -161,8 +161,8 @@ def _undetermined(owner: Instance, member: Member) -> str:
     basic, value = basic_type(owner, member), member.given
     fixed = basic.given.inner.get("fixed") if basic is not None else None
     if fixed is not None and fixed.value is not None and fixed.scope is not None:
-        told = resolve.Resolver(*fixed.scope, numeric=True)(fixed.value)
-        if told.kind == "boolean" and not told.args[0]:
+        state = resolve.Resolver(*fixed.scope, numeric=True)(fixed.value)
+        if state.kind == "boolean" and not state.args[0]:
             return member.declaration.name
     if basic is None or value.value is None or value.scope is None or value.scope[0] is not owner:
         return ""
@@ -255,7 +255,7 @@ def _instance(owner: Instance, member: Member, text: ClassText, name: str, given
             if len(value.args[1]) > len(names):
                 raise refused(f"{value.args[0]}(…) with more than {len(names)} values", inside, value.line)
             values = {**dict(zip(names, value.args[1], strict=False)), **dict(value.args[2])}
-            arguments = {key: Given(one, given.scope, line=value.line, text=inside) for key, one in values.items()}
+            arguments = {key: Given(item, given.scope, line=value.line, text=inside) for key, item in values.items()}
             given = Given(inner=given.inner).over(Given(inner=arguments))
         elif value.kind == "name":
             instance = record_of(scope, value)
@@ -290,7 +290,7 @@ def element(given: Given, index: int, size: int = 0) -> Given:
     """
     if given.each:
         return replace(given, each=False)  # for this array; another one in its elements takes it apart
-    entry = replace(given, inner={name: element(one, index, size) for name, one in given.inner.items()})
+    entry = replace(given, inner={name: element(modifier, index, size) for name, modifier in given.inner.items()})
     if given.value is not None and given.scope is not None:
         value = resolve.Resolver(*given.scope, numeric=False)(given.value)
         if value.kind == "array" and size not in (0, len(value.args)):

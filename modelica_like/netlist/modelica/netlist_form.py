@@ -79,12 +79,12 @@ class _Form:
         """Leave out variables that are only computed from the parts; refuse equations that the parts depend on."""
         signals = {name for name, field in self.model.fields.items() if not isinstance(field, Parameter)}
         joined = {end for ends in self.wires for end in ends}
-        own = inside(self.model)
-        defined = {left.args[0][0] for left, _, _ in own.statements if left.kind == "name"}
-        if defined != signals or signals & joined or own.happenings or own.initial:
+        record = inside(self.model)
+        defined = {left.args[0][0] for left, _, _ in record.statements if left.kind == "name"}
+        if defined != signals or signals & joined or record.happenings or record.initial:
             raise ModelicaTextError(
                 f"{inside(self.model).name} has equations of its own; a netlist contains only parts and connections.",
-                where=[source for _, _, source in (*own.initial, *own.statements)[:1]],
+                where=[source for _, _, source in (*record.initial, *record.statements)[:1]],
                 advice="Load the text itself: load and all commands read it like a netlist.",
             )  # fmt: skip
         if signals:
@@ -221,15 +221,15 @@ class _Form:
 
     def _check_class(self, path: str, part: Written) -> None:
         """Refuse a part that its class alone does not give: a netlist changes numbers, not equations."""
-        own = inside(part)
-        if _equations(part) == _equations(load_modelica(own.origin)):
+        record = inside(part)
+        if _equations(part) == _equations(load_modelica(record.origin)):
             return
         raise ModelicaTextError(
-            f"{path} has other equations than its class {own.text}: it is given what a netlist cannot say, such as a "
-            "Boolean, an Integer, an enumeration, a table or another class.",
+            f"{path} has other equations than its class {record.text}: it is given what a netlist cannot say, such as "
+            "a Boolean, an Integer, an enumeration, a table or another class.",
             where=part.place_of(),
             advice="Give what it is a name of its own in the text and use that: "
-            f"`model Mine extends {own.text}(…); end Mine;`.",
+            f"`model Mine extends {record.text}(…); end Mine;`.",
         )
 
     def _text(self, value: Value, unit: Unit, path: str) -> Any:
@@ -261,9 +261,9 @@ def _equations(model: Component) -> list[Any]:
         structure = {name: getattr(part, name) for name in declarations(part).structural}
         every.append((path, type(part).__name__, structure, sorted(part.fields)))
         if isinstance(part, Written):
-            own = inside(part)
-            pairs = [(left, right) for left, right, _ in (*own.initial, *own.statements)]
-            happenings = [(one.branches, one.text) for one in own.happenings]
+            record = inside(part)
+            pairs = [(left, right) for left, right, _ in (*record.initial, *record.statements)]
+            happenings = [(happening.branches, happening.text) for happening in record.happenings]
             every.append(([*part.wires.values()], _without_lines((pairs, happenings))))
     return every
 
@@ -274,7 +274,7 @@ def _without_lines(node: Any) -> Any:
         return node.kind, _without_lines(node.args)
     if isinstance(node, Mapping):
         return {name: _without_lines(value) for name, value in node.items()}
-    return [_without_lines(one) for one in node] if isinstance(node, list | tuple) else node
+    return [_without_lines(part) for part in node] if isinstance(node, list | tuple) else node
 
 
 def _quantity(number: float, unit: Unit) -> Any:

@@ -292,11 +292,11 @@ class Resolver:
         if "constant" in declared.prefixes or holder.kind == "package":
             return
         kind = "parameter" if "parameter" in declared.prefixes else "variable"
-        own = "a parameter" if kind == "parameter" and self.text.kind != "function" else "an input"
+        needed = "a parameter" if kind == "parameter" and self.text.kind != "function" else "an input"
         raise ModelicaTextError(
             f"{expression.path} is a {kind} of {holder.name}: other classes, those in it too, see its constants only.",
             where=self.text.place(expression.line),
-            advice=f"Give {self.text.name} {own} for it{', or declare it as a constant' * (kind == 'parameter')}.",
+            advice=f"Give {self.text.name} {needed} for it{', or declare it as a constant' * (kind == 'parameter')}.",
         )
 
     def _imported_constant(self, name: str) -> ClassText | None:
@@ -348,12 +348,12 @@ class Resolver:
             value = self(given[1 if short == "smooth" else 0])
             return fold.kept("noEvent", (value,), line)
         if short in KEPT:
-            values = tuple(self(one) for one in given)
+            values = tuple(self(argument) for argument in given)
             interval = values[-1] if (short, len(values)) in (("sample", 2), ("Clock", 1)) else fold.number(1)
             if interval.kind == "number" and not interval.args[0] > 0:
                 what = f"{short}(…) needs an interval above 0, not {interval.args[0]:g}."
                 raise ModelicaTextError(what, where=self.text.place(line))
-            return self._told(lambda: fold.each(short, values, line, lambda one: fold.call(short, one, line)), line)
+            return self._told(lambda: fold.each(short, values, line, lambda items: fold.call(short, items, line)), line)
         if short == "size":
             items = self._sized(given[0])
             dimension = self.number(given[1]) if len(given) > 1 else None

@@ -300,7 +300,7 @@ class Statements:
                 raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
             values = self._changes(body, text, local)
             calls = (s.parts[0] for s in body if s.kind == "call" and s.parts[0].args[0] == "reinit")
-            states = {one.args[0][0] for call in calls for one in fold.elements(resolver(call.args[1][0]))}
+            states = {state.args[0][0] for call in calls for state in fold.elements(resolver(call.args[1][0]))}
             assigned |= {name for name in values if name not in states and not _is_ending(name)}
             branches.append((conditions, values))
         for name in assigned & self.assigned:

@@ -109,8 +109,8 @@ def _leaves(value: Expr) -> Iterator[Expr]:
     inner = {"array": value.args, "if": (*value.args[1::2], value.args[-1])} if value.args else {}
     if value.kind not in ("array", "if"):
         yield value
-    for one in inner.get(value.kind, ()):
-        yield from _leaves(one)
+    for item in inner.get(value.kind, ()):
+        yield from _leaves(item)
 
 
 def _words(leaf: Expr) -> str:

@@ -73,16 +73,16 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
     inner = _inside(rest, instance, end.line)
     part = part_of(instance, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0)
     if isinstance(part, Known):
-        return [f"{head}.{part.here(one)}" for head in heads for one in inner]
+        return [f"{head}.{part.here(end)}" for head in heads for end in inner]
     if not isinstance(part, Instance):
-        return [f"{head}.{one}" for head in heads for one in inner]
+        return [f"{head}.{name}" for head in heads for name in inner]
     if len(rest) > 1:
         raise refused("a connection with the inside of a component", instance.text, end.line)
     last, subscripts = end.args[-1]
     outer = part.members.get(last)
     if outer is not None and (subscripts or len(heads) == 1):
         inner = [f"{last}{index}" for index in _indices(subscripts, sizes(part, outer), instance, end.line)]
-    return [f"{head}.{one}" for head in heads for one in inner]
+    return [f"{head}.{name}" for head in heads for name in inner]
 
 
 def _inside(parts: tuple[tuple[str, tuple[Expr, ...]], ...], instance: Instance, line: int) -> list[str]:
@@ -108,11 +108,11 @@ def _indices(subscripts: tuple[Expr, ...], shape: tuple[int, ...], instance: Ins
         if subscript.kind == "all" and size is not None:
             chosen.append(list(range(1, size + 1)))
             continue
-        places = [one.args[0] if one.kind == "number" else 0.5 for one in fold.elements(subscript)]
+        places = [item.args[0] if item.kind == "number" else 0.5 for item in fold.elements(subscript)]
         for place in places:
             if place != int(place) or place < 1 or (size is not None and place > size):
-                known = f"1 to {size}" if size is not None else "the whole numbers from 1"
-                what = f"A subscript of this end is not one of {known}."
+                allowed = f"1 to {size}" if size is not None else "the whole numbers from 1"
+                what = f"A subscript of this end is not one of {allowed}."
                 raise ModelicaTextError(what, where=instance.text.place(line))
         chosen.append([int(place) for place in places])
     return ["".join(f"[{k}]" for k in places) for places in product(*chosen)]

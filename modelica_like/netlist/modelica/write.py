@@ -54,10 +54,10 @@ class _Writer:
 
     def model(self, assembly: Assembly, name: str) -> str:
         """Return the class of an assembly."""
-        own = inside(assembly)
-        if isinstance(own, InsideWritten) and (own.statements or own.initial or own.happenings):
+        record = inside(assembly)
+        if isinstance(record, InsideWritten) and (record.statements or record.initial or record.happenings):
             raise ModelicaTextError(
-                f"{assembly.label} is {own.text}, a class of Modelica text with equations of its own.",
+                f"{assembly.label} is {record.text}, a class of Modelica text with equations of its own.",
                 where=assembly.place_of(),
                 advice="Parts and connections are written, such a class is not: use the text it comes from.",
             )
@@ -119,8 +119,8 @@ class _Writer:
                 text = self.model(part, name)
             self.made[name] = text
             return name, {}
-        known = by_component().get(type(part).__name__)
-        if known is None or known.type is not type(part):
+        entry = by_component().get(type(part).__name__)
+        if entry is None or entry.type is not type(part):
             for key, connector in part.connectors.items():
                 inside(connector).used = not connector.optional or f"{path}.{key}" in joined
             name = f"{type(part).__name__}_{re.sub('[^a-zA-Z0-9]', '_', path)}"
@@ -129,16 +129,16 @@ class _Writer:
             self.made[name] = text
             given = {identifier(key): self.value(value, owner) for key, value in inside(part).values.items()}
             return name, {**given, **self._starts(part, None, owner)}
-        values = _Arguments(self, owner, path, part, known, joined)
-        return known.path, {**values.read(), **self._starts(part, known, owner)}
+        values = _Arguments(self, owner, path, part, entry, joined)
+        return entry.path, {**values.read(), **self._starts(part, entry, owner)}
 
-    def _starts(self, part: Component, known: Known | None, owner: Assembly) -> dict[str, str]:
+    def _starts(self, part: Component, entry: Known | None, owner: Assembly) -> dict[str, str]:
         starts: dict[str, dict[str, Value]] = {}
         below = [(f"{node.path.removeprefix(f'{part.path}.')}.", node) for node in part.walk() if node is not part]
         every = [("", part), *below]
         given = [(f"{path}{name}", value) for path, node in every for name, value in inside(node).starts.items()]
         for name, value in given:
-            there = known.there(name) if known else name
+            there = entry.there(name) if entry else name
             if "." in there:
                 raise ModelicaTextError(f"The start value of {part.label}.{name} has no counterpart in Modelica text.")
             starts.setdefault(there.partition("[")[0], {})[there] = value
@@ -178,14 +178,14 @@ class _Arguments:
     """The values of a component as parameters of its class."""
 
     def __init__(
-        self, writer: _Writer, owner: Assembly, path: str, part: Component, known: Known, joined: set[str]
+        self, writer: _Writer, owner: Assembly, path: str, part: Component, entry: Known, joined: set[str]
     ) -> None:
         self.writer, self.owner, self.path, self.part, self.known, self.joined = (
             writer,
             owner,
             path,
             part,
-            known,
+            entry,
             joined,
         )
         self.declared, self.values = declarations(part), inside(part).values
@@ -224,11 +224,11 @@ class _Arguments:
                 # The last value holds: a row more makes the last slope zero.
                 if name != "extrapolate" or value != "hold":
                     raise self._refused(name, value)
-                for one in self.declared.tables:
-                    rows = getattr(self.part, one)
+                for table in self.declared.tables:
+                    rows = getattr(self.part, table)
                     if len(rows) > 1 and rows[-1][1:] != rows[-2][1:]:
                         more = (*rows, (rows[-1][0] + max(abs(rows[-1][0]), 1.0), *rows[-1][1:]))
-                        self.done[self.known.there(one)] = self._plain(one, more)
+                        self.done[self.known.there(table)] = self._plain(table, more)
         elif value != self.declared.structural[name] or any(self._scales(name)):
             if name in self.known.absent:
                 raise self._refused(name, value)
@@ -320,7 +320,7 @@ def _refuse_names_from_outside(assembly: Assembly) -> None:
         for key, value in (*inside(part).values.items(), *inside(part).starts.items()):
             scopes = scopes_of(part, value, given=True)
             names = () if value.formula is None else value.formula.names()
-            outer = next((name for name in names if not any(scope_for(scopes, name) is one for one in within)), None)
+            outer = next((name for name in names if all(scope_for(scopes, name) is not s for s in within)), None)
             if outer is not None:
                 raise ModelicaTextError(
                     f"{part.path}.{key} = {value.formula} uses {outer}, which is outside of {assembly.path}.",
@@ -340,8 +340,8 @@ def formula_text(formula: Formula, owner: Component, outer: int = 0) -> str:
     if kind == "name":
         path = operands[0] if isinstance(operands[0], str) else operands[0].name
         part, _, name = path.rpartition(".")
-        known = by_component().get(type(owner.find(part)).__name__) if part else None
-        return identifier(f"{part}.{known.there(name) if known else name}" if part else name)
+        entry = by_component().get(type(owner.find(part)).__name__) if part else None
+        return identifier(f"{part}.{entry.there(name) if entry else name}" if part else name)
     if kind == "neg":
         return f"(-{formula_text(operands[0], owner, 3)})"
     if kind not in _PRECEDENCE:
@@ -369,9 +369,9 @@ def _there(assembly: Assembly, end: Any) -> str:
         return identifier(name)
     head, *rest = owner.split(".")
     part = assembly.parts[head]
-    known = by_component().get(type(part).__name__)
+    entry = by_component().get(type(part).__name__)
     inner = ".".join([*rest, name])
-    return identifier(f"{head}.{known.there(inner) if known and known.type is type(part) else inner}")
+    return identifier(f"{head}.{entry.there(inner) if entry and entry.type is type(part) else inner}")
 
 
 def _path(assembly: Assembly, end: Any) -> str:
