@@ -43,15 +43,15 @@ class Assembly(Component):
         free: Sequence[str] = (), parameters: Mapping[str, Any] | None = None, description: str = "",
     ) -> None:  # fmt: skip
         super().__init__()
-        own = self._inside
-        own.name, own.description, own.made = name, description, caller()
+        record = self._inside
+        record.name, record.description, record.made = name, description, caller()
         for key, value in (parameters or {}).items():
             self.add_parameter(key, value)
         for key, part in (parts or {}).items():
             setattr(self, key, part)
-        own.wires = {key: tuple(ends) for key, ends in (connect or {}).items()}
-        own.chains = {key: tuple(ends) for key, ends in (series or {}).items()}
-        own.free = tuple(free)
+        record.wires = {key: tuple(ends) for key, ends in (connect or {}).items()}
+        record.chains = {key: tuple(ends) for key, ends in (series or {}).items()}
+        record.free = tuple(free)
 
     def add_parameter(self, name: str, value: Any) -> None:
         """Declare a parameter of the assembly; its unit is that of its value.
@@ -190,12 +190,12 @@ def declare(of: Assembly, name: str, field: Field) -> None:
         DuplicateName: the name is in use.
         ValueOutOfRange: the nominal value of the field is not positive and finite.
     """
-    own = inside(of)
-    if name in of.fields or name in own.parts or name in own.connectors:
+    record = inside(of)
+    if name in of.fields or name in record.parts or name in record.connectors:
         raise DuplicateName(f"{of.label}: '{name}' is already in use.")
     field.owner, field.name = of.label, name
     field.check()
-    own.own_fields = {**own.own_fields, name: field}
+    record.own_fields = {**record.own_fields, name: field}
 
 
 def end_at(of: Assembly, path: str) -> Connector | Symbol:

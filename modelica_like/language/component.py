@@ -56,7 +56,7 @@ class Component(Declared):
         }
         tables = {name: value for name, value in plain.items() if isinstance(value, Rows)}
         plain |= {name: table.default for name, table in tables.items()}
-        cls._declared = own = Declarations(
+        cls._declared = declared = Declarations(
             fields=cls._declared.fields,
             connectors=of_kind(cls, Connector),
             modes=of_kind(cls, Mode),
@@ -66,12 +66,12 @@ class Component(Declared):
             tables=_joined(*(base.tables for base in above), tables),
             partial=partial,
         )
-        for name in chain(own.fields, own.connectors, own.modes, own.parts, own.structural):
+        for name in chain(declared.fields, declared.connectors, declared.modes, declared.parts, declared.structural):
             require_identifier(name, cls.__name__)
             if hasattr(Component, name):
                 what = f"{cls.__name__} declares '{name}', which every component has already."
                 raise DuplicateName(what, where=caller(), advice="Choose another name.")
-        for mode in own.modes.values():
+        for mode in declared.modes.values():
             mode.check()
 
     def __init__(self, **values: Any) -> None:
@@ -340,8 +340,8 @@ class Component(Declared):
             self.give(name, value)
 
     def _adopt(self, name: str, value: Component | list[Component]) -> None:
-        own = self._inside
-        taken = (self.fields, own.connectors, self._declared.structural, self._declared.modes)
+        record = self._inside
+        taken = (self.fields, record.connectors, self._declared.structural, self._declared.modes)
         if any(name in names for names in taken) or hasattr(Component, name):
             hint = ": every component has something of this name" * hasattr(Component, name)
             raise DuplicateName(f"{self.label}: '{name}' is already in use{hint}.", where=caller())
@@ -350,29 +350,29 @@ class Component(Declared):
             adopted: Any = [self._owned(f"{name}[{k}]", part) for k, part in enumerate(value, 1)]
         else:
             adopted = self._owned(name, value)
-        own.parts[name] = adopted
+        record.parts[name] = adopted
         self.__dict__[name] = adopted
-        own.elements = None
+        record.elements = None
 
     def _owned(self, name: str, part: Component) -> Component:
         twin = part.copy()
-        own = twin._inside
-        own.owner, own.name = self, name
+        record = twin._inside
+        record.owner, record.name = self, name
         return twin
 
     def _adopt_connector(self, name: str, connector: Connector) -> None:
         twin = connector._detached_copy()
-        own = inside(twin)
-        own.owner, own.name = self, name
+        record = inside(twin)
+        record.owner, record.name = self, name
         self._inside.connectors[name] = twin
         self.__dict__[name] = twin
 
     def copy(self) -> Self:
         """Return an independent copy of this component and its parts, without an owner."""
         twin = self._detached_copy()
-        own = twin._inside
-        own.values, own.starts, own.start_modes = own.values.copy(), own.starts.copy(), own.start_modes.copy()
-        own.parts, own.connectors = {}, {}
+        record = twin._inside
+        record.values, record.starts = record.values.copy(), record.starts.copy()
+        record.start_modes, record.parts, record.connectors = record.start_modes.copy(), {}, {}
         for name, connector in self._inside.connectors.items():
             twin._adopt_connector(name, connector)
         for name, part in self._inside.parts.items():

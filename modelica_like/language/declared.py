@@ -30,15 +30,15 @@ class Declared:
 
     def __new__(cls, *_: Any, **__: Any) -> Self:
         """Make the record of the framework; `__init__` of a user's class may call the one here late."""
-        one = super().__new__(cls)
-        one.__dict__["_inside"] = cls._kept()
-        return one
+        component = super().__new__(cls)
+        component.__dict__["_inside"] = cls._kept()
+        return component
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         cls._declared = Declarations(fields=of_kind(cls, Field))
-        for one in cls._declared.fields.values():
-            one.check()
+        for entry in cls._declared.fields.values():
+            entry.check()
         former = (vars(base).get("renamed", {}) for base in reversed(cls.__mro__))
         cls.renamed = {name: instead for names in former for name, instead in names.items()}
 
@@ -55,12 +55,12 @@ class Declared:
     def fields(self) -> dict[str, Field]:
         """Declared parameters, variables, signals and discrete values, and those that this one alone has, by name."""
         within = self._inside
-        own = within.own_fields
-        if not own:
+        further = within.own_fields
+        if not further:
             return self._declared.fields
         # Every change makes a new dictionary; a netlist of thousands of parameters asks for each of them.
-        if within.joined is None or within.joined[0] is not own:
-            within.joined = own, {**self._declared.fields, **own}
+        if within.joined is None or within.joined[0] is not further:
+            within.joined = further, {**self._declared.fields, **further}
         return within.joined[1]
 
     def declare_array(self, name: str, size: int, field: Field) -> None:
@@ -115,8 +115,8 @@ class Declared:
     def _detached_copy(self) -> Self:
         twin = object.__new__(type(self))
         twin.__dict__.update(self.__dict__)
-        twin.__dict__["_inside"] = own = self._inside.detached()
-        own.owner = None
+        twin.__dict__["_inside"] = record = self._inside.detached()
+        record.owner = None
         return twin
 
 
@@ -181,7 +181,7 @@ class Connector(Declared):
 
 
 def unknown(
-    kind: str, label: str, name: str, known: Iterable[str], renamed: Mapping[str, str] | None = None
+    kind: str, label: str, name: str, existing: Iterable[str], renamed: Mapping[str, str] | None = None
 ) -> UnknownName:
     """Return the error about a name that does not exist.
 
@@ -189,12 +189,12 @@ def unknown(
         kind: kind of name, such as `part`.
         label: owner of the names.
         name: the name.
-        known: the names that exist.
+        existing: the names that exist.
         renamed: what to write instead of names of earlier versions.
     """
     if renamed and renamed.get(name):
         return UnknownName(f"{label} has no {kind} '{name}' any more.", advice=f"Write {renamed[name]}.")
-    names = list(known)
+    names = list(existing)
     listing = f" It has {', '.join(names)}." if names else " It has none."
     return UnknownName(f"{label} has no {kind} '{name}'{did_you_mean(name, names) or '.'}{listing}")
 

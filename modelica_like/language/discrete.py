@@ -338,14 +338,14 @@ def when(condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> W
     conditions = condition if isinstance(condition, tuple) else (condition,)
     edges: list[Any] = []
     clocked = False
-    for one in conditions:
-        symbols = symbols_in(one)
+    for part in conditions:
+        symbols = symbols_in(part)
         if not any(symbol is TIME or symbol.owner is None or not is_fixed(symbol) for symbol in symbols):
-            what = f"when({one}, …) has no edge: its condition is the same during the whole run."
+            what = f"when({part}, …) has no edge: its condition is the same during the whole run."
             raise LanguageError(what, where=caller(), advice="Compare what changes, such as a variable or time.")
         ticks = any(isinstance(symbol, Marker) and symbol.kind == "clock" for symbol in symbols)
         clocked |= ticks
-        edges.append(one if one is INITIAL or (ticks and cast(Any, one).op() == ca.OP_NE) else edge(one))
+        edges.append(part if part is INITIAL or (ticks and cast(Any, part).op() == ca.OP_NE) else edge(part))
     active = cast(Expr, functools.reduce(ca.logic_or, edges))
     new = {key: _at_tick(value) for key, value in values.items()} if clocked else dict(values)
     return When(((active, new),), conditions)

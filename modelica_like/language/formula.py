@@ -95,7 +95,8 @@ class Formula(Arithmetic):
         if self.operation == "name":
             return Formula("name", (rename(self._name()),))
         return Formula(
-            self.operation, tuple(one.renamed(rename) if isinstance(one, Formula) else one for one in self.operands)
+            self.operation,
+            tuple(operand.renamed(rename) if isinstance(operand, Formula) else operand for operand in self.operands),
         )
 
     def evaluate(self, lookup: Callable[[str], Any], quantity: Callable[[str], Any] | None = None) -> Any:

@@ -28,20 +28,20 @@ def give_by_path(component: Component, path: str, value: Any, *, above: int = 0)
     owner_path, _, name = path.rpartition(".")
     owner, levels = component.find(owner_path), path.count(".") + above
     owner.give(name, value)
-    own = inside(owner)
-    for store in (own.values, own.starts):
+    record = inside(owner)
+    for store in (record.values, record.starts):
         if name in store and store[name].formula is not None:
             store[name] = replace(store[name], levels=max(levels, 1))
 
 
 def owners(component: Component, levels: int) -> list[Component]:
     """Return the owners of a component, the nearest first: as many as there are, and at most `levels`."""
-    found: list[Component] = []
+    above: list[Component] = []
     owner = inside(component).owner
-    while isinstance(owner, Component) and len(found) < levels:
-        found.append(owner)
+    while isinstance(owner, Component) and len(above) < levels:
+        above.append(owner)
         owner = inside(owner).owner
-    return found
+    return above
 
 
 def scopes_of(component: Component, value: Value, *, given: bool) -> list[Component]:
@@ -71,12 +71,12 @@ def _knows(scope: Component, path: str) -> bool:
 
 def given_above(component: Component, name: str) -> Source:
     """Return the place of a value in the netlist of an owner, which need not be the nearest one."""
-    own = inside(component)
-    value = own.values.get(name) or own.starts.get(name)
-    if value is None or own.owner is None or (value.levels < 2 and name in own.starts):
+    record = inside(component)
+    value = record.values.get(name) or record.starts.get(name)
+    if value is None or record.owner is None or (value.levels < 2 and name in record.starts):
         return NOWHERE
     above = owners(component, value.levels)[-1]
     inner = f"{component.path}.{name}".removeprefix(f"{above.path}.")
-    found = (above.source_of(key) for key in (f"start.{inner}", f"guess.{inner}"))
+    sources = (above.source_of(key) for key in (f"start.{inner}", f"guess.{inner}"))
     part = inner.partition(".")[0].partition("[")[0]
-    return next((source for source in found if source.file), above.source_of(f"parts.{part}"))
+    return next((source for source in sources if source.file), above.source_of(f"parts.{part}"))

@@ -85,10 +85,10 @@ class Rows:
         columns = self.columns + (self.columns[-1],) * (width - len(self.columns))
         table: list[tuple[Any, ...]] = []
         measured: set[str] = set()
-        for number, one in enumerate(cast("tuple[Any, ...]", given), 1):
-            cells: Any = (one,) if self.flat else one
+        for number, line in enumerate(cast("tuple[Any, ...]", given), 1):
+            cells: Any = (line,) if self.flat else line
             if not isinstance(cells, tuple) or len(cast("tuple[Any, ...]", cells)) != width:
-                raise NetlistError(f"{label}, row {number}: {_short(one)} must be {row}.")
+                raise NetlistError(f"{label}, row {number}: {_short(line)} must be {row}.")
             pairs = list(zip(columns, cast("tuple[Any, ...]", cells), strict=True))
             place = f"{label}, row {number}, "
             table.append(tuple(_cell(f"{place}{column.what}", column, fields, cell) for column, cell in pairs))
