@@ -201,9 +201,9 @@ class Interrupted(KeyboardInterrupt):
     @classmethod
     def after(cls, run: Any) -> Interrupted:
         """Return the interrupt of a run."""
-        made = cls()
-        made.run = run
-        return made
+        error = cls()
+        error.run = run
+        return error
 
 
 class SingularAtStart(SolveError):
@@ -291,12 +291,12 @@ def extra_module(module: str, extra: str, package: str = "") -> Any:
         raise missing_extra(package or module.partition(".")[0], extra) from None
 
 
-def did_you_mean(name: object, known: Iterable[str]) -> str:
+def did_you_mean(name: object, candidates: Iterable[str]) -> str:
     """Return `; did you mean 'sun'?` for the known name nearest to `name` (of any type), or an empty string."""
     import difflib  # slow to import
 
-    name, names = str(name), list(known)
-    within = sorted((one for one in names if len(name) > _SHORT and name.lower() in one.lower()), key=len)
+    name, names = str(name), list(candidates)
+    within = sorted((other for other in names if len(name) > _SHORT and name.lower() in other.lower()), key=len)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.58 if not within else 0.8)
-    near = near or within or [one for one in names if one in name.split("_")]
+    near = near or within or [other for other in names if other in name.split("_")]
     return f"; did you mean '{near[0]}'?" if near else ""

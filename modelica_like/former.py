@@ -39,5 +39,5 @@ class _Former:
     def _home(self, name: str) -> str:
         if name.partition(".")[0] not in self.tops:
             return ""
-        package = next((one for one in self.homes if name == one or name.startswith(f"{one}.")), None)
+        package = next((home for home in self.homes if name == home or name.startswith(f"{home}.")), None)
         return f"{self.homes[package]}{name[len(package) :]}" if package else ""

@@ -75,8 +75,8 @@ class Options:
             if not _fits(value, whole=whole):
                 raise ValueOutOfRange(f"{name} = {value!r} is no {'whole ' * whole}number.")
             if not low <= value <= high:
-                told, least, most = (f"{one:,}" if isinstance(one, int) else f"{one:g}" for one in (value, low, high))
-                raise ValueOutOfRange(f"{name} = {told} is out of range: it must be between {least} and {most}.")
+                given, least, most = (f"{x:,}" if isinstance(x, int) else f"{x:g}" for x in (value, low, high))
+                raise ValueOutOfRange(f"{name} = {given} is out of range: it must be between {least} and {most}.")
         if not self.max_step > 0:
             raise ValueOutOfRange(f"max_step = {self.max_step:g} s is out of range: it must be positive.")
         for name, kinds in (("on_chattering", get_args(OnChattering)), ("on_energy_drift", get_args(OnEnergyDrift))):

@@ -293,23 +293,23 @@ def seconds(until: float | str | None, name: str = "until") -> float:
         raise
 
 
-def positive_step(asked: float | str | None) -> float:
+def positive_step(fixed_step: float | str | None) -> float:
     """Return a fixed step in s, 0 for None.
 
     Raises:
         ValueOutOfRange: it is not positive and finite.
     """
-    step = 0.0 if asked is None else seconds(asked, "fixed_step")
-    if asked is not None and not 0 < step < math.inf:
+    step = 0.0 if fixed_step is None else seconds(fixed_step, "fixed_step")
+    if fixed_step is not None and not 0 < step < math.inf:
         raise ValueOutOfRange(f"The fixed step must be a positive time, not {step:g} s.")
     return step
 
 
 def _options(base: Options, settings: Mapping[str, Any], **given: Any) -> Options:
     values = {name: getattr(base, name) for name in Options.__dataclass_fields__}
-    told = {name: settings[name] for name in ("rtol", "atol", "points", "on_chattering") if name in settings}
-    told |= {name: value for name, value in given.items() if value is not None}
-    if "rtol" in told and "atol" not in told:
+    chosen = {name: settings[name] for name in ("rtol", "atol", "points", "on_chattering") if name in settings}
+    chosen |= {name: value for name, value in given.items() if value is not None}
+    if "rtol" in chosen and "atol" not in chosen:
         # Otherwise what is small compared with its nominal value would not become more precise.
-        told["atol"] = min(values["atol"], replace(base, rtol=told["rtol"]).rtol / 100)
-    return Options(**(values | told))
+        chosen["atol"] = min(values["atol"], replace(base, rtol=chosen["rtol"]).rtol / 100)
+    return Options(**(values | chosen))

@@ -100,7 +100,7 @@ def numbered(axes: Axes, shares: Sequence[float], width: float, size: float = 7.
     groups, k = [[n] for n in range(len(shares))], 0
     while k < len(groups) - 1:
         room = (middle(groups[k + 1]) - middle(groups[k])) * width
-        if room < sum(text_width(text(one), size) for one in groups[k : k + 2]) / 2 + 0.05:
+        if room < sum(text_width(text(label), size) for label in groups[k : k + 2]) / 2 + 0.05:
             groups[k : k + 2] = [[*groups[k], *groups[k + 1]]]
             k = max(k - 1, 0)
         else:

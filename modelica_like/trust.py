@@ -17,7 +17,7 @@ from modelica_like.writing import write_text
 Decide = Callable[[Path], bool]
 """Tells whether the modules of a folder may run."""
 _HOME = Path(__file__).resolve().parent
-_EXAMPLES = next((one / "examples" for one in (_HOME, _HOME.parent) if (one / "examples").is_dir()), _HOME)
+_EXAMPLES = next((folder / "examples" for folder in (_HOME, _HOME.parent) if (folder / "examples").is_dir()), _HOME)
 """They come with this package, whose code runs anyway: in its wheel, or beside it."""
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
@@ -118,18 +118,18 @@ def distrust(folder: str | Path) -> Path:
         NetlistError: it is not on the list.
         OSError: the list cannot be written.
     """
-    place, known = Path(folder).resolve(), trusted_folders()
-    if place not in known:
-        above = next((one for one in place.parents if one in known), None)
+    place, trusted = Path(folder).resolve(), trusted_folders()
+    if place not in trusted:
+        above = next((parent for parent in place.parents if parent in trusted), None)
         raise NetlistError(f"'{place}' is not on the list" + (f"; '{above}', around it, is." if above else "."))
-    _write([one for one in known if one != place])
+    _write([folder for folder in trusted if folder != place])
     return place
 
 
 def _write(folders: list[Path]) -> None:
     store = _store()
     store.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    write_text(store, json.dumps({"folders": sorted({str(one) for one in folders})}, indent=1) + "\n")
+    write_text(store, json.dumps({"folders": sorted({str(folder) for folder in folders})}, indent=1) + "\n")
     store.chmod(0o600)
 
 

@@ -74,7 +74,7 @@ def check_writable(path: str | Path) -> None:
     if target.exists() and not target.is_file():
         return
     given = target if Path(path).is_symlink() else Path(path)
-    folder = next(one for one in given.parents if one.exists())
+    folder = next(parent for parent in given.parents if parent.exists())
     if not folder.is_dir():
         raise _refused(folder, errno.ENOTDIR)
     import tempfile  # with all archivers: slow to import

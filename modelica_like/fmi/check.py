@@ -77,8 +77,8 @@ def _terminal_problems(content: bytes, description: bytes, names: set[str]) -> l
     for member in top.iter("TerminalMemberVariable"):
         if member.get("variableName") not in listed:
             result.append(f"{TERMINALS}: there is no variable {member.get('variableName')}.")
-    for one in top.iter("TerminalGraphicalRepresentation"):
-        icon = f"terminalsAndIcons/{one.get('iconBaseName')}.png"
+    for picture in top.iter("TerminalGraphicalRepresentation"):
+        icon = f"terminalsAndIcons/{picture.get('iconBaseName')}.png"
         if icon not in names:
             result.append(f"{TERMINALS}: {icon} is missing.")
     return result

@@ -184,18 +184,18 @@ def sparsity_rows(function: Any, output: int = 0) -> Rows:
     return [set(reach.elements(row)) for row in range(len(reach.rows))]
 
 
-def solved_rows(own: Sequence[set[int]], outer: Rows, unknowns: int) -> Rows:
+def solved_rows(inner: Sequence[set[int]], outer: Rows, unknowns: int) -> Rows:
     """Dependencies of each unknown of a square system.
 
     Args:
-        own: unknowns in each equation.
+        inner: unknowns in each equation.
         outer: known values in each equation.
         unknowns: their number.
     """
     if not unknowns:
         return []
-    places = [(row, column) for row, columns in enumerate(own) for column in columns]
-    pattern = ca.Sparsity.triplet(len(own), unknowns, [row for row, _ in places], [column for _, column in places])
+    places = [(row, column) for row, columns in enumerate(inner) for column in columns]
+    pattern = ca.Sparsity.triplet(len(inner), unknowns, [row for row, _ in places], [column for _, column in places])
     _, row_order, column_order, row_blocks, column_blocks, *_ = pattern.btf()
     result: Rows = [set() for _ in range(unknowns)]
     # The form is lower block triangular: a block needs those before it.
@@ -203,7 +203,7 @@ def solved_rows(own: Sequence[set[int]], outer: Rows, unknowns: int) -> Rows:
         rows = row_order[row_blocks[block] : row_blocks[block + 1]]
         columns = set(column_order[column_blocks[block] : column_blocks[block + 1]])
         total: set[Known] = set().union(*(outer[row] for row in rows))
-        total = total.union(*(result[column] for row in rows for column in own[row] - columns))
+        total = total.union(*(result[column] for row in rows for column in inner[row] - columns))
         for column in columns:
             result[column] = total
     return result

@@ -81,9 +81,9 @@ def start_tables(model: CompiledDae, plan: StartPlan | None = None) -> StartTabl
 def _plan(model: CompiledDae) -> StartPlan:
     point = Point(0.0, model.starts.guesses.copy(), model.starts.z_guesses.copy(), np.zeros(model.discrete_size))
     point.d = call(model, model.starts.discretes, point)
-    for one in model.held.motions:  # what is shared says nothing of motions
-        if point.d[one.mode] == one.number and one.loose >= 0:
-            point.d[one.mode] = one.loose
+    for hold in model.held.motions:  # what is shared says nothing of motions
+        if point.d[hold.mode] == hold.number and hold.loose >= 0:
+            point.d[hold.mode] = hold.loose
     values = call(model, model.starts.values, point)
     for k, entry in reversed([*enumerate(model.starts.entries)]):  # of several for one state, the first counts
         if entry.strength == "fixed" and entry.state is not None:

@@ -125,9 +125,9 @@ def terminals_and_icons(terminals: Sequence[CompiledTerminal], icon: bytes) -> s
     element(picture, "Icon", x1=0.0, y1=space, x2=_WIDTH, y2=height - space)
     if terminals:
         group = element(top, "Terminals")
-        for place, one in enumerate(terminals, 1):
-            terminal = element(group, "Terminal", name=one.name, matchingRule="plug", terminalKind=one.kind)
-            for member, variable in one.members:
+        for place, end in enumerate(terminals, 1):
+            terminal = element(group, "Terminal", name=end.name, matchingRule="plug", terminalKind=end.kind)
+            for member, variable in end.members:
                 element(
                     terminal, "TerminalMemberVariable", variableName=variable, memberName=member, variableKind="signal"
                 )
@@ -135,6 +135,6 @@ def terminals_and_icons(terminals: Sequence[CompiledTerminal], icon: bytes) -> s
             element(
                 terminal, "TerminalGraphicalRepresentation", defaultConnectionColor="0 0 0",
                 defaultConnectionStrokeSize=1.0, x1=_WIDTH - _MARGIN, y1=middle - _MARGIN / 2, x2=_WIDTH,
-                y2=middle + _MARGIN / 2, iconBaseName=icon_name(one.kind),
+                y2=middle + _MARGIN / 2, iconBaseName=icon_name(end.kind),
             )  # fmt: skip
     return document(top)

@@ -38,12 +38,12 @@ def document(top: Element) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + "".join(_lines(top, "", "\n"))
 
 
-def _lines(one: Element, indent: str, end: str) -> list[str]:
-    if not one.inner:
-        return [f"{indent}{one.head}/>{end}"]
-    inside = ("", "") if not end or one.tag in INLINE else (f"{indent}  ", end)
-    inner = [line for child in one.inner for line in _lines(child, *inside)]
-    return [f"{indent}{one.head}>{inside[1]}", *inner, f"{indent if inside[1] else ''}</{one.tag}>{end}"]
+def _lines(element: Element, indent: str, end: str) -> list[str]:
+    if not element.inner:
+        return [f"{indent}{element.head}/>{end}"]
+    inside = ("", "") if not end or element.tag in INLINE else (f"{indent}  ", end)
+    inner = [line for child in element.inner for line in _lines(child, *inside)]
+    return [f"{indent}{element.head}>{inside[1]}", *inner, f"{indent if inside[1] else ''}</{element.tag}>{end}"]
 
 
 def _text(value: object) -> str:

@@ -57,8 +57,8 @@ def plot(
     curves = [signal for signal in chosen if signal.name not in modes] if chosen else usual(solution, units)
     values = evaluated(solution, curves)
     groups: dict[tuple[str, str], list[Signal]] = {}
-    for one in curves:
-        groups.setdefault((quantity_of(one), one.shown_in(shown)), []).append(one)
+    for signal in curves:
+        groups.setdefault((quantity_of(signal), signal.shown_in(shown)), []).append(signal)
     panels, left = _panels(groups, 0 if chosen else _MOST_PANELS[0])
     bands, unbanded = bands_of(solution, [signal.name for signal in chosen if signal.name in modes])
     marks, unmarked = marks_of(solution, [band.mode for band in bands])

@@ -94,7 +94,7 @@ def _held_angles(model: CompiledDae, point: Point, motions: Motions) -> Matrix:
     """
     count, full = len(model.states), _rate_slopes(model, point)
     positions = {model.held.motions[k].position for k in holding(model, point)}
-    own = [n for n, k in enumerate(motions.keep) if k in positions and not np.any(full[k])]
+    resting = [n for n, k in enumerate(motions.keep) if k in positions and not np.any(full[k])]
     gone = [k for k in range(count) if k not in set(motions.keep)]
     rows = [n for n, k in enumerate(motions.keep) if np.any(full[k, gone])]
     full = full[[motions.keep[n] for n in rows]]
@@ -108,7 +108,7 @@ def _held_angles(model: CompiledDae, point: Point, motions: Motions) -> Matrix:
     held = still @ right[sizes > _ZERO].T if still.size else np.zeros((len(rows), 0))
     lines = np.zeros((held.shape[1], len(motions.keep)))
     lines[:, rows] = (held / scale).T
-    return np.vstack([lines, np.eye(len(motions.keep))[own]])
+    return np.vstack([lines, np.eye(len(motions.keep))[resting]])
 
 
 def _null(matrix: Matrix) -> Matrix:

@@ -55,9 +55,9 @@ def unsettled(model: CompiledDae, point: Point) -> set[str]:
     if not clocks(model):
         return set()
     change = np.abs(check_ticks(model, point).d - point.d) > _SETTLED * (1.0 + np.abs(point.d))
-    kinds = enumerate(model.flat_discretes)
+    numbers = [k for k, d in enumerate(model.flat_discretes) if d.kind == "number" and not d.hidden and not d.names]
     # Numbers of ticks grow everywhere, and hidden values are those of clocks; modes are those of the angle there.
-    changed = [k for k, one in kinds if change[k] and not one.hidden and not one.names and one.kind == "number"]
+    changed = [k for k in numbers if change[k]]
     reading = np.flatnonzero(depends(model.equations.variables, "d")[:, changed].any(axis=1))
     return {model.flat_discretes[k].path for k in changed} | {model.flat_variables[k].path for k in reading}
 

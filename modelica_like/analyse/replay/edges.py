@@ -165,15 +165,15 @@ def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
 
 def _sliding(model: CompiledDae, point: Point, hold: int) -> Vector:
     """Accelerations of all states for an acceleration of 1 of a motion that can be held; zeros where others hold it."""
-    one, others = model.held.motions[hold], [k for k in holding(model, point) if k != hold]
-    motions = variable_slopes(model, point, [one.motion, *(model.held.motions[k].motion for k in others)])
+    entry, others = model.held.motions[hold], [k for k in holding(model, point) if k != hold]
+    motions = variable_slopes(model, point, [entry.motion, *(model.held.motions[k].motion for k in others)])
     left = (
         motions[0] - motions[1:].T @ np.linalg.lstsq(motions[1:].T, motions[0], rcond=None)[0] if others else motions[0]
     )
     if np.abs(left).max() <= _ROUNDING * np.abs(motions[0]).max():
         return np.zeros(len(point.x))
     held = point.copy()
-    held.d[one.mode] = one.number
+    held.d[entry.mode] = entry.number
     share(model, held)
     solve_implicit(model, held)
-    return slopes(model, held, "ode").theta[:, Sizes.of(model).fixed + one.approach]
+    return slopes(model, held, "ode").theta[:, Sizes.of(model).fixed + entry.approach]

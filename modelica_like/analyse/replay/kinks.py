@@ -156,11 +156,11 @@ class Kinks:
         both: Callable[[float], Vector], crossed: tuple[float, float], sides: list[Vector], size: float, sizes: Vector
     ) -> Any:
         """Return which rates have a slope without bound at a kink: it grows the more, the nearer to it on one side."""
-        found = np.zeros(len(sizes), bool)
+        steep = np.zeros(len(sizes), bool)
         for sign, begin, value in zip((-1.0, 1.0), crossed, sides, strict=True):
             near, far = (abs(both(begin + sign * away * size) - value) / away for away in (_NEAR, _FAR))
-            found |= (near > _GROWTH * far) & (near > _STEEP * (sizes + abs(value)))
-        return np.flatnonzero(found)
+            steep |= (near > _GROWTH * far) & (near > _STEEP * (sizes + abs(value)))
+        return np.flatnonzero(steep)
 
     def _crossed(
         self, along: Callable[[float], Point], number: int, begin: Vector, size: float

@@ -150,9 +150,9 @@ class _Maker:
     def _ticks(self, before: Point) -> Iterator[tuple[CompiledTransition, Slopes]]:
         """Yield the clocks that tick at the start: the only timed transitions that lead to where they come from."""
         fired = [self.model.events.transitions[event.transition] for event in self.events[0] if event.transition >= 0]
-        for one in fired:
-            if one.timed and one.target in one.sources:
-                yield one, slopes(self.model, before, "moments", [one.index])
+        for transition in fired:
+            if transition.timed and transition.target in transition.sources:
+                yield transition, slopes(self.model, before, "moments", [transition.index])
 
     def _append(self, move: Move) -> None:
         self.chain.append(move)

@@ -21,14 +21,14 @@ def rounding(arguments: list[Any], expressions: Any) -> Any:
         expressions: an SX column in them.
     """
     function = ca.Function("rounded", arguments, [ca.densify(expressions)])
-    symbols = [ca.vertsplit(one) for one in arguments]
-    held, wrong, found = dict[int, Any](), dict[int, Any](), [ca.SX(0)] * int(function.numel_out(0))
+    symbols = [ca.vertsplit(argument) for argument in arguments]
+    held, wrong, errors = dict[int, Any](), dict[int, Any](), [ca.SX(0)] * int(function.numel_out(0))
     for k in range(function.n_instructions()):
         code, reads, places = (
             function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
         )  # fmt: skip
         if code == ca.OP_OUTPUT:
-            found[places[1]] = wrong[reads[0]]
+            errors[places[1]] = wrong[reads[0]]
             continue
         if code == ca.OP_CONST:
             value = ca.SX(function.instruction_constant(k))
@@ -39,9 +39,9 @@ def rounding(arguments: list[Any], expressions: Any) -> Any:
         else:
             value = ca.SX.binary(code, held[reads[0]], held[reads[1]])
         leaf = code in (ca.OP_CONST, ca.OP_INPUT)
-        error = 0 if leaf else _carried(code, [held[one] for one in reads], [wrong[one] for one in reads])
+        error = 0 if leaf else _carried(code, [held[read] for read in reads], [wrong[read] for read in reads])
         held[places[0]], wrong[places[0]] = value, ca.fabs(value) + error
-    return ca.vertcat(ca.SX(0, 1), *found)
+    return ca.vertcat(ca.SX(0, 1), *errors)
 
 
 def _carried(code: int, values: list[Any], errors: list[Any]) -> Any:

@@ -310,7 +310,7 @@ class StepFunctions:
         taken = ca.mtimes(by_w, ca.horzcat(self._estimated(W, z), error))
         weighted, *sizes = self._gains(*self._names, change, P)
         errors = ca.fabs(weighted + self.tableau.gamma * h * (first + taken))
-        return [ca.densify(one) for one in (errors, *sizes)]
+        return [ca.densify(column) for column in (errors, *sizes)]
 
     @cached_property
     def _gains(self) -> ca.Function:
@@ -330,17 +330,17 @@ class StepFunctions:
         for k, (power, by_w, by_theta) in enumerate(zip(powers, q_w, q_theta, strict=True)):
             here = slice(k * width, (k + 1) * width)
             values.append(ca.horzcat(power, ca.mtimes(by_w, change[here]) + ca.mtimes(by_theta, P)))
-            own = ca.mtimes(ca.fabs(by_w), ca.fabs(self._symbols[3][here]) + least)
+            rounding_of_w = ca.mtimes(ca.fabs(by_w), ca.fabs(self._symbols[3][here]) + least)
             felt = ca.mtimes(ca.fabs(by_w), ca.fabs(change[here])) + ca.mtimes(ca.fabs(by_theta), ca.fabs(P))
             # Directions change parameters by about their sizes: what is noise beside a value is so beside its change.
-            terms.append(ca.horzcat(own, own + felt))
+            terms.append(ca.horzcat(rounding_of_w, rounding_of_w + felt))
         sums = (
             self._weighted(self.tableau.estimate, values),
             self._weighted(self.tableau.weights, [ca.fabs(value) for value in values]),
             self._weighted(self.tableau.weights, terms),
-            self._weighted(self.tableau.weights, [ca.repmat(one, 1, 2) for one in self._at_stages(rounded)[0]]),
+            self._weighted(self.tableau.weights, [ca.repmat(column, 1, 2) for column in self._at_stages(rounded)[0]]),
         )
-        return ca.Function("gains", [*self._symbols, change, P], [ca.densify(one) for one in sums])
+        return ca.Function("gains", [*self._symbols, change, P], [ca.densify(column) for column in sums])
 
     @cached_property
     def _tangent_rates(self) -> ca.Function:

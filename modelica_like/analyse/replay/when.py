@@ -197,10 +197,10 @@ def at_rest(model: CompiledDae, point: Point, hold: int, by: Vector) -> Coincide
         hold: position of the held motion.
         by: derivative of the motion by (x, theta) before the event.
     """
-    one = model.held.motions[hold]
-    mode, motion = model.flat_discretes[one.mode], model.flat_variables[one.motion].path
-    held = f"{mode.path} becomes {mode.names[one.number]}"
-    speed = slopes(model, point, "variables", [one.motion])
+    held_motion = model.held.motions[hold]
+    mode, motion = model.flat_discretes[held_motion.mode], model.flat_variables[held_motion.motion].path
+    held = f"{mode.path} becomes {mode.names[held_motion.number]}"
+    speed = slopes(model, point, "variables", [held_motion.motion])
     size = SAME * float(np.abs(speed.x[0]) @ (np.abs(point.x) + model.equations.nominals))
     error = NoGradient(
         f"No gradient at t = {point.t:.9g} s: {held}, because {motion} is zero.",

@@ -79,8 +79,8 @@ def _at_start(chain: Replay, readings: Sequence[Reading]) -> Iterator[Edge]:
     for transition, part in [*chain.ticks, *_passed_over(chain)]:
         ticks = transition.target in transition.sources
 
-        def matters(one: CompiledTransition = transition, part: Slopes = part, ticks: bool = ticks) -> bool:
-            sides = [part.point.d] if ticks else _modes_before(chain, one, part)
+        def matters(passed: CompiledTransition = transition, part: Slopes = part, ticks: bool = ticks) -> bool:
+            sides = [part.point.d] if ticks else _modes_before(chain, passed, part)
             return _begins_otherwise(chain, readings, sides)
 
         # A clock has counted its tick at the start, so its time there is that before.
@@ -130,12 +130,13 @@ def _passed_over(chain: Replay) -> Iterator[tuple[CompiledTransition, Slopes]]:
     """Timed transitions at the start that lead to its modes, also by others there, and their moments."""
     model, start = chain.model, chain.nodes[0]
     moments = call(model, model.events.moments, start)
-    there = [one for one in model.events.transitions if one.timed and _same(chain, float(moments[one.index]), start.t)]
-    reached = {(one.mode, start.d[one.mode]) for one in there}
-    while ready := [one for one in there if (one.mode, one.target) in reached]:
-        there = [one for one in there if one not in ready]
-        reached |= {(one.mode, source) for one in ready for source in one.sources}
-        yield from ((one, slopes(model, start, "moments", [one.index])) for one in ready)
+    timed = [transition for transition in model.events.transitions if transition.timed]
+    there = [transition for transition in timed if _same(chain, float(moments[transition.index]), start.t)]
+    reached = {(transition.mode, start.d[transition.mode]) for transition in there}
+    while ready := [transition for transition in there if (transition.mode, transition.target) in reached]:
+        there = [transition for transition in there if transition not in ready]
+        reached |= {(transition.mode, source) for transition in ready for source in transition.sources}
+        yield from ((transition, slopes(model, start, "moments", [transition.index])) for transition in ready)
 
 
 def _read_there(chain: Replay, readings: Sequence[Reading], outputs: Sequence[Output]) -> Iterator[Edge]:
@@ -172,7 +173,7 @@ def _edge(chain: Replay, jump: Jump, instant: float, reading: Reading, output: O
 
 def _differ(chain: Replay, before: Slopes, after: Slopes) -> bool:
     """Whether a value or its rate jumps: with a kink in time it has on both sides another part of what moves that."""
-    values, rates = ([float(getattr(one, name)[0]) for one in (before, after)] for name in ("value", "rate"))
+    values, rates = ([float(getattr(side, name)[0]) for side in (before, after)] for name in ("value", "rate"))
     # A motion that is held has rates of rounding, which would not change the value in the whole run.
     size, span = sum(map(abs, values)), chain.nodes[-1].t - chain.nodes[0].t
     jumps = abs(values[1] - values[0]), abs(rates[1] - rates[0])

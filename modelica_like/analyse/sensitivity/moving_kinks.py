@@ -32,7 +32,7 @@ def kinks_at(replay: Replay, path: str, node: Point) -> list[tuple[float, Vector
     those of a table in the equations of states, leave its rate as it is unless they jump.
     """
     model = replay.model
-    kinks, own = model.once((Cached.KINKS_OF, path), lambda: _kinks_of(model, path))
+    kinks, of_value = model.once((Cached.KINKS_OF, path), lambda: _kinks_of(model, path))
     rates, size = call(model, model.equations.ode, node), max(1.0, abs(node.t))
 
     def both(time: float) -> Vector:
@@ -49,14 +49,14 @@ def kinks_at(replay: Replay, path: str, node: Point) -> list[tuple[float, Vector
         sizes = np.sum(np.abs(sides[0]), axis=0)
         return bool(np.any((near > _STAYS * far) & (near > _FELT * sizes)))
 
-    for numbers in (range(kinks.count - own, kinks.count), range(kinks.count - own)):
+    for numbers in (range(kinks.count - of_value, kinks.count), range(kinks.count - of_value)):
         every = (kinks.slopes(node, number) for number in numbers)
         # Without a division: a rate may be so small that a time has no number.
         there = [kink for kink in every if kink.rate[0] and abs(kink.value[0]) <= _AT_IT * size * abs(kink.rate[0])]
         times = [-float(kink.value[0] / kink.rate[0]) for kink in there]
-        found = [(late, -kink.by[0] / kink.rate[0]) for kink, late in zip(there, times, strict=True) if jumps(late)]
-        if found:
-            return found
+        jumping = [(late, -kink.by[0] / kink.rate[0]) for kink, late in zip(there, times, strict=True) if jumps(late)]
+        if jumping:
+            return jumping
     return []
 
 

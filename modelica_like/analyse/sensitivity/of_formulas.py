@@ -22,7 +22,7 @@ def formulas(outputs: Sequence[Output], parts: Sequence[Reading]) -> list[Readin
     result: list[Reading] = []
     for output, of in zip(outputs, by_output(outputs, parts), strict=True):
         if output.operands:
-            value, slopes = (one.full()[0] for one in output.formula()(_values(of)))
+            value, slopes = (result.full()[0] for result in output.formula()(_values(of)))
             result.append(_chained(float(value[0]), slopes, of))
         else:
             result.append(of[0])
@@ -36,7 +36,7 @@ def formula_kinks(outputs: Sequence[Output], parts: Sequence[Reading]) -> Iterat
         kinks = arguments_of_kinks(output.formula(), [column]) if output.operands else []
         for kink in kinks:
             function = ca.Function("kink", [column], [kink, ca.densify(ca.jacobian(kink, column))])
-            value, slopes = (one.full()[0] for one in function(_values(of)))
+            value, slopes = (result.full()[0] for result in function(_values(of)))
             error = NoGradient(
                 f"No gradient of {output.name}: its formula is at a kink.",
                 why="The derivatives on both sides differ.",

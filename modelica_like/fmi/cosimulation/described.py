@@ -37,7 +37,7 @@ class UnitDefinition:
 
     def same_dimension(self, other: UnitDefinition) -> bool:
         """Return whether both measure the same kind of quantity; the radian is a number."""
-        first, second = ({name: power for name, power in one.exponents if name != "rad"} for one in (self, other))
+        first, second = ({name: power for name, power in unit.exponents if name != "rad"} for unit in (self, other))
         return first == second
 
     def convert(self, value: float, to: UnitDefinition) -> float:
@@ -126,7 +126,7 @@ def refuse_other_unit(target: str, source: str, units: Iterable[UnitDefinition |
         NetlistError: they differ in scale or dimension.
     """
     first, *others = [unit for unit in units if unit is not None] or [UnitDefinition("1")]
-    other = next((one for one in others if not (first.same_scale(one) and first.same_dimension(one))), None)
+    other = next((unit for unit in others if not (first.same_scale(unit) and first.same_dimension(unit))), None)
     if other is None:
         return
     if first.same_dimension(other):

@@ -64,7 +64,7 @@ class CosimSolution(RecordedSolution):
             for name, value in part["constants"].items()
         }
         modes = np.array([column.kind == "discrete" for column in columns], dtype=bool)
-        continuous = (*(one for one in columns if one.kind != "discrete"), *bond_columns(system))
+        continuous = (*(column for column in columns if column.kind != "discrete"), *bond_columns(system))
         model = RecordedModel(
             system.name, continuous, tuple(column for column in columns if column.kind == "discrete"), constants
         )
@@ -86,7 +86,7 @@ class CosimSolution(RecordedSolution):
 def described_model(system: System) -> RecordedModel:
     """Return the names of the results of a run, as far as the descriptions of the FMUs give them."""
     fmus = [described(unit.file).variables.values() for unit in system.units]
-    columns = _columns(system, [[{"path": one.name} for one in fmu if one.varies] for fmu in fmus])
+    columns = _columns(system, [[{"path": variable.name} for variable in fmu if variable.varies] for fmu in fmus])
     return RecordedModel(system.name, (*columns, *bond_columns(system)), (), {})
 
 
@@ -103,8 +103,8 @@ def _columns(system: System, units: Sequence[Sequence[Mapping[str, Any]]]) -> li
 
 def bond_columns(system: System) -> list[RecordedVariable]:
     """Return the variables of the couplings, which no FMU has."""
-    told = ("power", "W", "power through the coupling"), ("residual_energy", "J", "energy created by the coupling")
-    return [RecordedVariable(f"{bond.name}.{name}", unit, text) for bond in system.bonds for name, unit, text in told]
+    terms = ("power", "W", "power through the coupling"), ("residual_energy", "J", "energy created by the coupling")
+    return [RecordedVariable(f"{bond.name}.{name}", unit, text) for bond in system.bonds for name, unit, text in terms]
 
 
 def _notice(entry: dict[str, Any]) -> str:

@@ -76,8 +76,8 @@ def _component(
     component = element(
         parts, "ssd:Component", name=unit.name, type=FMU_TYPE, source=source, implementation="CoSimulation"
     )
-    known = {name: one if one.unit in fmu.units else replace(one, unit="") for name, one in fmu.variables.items()}
-    variables = [known[port.variable] for port in ports if port.unit == unit.name]
+    described = {name: v if v.unit in fmu.units else replace(v, unit="") for name, v in fmu.variables.items()}
+    variables = [described[port.variable] for port in ports if port.unit == unit.name]
     if variables:
         connectors = element(component, "ssd:Connectors")
         for variable in variables:
@@ -90,7 +90,7 @@ def _component(
         given = element(group, "ssv:Parameters")
         for name, value in unit.parameters.items():
             parameter = element(given, "ssv:Parameter", name=name)
-            _type(parameter, "ssv", known[name], version, value)
+            _type(parameter, "ssv", described[name], version, value)
 
 
 def _type(parent: Element, prefix: str, variable: FmuVariable, version: Version, value: float | None = None) -> None:
@@ -127,8 +127,8 @@ def _units(top: Element, used: list[tuple[DescribedFmu, str]]) -> None:
     if units:
         group = element(top, "ssd:Units")
         for name in sorted(units):
-            one = units[name]
-            base: dict[str, object] = dict(one.exponents)
-            base |= {} if one.factor == 1.0 else {"factor": one.factor}
-            base |= {} if one.offset == 0.0 else {"offset": one.offset}
+            about = units[name]
+            base: dict[str, object] = dict(about.exponents)
+            base |= {} if about.factor == 1.0 else {"factor": about.factor}
+            base |= {} if about.offset == 0.0 else {"offset": about.offset}
             element(element(group, "ssc:Unit", name=name), "ssc:BaseUnit", **base)

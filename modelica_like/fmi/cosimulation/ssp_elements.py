@@ -154,11 +154,11 @@ def read_element(xml: Any, path: ElementPath, files: Files) -> Element:
             advice="Connect the components directly.",
         )  # fmt: skip
     element = Element(path, xml, None if kind == "System" else _fmu(xml, files))
-    for name, one in _named(element, "connector", "ssd:Connectors/ssd:Connector"):
-        units = [child.get("unit", "") for child in one if local(child) in ("Real", "Float64", "Float32")]
-        element.connectors[name] = Connector(needed(one, "kind"), units[0] if units else "")
-    for name, one in _named(element, "element", "ssd:Elements/*"):
-        element.children[name] = read_element(one, (*path, name), files)
+    for name, connector in _named(element, "connector", "ssd:Connectors/ssd:Connector"):
+        units = [child.get("unit", "") for child in connector if local(child) in ("Real", "Float64", "Float32")]
+        element.connectors[name] = Connector(needed(connector, "kind"), units[0] if units else "")
+    for name, child in _named(element, "element", "ssd:Elements/*"):
+        element.children[name] = read_element(child, (*path, name), files)
     return element
 
 

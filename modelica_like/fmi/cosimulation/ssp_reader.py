@@ -82,7 +82,7 @@ class _Reader:
         targets = {target: self._origin(target) for target in self.drives if target[0] in self.fmus}
         note = self.top.find(f"ssd:Annotations/ssc:Annotation[@type='{COSIMULATION}']/ml:Cosimulation", NAMES)
         between = {target: way for target, way in targets.items() if way[-1].source[0] in self.fmus}
-        links = self._links(between, own=note is not None)
+        links = self._links(between, described=note is not None)
         outer = {target: way[-1].source for target, way in targets.items() if target not in between}
         parameters = self._parameters(outer)
         units = tuple(Unit(self.names[path], file, parameters[path]) for path, file in self.files_of.items())
@@ -141,16 +141,16 @@ class _Reader:
             way.append(self.drives[way[-1].source])
         return way
 
-    def _links(self, targets: Mapping[Target, list[_Drive]], *, own: bool) -> tuple[Link, ...]:
-        """Return the connections between components; in a file of our own, their descriptions are their names."""
+    def _links(self, targets: Mapping[Target, list[_Drive]], *, described: bool) -> tuple[Link, ...]:
+        """Return the connections between components; `described` in our own files, which is their name."""
         grouped: dict[tuple[Target, str], list[Target]] = {}
         for target, way in targets.items():
             self._check_units(target, way)
-            grouped.setdefault((way[-1].source, way[0].description if own else ""), []).append(target)
+            grouped.setdefault((way[-1].source, way[0].description if described else ""), []).append(target)
         links: list[Link] = []
         for (source, _), taken in grouped.items():
             said = targets[taken[0]][0].description
-            is_name = said != "" if own else said.isidentifier()
+            is_name = said != "" if described else said.isidentifier()
             chosen = said if is_name else _word(_text(source))
             used = [link.name for link in links]
             name = next(c for c in chain([chosen], (f"{chosen}_{k}" for k in count(2))) if c not in used)

@@ -151,9 +151,9 @@ def alone(kind: type[Component]) -> Node:
         if not connector.optional:
             side, along = _place(kind.icon, name, 0)
             node.ports[name] = Port(name, node, side, along, connector.stroke or PLAIN)
-    for name, one in declarations(kind).fields.items():
-        if isinstance(one, Input | Output):
-            drives = 1 if isinstance(one, Output) else -1
+    for name, entry in declarations(kind).fields.items():
+        if isinstance(entry, Input | Output):
+            drives = 1 if isinstance(entry, Output) else -1
             side, along = _place(kind.icon, name, drives)
             node.ports[name] = Port(name, node, side, along, SIGNAL, drives)
     if node.icon is None:

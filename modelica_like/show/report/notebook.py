@@ -51,9 +51,9 @@ def html(shown: Any) -> str:
 def _given(drive: Component) -> Iterator[tuple[str, str, str]]:
     """Yield path, value and description of each given parameter, and of the parameters of assemblies."""
     for part in drive.walk():
-        own = inside(part)
+        record = inside(part)
         for name, field in part.fields.items():
-            value = part.value(name) if name in own.values or name in own.own_fields else None
+            value = part.value(name) if name in record.values or name in record.own_fields else None
             if isinstance(field, Parameter) and value is not None:
                 yield f"{path_of(part)}.{name}".removeprefix("."), str(value.given), field.description
 

@@ -51,9 +51,9 @@ def overlay(
     for signal in signals:
         curves = {label: curve for label, run in sources.items() if (curve := _curve(signal, run)) is not None}
 
-        def draw(axes: Any, one: Signal = signal, curves: Mapping[str, Any] = curves) -> None:
+        def draw(axes: Any, drawn: Signal = signal, curves: Mapping[str, Any] = curves) -> None:
             for label, curve in curves.items():
-                values = one.driving * shown.converted(curve, one.unit, one.shown_in(shown))
+                values = drawn.driving * shown.converted(curve, drawn.unit, drawn.shown_in(shown))
                 axes.plot(sources[label].time, values, label=label, **looks[label])
 
         panels.append(Panel(signal.label, signal.shown_in(shown), [] if panels else list(curves), draw))

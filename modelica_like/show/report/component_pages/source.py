@@ -306,15 +306,15 @@ class _Reader(Writer):
         """Store a local name: its meaning if that is a path or a column of a table, otherwise a term."""
         match target, value:
             case ast.Tuple(elts=targets), ast.Tuple(elts=values):
-                for one, other in zip(targets, values, strict=True):
-                    yield from self._assigned(one, other)
+                for part, other in zip(targets, values, strict=True):
+                    yield from self._assigned(part, other)
             case ast.Tuple(elts=targets), ast.Call(func=ast.Name(id="zip"), args=[ast.Starred(value=table)]):
                 path = self.path(table)
                 if path is None or not all(isinstance(t, ast.Name) for t in targets):
                     raise Unwritable
-                for k, one in enumerate(targets):
-                    assert isinstance(one, ast.Name)
-                    self.local[one.id] = Column(path.path, "" if len(targets) == 2 else str(k))
+                for k, part in enumerate(targets):
+                    assert isinstance(part, ast.Name)
+                    self.local[part.id] = Column(path.path, "" if len(targets) == 2 else str(k))
             case ast.Name(id=name), ast.Dict():
                 self.local[name] = value
             case ast.Name(id=name), _ if (path := self.path(value)) is not None:
