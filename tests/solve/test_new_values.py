@@ -1,6 +1,5 @@
 """New values at events: what is named takes them, what it is rigidly coupled with follows, all else keeps its own."""
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +10,6 @@ from components import (
     Brake,
     Clutch,
     Constant,
-    ConstantSpeed,
     ConstantTorque,
     Damper,
     Freewheel,
@@ -30,7 +28,6 @@ from components import (
     TranslationalSpringDamper,
 )
 from modelica_like import Options, build, export_fmu, run_fmu, sensitivities, simulate
-from modelica_like.errors import ContradictingValue
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, connect, free, param, series, when
 
 SOLVERS = pytest.mark.parametrize("solver", ["idas", "native"])
@@ -347,19 +344,6 @@ def test_an_fmu_slides_too(tmp_path: Path) -> None:
         assert run["m.s"][-1] == pytest.approx(1.34, abs=1e-5)
 
 
-class Prescribed(Component):
-    A = Inertia(J=1.0, phi=0.0)
-    s = ConstantSpeed(w_fixed=2.0)
-    tr: Parameter = param("s", default=0.2)
-    w1: Parameter = param("rad/s", default=1.0)
-
-    def equations(self) -> Equations:
-        yield connect(self.s.flange, self.A.flange_a)
-
-    def events(self) -> Events:
-        yield when(self.time > self.tr, {self.A.w: self.w1})
-
-
 class Geared(Component):
     A = Inertia(J=1.0, phi=0.0, w=1.0)
     s = IdealGear(ratio=2.0)
@@ -373,46 +357,6 @@ class Geared(Component):
 
     def events(self) -> Events:
         yield when(self.time > self.tr, {self.A.w: self.w_A, self.B.w: self.w_B})
-
-
-class Twice(Component):
-    A = Inertia(J=1.0, phi=0.0, w=5.0)
-    m = Mode("a", "b")
-    k = Mode("a", "b")
-    tr: Parameter = param("s", default=0.2)
-    w1: Parameter = param("rad/s", default=1.0)
-
-    def equations(self) -> Equations:
-        yield free(self.A.flange_a)
-
-    def events(self) -> Events:
-        yield self.m.go("a", "b", at=self.tr, reset={self.A.w: self.w1})
-        yield self.k.go("a", "b", at=self.tr, reset={self.A.w: 2 * self.A.w})
-
-
-@SOLVERS
-@pytest.mark.parametrize(
-    ("drive", "message"),
-    [
-        (
-            Prescribed(),
-            r"At 0\.2 s A\.w cannot become 1 rad/s: something else determines it, what prescribes its motion or "
-            r"another new value\.\n  in test_new_values\.py:\d+ .*\nGive a new value to what is free to take it only, "
-            r"and to one of those that follow from each other\.",
-        ),
-        (Geared(), r"At 0\.2 s (A\.w|B\.w) cannot become 3 rad/s: .*\n  in test_new_values\.py:\d+ .*\nGive .*"),
-        (
-            Twice(),
-            r"At 0\.2 s A\.w gets two new values\.\n  in test_new_values\.py:\d+ .*\n  in test_new_values\.py:\d+ .*\n"
-            r"Give one to each motion only: what is coupled rigidly follows\.",
-        ),
-    ],
-    ids=["prescribed", "geared", "twice"],
-)
-def test_values_that_contradict_are_refused(solver: str, drive: Component, message: str) -> None:
-    with pytest.raises(ContradictingValue) as refused:
-        simulate(drive, 0.4, solver=solver)
-    assert re.fullmatch(message, str(refused.value)), str(refused.value)
 
 
 @SOLVERS
