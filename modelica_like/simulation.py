@@ -143,7 +143,7 @@ def simulate(
         rtol: relative tolerance.
         atol: absolute tolerance, in nominal values; if only `rtol` is given, at most a hundredth of it.
         points: number of equal intervals of the results.
-        options: all options together; the arguments above override them.
+        options: all options together, which win over those of a netlist; the arguments above override them.
         progress: called with the time reached.
         solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast. By default
             IDAS; if IDAS gives up, the run-time if there is one and it succeeds, with a notice.
@@ -307,7 +307,9 @@ def positive_step(fixed_step: float | str | None) -> float:
 
 def _options(base: Options, settings: Mapping[str, Any], **given: Any) -> Options:
     values = {name: getattr(base, name) for name in Options.__dataclass_fields__}
-    chosen = {name: settings[name] for name in ("rtol", "atol", "points", "on_chattering") if name in settings}
+    asked = {name for name, value in values.items() if value != getattr(Options, name)}  # wins over the netlist
+    names = {"rtol", "atol", "points", "on_chattering"} & settings.keys() - asked
+    chosen = {name: settings[name] for name in names}
     chosen |= {name: value for name, value in given.items() if value is not None}
     if "rtol" in chosen and "atol" not in chosen:
         # Otherwise what is small compared with its nominal value would not become more precise.

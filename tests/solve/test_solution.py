@@ -9,6 +9,7 @@ from components import Clutch, Inertia, TorqueStep
 from modelica_like import Options, Solution, build, simulate
 from modelica_like.errors import LanguageError, UnitError, UnknownName, ValueOutOfRange
 from modelica_like.language import Component, Equations, Parameter, Variable, connect, der, param, series, var
+from modelica_like.netlist import loads
 
 
 class Drive(Component):
@@ -383,6 +384,15 @@ def test_wrong_limits():
 def test_arguments_win_over_options():
     found = simulate(Drive(), 0.5, options=Options(points=3, rtol=1e-5), points=2)
     assert (found.options.points, found.options.rtol) == (2, 1e-5)
+
+
+def test_options_win_over_the_netlist():
+    drive = loads(
+        '[simulate]\nuntil = 0.1\nrtol = 1e-5\npoints = 7\n[parts]\nw = { is = "Inertia", J = 1, phi = 0, w = 1 }'
+    )
+    assert (simulate(drive).options.rtol, simulate(drive).options.points) == (1e-5, 7)
+    found = simulate(drive, options=Options(rtol=1e-9))
+    assert (found.options.rtol, found.options.points) == (1e-9, 7)
 
 
 def test_progress_is_told():
