@@ -83,6 +83,13 @@ typedef struct { /* of another integrator: where its pieces end, and five knots 
     const double *ends, *knots;
 } Panel;
 
+typedef struct { /* results of another integrator from the present point, and the pieces that they become */
+    const double *x, *z, *shares;           /* shares: of the span, at which they lie */
+    double span, relative, absolute;        /* its tolerances; the last one in nominal values */
+    int64_t results, precise;               /* precise: pieces as the integrator has laid them out */
+    double *ends, *knots, *wishes, *errors; /* of each piece: how long it should have been, its error in tolerances */
+} Looks;
+
 /* Integrates from the present point up to a time at most; returns 0 where it cannot. */
 typedef int (*Integrator)(double limit, Panel *panel);
 
@@ -347,6 +354,7 @@ int is_due(Instance *c);
 static inline int takes_panels(const Instance *c) { return c->integrator != NULL && c->own_steps == 0; }
 void piece_between(Instance *c, const Piece *whole, double begin, double end, Piece *piece);
 int next_piece(Instance *c, double limit, double far);
+void take_looks(Instance *c, Looks *looks);
 /* locate.c */
 #define MOST_LOOKS 11 /* at guards, that there is room for */
 double cubic_guess(double g0, double r0, double g1, double r1);

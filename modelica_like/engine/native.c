@@ -112,6 +112,12 @@ EXPORTED void native_integrate_by(Native *n, Integrator integrator, const unsign
     memcpy(n->c->felt, felt, (size_t)n->c->model->n_d);
 }
 
+/* Makes a panel of its results, up to a piece that is not precise; returns the number of pieces. */
+EXPORTED int64_t native_take_looks(Native *n, Looks *looks) {
+    take_looks(n->c, looks);
+    return n->c->panel.pieces;
+}
+
 /* The largest step from now on, in s. */
 EXPORTED void native_limit(Native *n, double longest) { n->c->state.longest = longest; }
 

@@ -3,7 +3,15 @@
 #include "core.h"
 
 #define PARTS_OF_PIECE 4
-#define MOST_PANELS 20 /* tried: what switches without end is integrated as it is written */
+#define LOOKS (2 * PARTS_OF_PIECE) /* results of a piece: those between knots tell how far its polynomial is off */
+#define MOST_PANELS 20             /* tried: what switches without end is integrated as it is written */
+#define PRECISE 1 /* largest error of a polynomial in tolerances; the one to aim at: IDAS has about one itself */
+#define AIM 0.3
+#define HALVED \
+    8           /* largest error of a piece that becomes precise in halves: smooth ones are 32 times as precise there */
+#define ORDER 5 /* of that error, in the length of a piece */
+#define SHRINKS_AT_MOST 0.1 /* what an error tells about the length of pieces */
+#define GROWS_AT_MOST 30
 
 double *last_of(const Model *m, Piece *piece) { return piece->points + m->n_unknowns; }
 
@@ -49,6 +57,58 @@ void piece_between(Instance *c, const Piece *whole, double begin, double end, Pi
         piece_at(m, whole, k < PARTS_OF_PIECE ? begin + (end - begin) * k / PARTS_OF_PIECE : end,
             rows + (size_t)k * (size_t)m->n_unknowns);
     piece_through(m, rows, begin, end, piece);
+}
+
+/* Errors of polynomials in the middles between their knots, in tolerances and the norm of IDAS, from the rows of all
+ * looks. */
+static double error_of_looks(const Model *m, const double *rows, double relative, double absolute) {
+    static const double weights[PARTS_OF_PIECE][PARTS_OF_PIECE + 1] = {
+        {35, 140, -70, 28, -5}, {-5, 60, 90, -20, 3}, {3, -20, 90, 60, -5}, {-5, 28, -70, 140, 35}};
+    size_t n = (size_t)m->n_unknowns;
+    double sum = 0;
+    for (int k = 0; k < m->n_x; k++) {
+        const double *y = rows + k;
+        double size = 0.5 * relative * (fabs(y[0]) + fabs(y[LOOKS * n])) + absolute * m->nominals[k], most = 0;
+        for (size_t part = 0; part < PARTS_OF_PIECE; part++) {
+            double between = 0;
+            for (size_t j = 0; j <= PARTS_OF_PIECE; j++) between += weights[part][j] / 128 * y[2 * j * n];
+            double error = fabs(between - y[(2 * part + 1) * n]);
+            most = isnan(error) ? INFINITY : fmax(most, error);
+        }
+        sum += (most / size) * (most / size);
+    }
+    return isnan(sum) ? INFINITY : sqrt(sum / m->n_x);
+}
+
+/* Pieces that are not precise become two, with all looks as knots; the first one that is still rough ends the panel. */
+void take_looks(Instance *c, Looks *looks) {
+    const Model *m = c->model;
+    size_t n = (size_t)m->n_unknowns, n_x = (size_t)m->n_x, n_z = n - n_x, row = n * sizeof(double);
+    double *rows = memcpy(c->stages, c->x, row), *knot = memcpy(looks->knots, rows, row), begin = 0;
+    double resolution = TIME_RESOLUTION * fmax(1, fabs(c->state.t));
+    c->panel = (Panel){c->state.t, c->panel.longest, 0, 0, looks->ends, looks->knots};
+    for (looks->precise = 0; (looks->precise + 1) * LOOKS <= looks->results; looks->precise++) {
+        size_t first = (size_t)looks->precise * LOOKS;
+        for (size_t k = 0; k < LOOKS; k++) {
+            memcpy(rows + (k + 1) * n, looks->x + (first + k) * n_x, n_x * sizeof(double));
+            memcpy(rows + (k + 1) * n + n_x, looks->z + (first + k) * n_z, n_z * sizeof(double));
+        }
+        double end = looks->shares[first + LOOKS - 1], length = looks->span * (end - begin);
+        double error = error_of_looks(m, rows, looks->relative, looks->absolute);
+        double change = fmin(fmax(pow(AIM / error, 1.0 / ORDER), SHRINKS_AT_MOST), GROWS_AT_MOST);
+        int halves = error > PRECISE ? 2 : 1, rough = error > HALVED && length > resolution; /* shorter: a jump */
+        for (int half = 1; half <= halves; half++) {
+            int64_t piece = c->panel.pieces;
+            looks->wishes[piece] = length * change;
+            looks->errors[piece] = error;
+            if (rough) return;
+            looks->ends[piece] = c->state.t + looks->span * (half < halves ? 0.5 * (begin + end) : end);
+            c->panel.pieces++;
+        }
+        for (int k = 3 - halves; k <= LOOKS; k += 3 - halves) memcpy(knot += n, rows + (size_t)k * n, row);
+        memcpy(rows, rows + LOOKS * n, row);
+        begin = end;
+    }
 }
 
 static double begin_of(const Panel *panel) { return panel->number > 0 ? panel->ends[panel->number - 1] : panel->begin; }

@@ -64,6 +64,17 @@ class Panel(c.Structure):
     ]
 
 
+class Looks(c.Structure):
+    """`Looks` in core.h."""
+
+    _fields_ = [
+        *((name, _POINTER) for name in ("x", "z", "shares")),
+        *((name, _NUMBER) for name in ("span", "relative", "absolute")),
+        *((name, _COUNT) for name in ("results", "precise")),
+        *((name, _POINTER) for name in ("ends", "knots", "wishes", "errors")),
+    ]
+
+
 INTEGRATOR = c.CFUNCTYPE(c.c_int, _NUMBER, c.POINTER(Panel))
 """`Integrator` in core.h."""
 
@@ -77,6 +88,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "reset": (_CODE, [_POINTER, *4 * [_NUMBER]]),
     "limit": (None, [_POINTER, _NUMBER]),
     "integrate_by": (None, [_POINTER, INTEGRATOR, _POINTER]),
+    "take_looks": (_COUNT, [_POINTER, c.POINTER(Looks)]),
     "set": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),
     "set_all": (None, 3 * [_POINTER]),
     "get": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),

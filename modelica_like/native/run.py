@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import pairwise
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.native import library
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.endless import chattering
 from modelica_like.native.library import INTEGRATOR
@@ -19,7 +21,7 @@ from modelica_like.options import Options
 from modelica_like.solve.dense import Dense
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.initialize import Impact, Point
-from modelica_like.solve.panels import Panels, Progress
+from modelica_like.solve.panels import LOOKS, Looks, Panels, Progress
 from modelica_like.solve.recorder import Recorder, Segment
 
 _PARTS = 100
@@ -45,10 +47,22 @@ class _ByIdas:
     def __init__(self, instance: Instance, panels: Panels, progress: Progress | None) -> None:
         self.panels, self._instance, self._progress = panels, instance, progress
         self._x, self._d = instance.point()
-        self._ends = self._knots = np.zeros(0)
+        ends, wishes, errors = np.empty((3, 2 * panels.most))
+        self._knots = np.empty((LOOKS * panels.most + 1) * len(self._x))
+        panels.looks = Looks(self._take, ends, wishes, errors)
+        at = {"ends": ends, "wishes": wishes, "errors": errors, "knots": self._knots}
+        self._looks = library.Looks(**{name: array.ctypes.data for name, array in at.items()})
         self._asked = INTEGRATOR(self._answer)
         felt = panels.felt
         instance.library.integrate_by(instance.address, self._asked, felt.ctypes.data)
+
+    def _take(
+        self, x: Vector, z: Vector, shares: Vector, span: float, relative: float, absolute: float
+    ) -> tuple[int, int]:
+        looks = self._looks
+        looks.x, looks.z, looks.shares = x.ctypes.data, z.ctypes.data, shares.ctypes.data
+        looks.span, looks.relative, looks.absolute, looks.results = span, relative, absolute, len(x)
+        return self._instance.library.take_looks(self._instance.address, ctypes.byref(looks)), looks.precise
 
     def _answer(self, limit: float, place: Any) -> int:
         nx = len(self.panels.model.states)
@@ -56,13 +70,10 @@ class _ByIdas:
         try:
             if self._progress is not None:
                 self._progress(now.t)
-            self._ends, self._knots = self.panels.go_on(now, limit, place.contents.longest)
+            self.panels.go_on(now, limit, place.contents.longest)
         except BaseException as error:  # noqa: BLE001 - also an interrupt: ctypes would lose it
             self.error = error
             return 0
-        panel = place.contents
-        panel.begin, panel.pieces = now.t, len(self._ends)
-        panel.ends, panel.knots = self._ends.ctypes.data, self._knots.ctypes.data
         return 1
 
 

@@ -141,7 +141,8 @@ class Integrator:
         first: first step in scaled time.
 
     Attributes:
-        tolerances: present relative one, and absolute ones of the states.
+        rtol: present relative tolerance.
+        atol: present absolute one, in nominal values.
         reached: time in s at which IDAS gave up last.
     """
 
@@ -169,15 +170,10 @@ class Integrator:
         self._seconds: float | None = None
         self._tail = np.concatenate([model.p, model.u])
 
-    @property
-    def rtol(self) -> float:
-        """Present relative tolerance."""
-        return self.tolerances[0]
-
     def weights(self, x: Vector) -> Vector:
         """Error weights of states from relative and absolute tolerance; shape as x, (nx,) or (nx, n)."""
-        relative, absolute = self.tolerances
-        return relative * np.abs(x) + (absolute if x.ndim == 1 else absolute[:, None])
+        absolute = self.atol * self.model.equations.nominals
+        return self.rtol * np.abs(x) + (absolute if x.ndim == 1 else absolute[:, None])
 
     def relax(self) -> bool:
         """Relax the tolerances by ten, once; False if they are already."""
@@ -187,7 +183,7 @@ class Integrator:
 
     def _relax(self, factor: float) -> None:
         self._relaxed = factor
-        self.tolerances = self.options.rtol * factor, self.options.atol * factor * self.model.equations.nominals
+        self.rtol, self.atol = self.options.rtol * factor, self.options.atol * factor
 
     def _instance(self, grid: Grid, steps: int, gentle: bool, first: float, longest: float) -> BufferedFunction:
         key = Cached.IDAS, grid, self.rtol, self.options.atol, steps, gentle, first, self._seconds, longest

@@ -18,13 +18,11 @@ from modelica_like.solve.initialize import Point
 
 Progress = Callable[[float], None]
 
-_PARTS = 4
-"""Of a piece, between knots of its polynomial; PARTS_OF_PIECE in panels.c."""
-_LOOKS = 2 * _PARTS
-"""Results of IDAS per piece: those between knots tell how far its polynomial is off."""
-_EVEN = tuple(Grid(pieces, _LOOKS) for pieces in (1, 4, 16, 64, 256))
+LOOKS = 8
+"""Results of IDAS per piece; LOOKS in panels.c."""
+_EVEN = tuple(Grid(pieces, LOOKS) for pieces in (1, 4, 16, 64, 256))
 """Grids of what goes on: few, because each needs an instance of IDAS."""
-_GRADED = Grid(32, _LOOKS, power=3)
+_GRADED = Grid(32, LOOKS, power=3)
 """Grid of what begins: its first piece is 30,000 times as short as the whole."""
 _SMOOTH = 16
 """Largest number of even pieces in what begins."""
@@ -32,18 +30,14 @@ _WORTH = 16
 """Pieces of a panel at least: a start of IDAS costs as much as ten of them."""
 _LARGEST = 2**22
 """Numbers in a call, limited by memory."""
-_PRECISE, _AIM = 1.0, 0.3
-"""Largest error of a polynomial in tolerances, and the one to aim at: the error of IDAS is about one."""
 _FINEST = 1e-12
 """Relative tolerance below which IDAS makes more noise than errors."""
-_ORDER = 5
-"""Of that error, in the length of a piece."""
 _HALVED = 8.0
-"""Largest error of a piece that becomes precise in halves: what is smooth is 32 times as precise there."""
+"""Error of a polynomial up to which it becomes precise in halves, in tolerances; HALVED in panels.c."""
 _TELLING = 0.02
 """Smaller errors are rounding and noise, and tell nothing about lengths."""
-_SHRINKS, _GROWS = 0.1, 30.0
-"""Limits of a change of that length."""
+_SHRINKS = 0.1
+"""Of panels in which IDAS gives up."""
 _MOST = 0.2
 """Of the last pieces of a panel, whose wishes for the next ones count less: IDAS makes some noise."""
 _LONGER, _ROOM = 4.0, 1.5
@@ -61,8 +55,23 @@ _SAME = 1e-3
 """Distance of two places at which IDAS gave up, relative to the panel, below which they are one."""
 
 
-_BETWEEN = np.array([[35, 140, -70, 28, -5], [-5, 60, 90, -20, 3], [3, -20, 90, 60, -5], [-5, 28, -70, 140, 35]]) / 128
-"""Weights of the five knots of a piece in its polynomial, in the middles between them."""
+@dataclass
+class Looks:
+    """What the run-time makes of results of IDAS: pieces up to the first one that is not precise.
+
+    Attributes:
+        take: makes them of results (states and implicit unknowns, by rows), their places as shares of a span, its
+            length in s, and tolerances (the absolute one in nominal values); returns how many, and of how many of those
+            that IDAS was asked for.
+        ends: of the pieces in s.
+        wishes: how long they should have been in s; also that of the first one that is not precise.
+        errors: of their polynomials in tolerances.
+    """
+
+    take: Callable[[Vector, Vector, Vector, float, float, float], tuple[int, int]]
+    ends: Vector
+    wishes: Vector
+    errors: Vector
 
 
 @dataclass
@@ -89,7 +98,11 @@ class Panels:
     Attributes:
         integrator: does the steps.
         notices: messages about relaxed tolerances.
+        most: pieces of a panel.
+        looks: to be set before the first panel; there are `most` pieces at most, each of which may become two.
     """
+
+    looks: Looks
 
     def __init__(self, model: CompiledDae, options: Options, begin: float, end: float) -> None:
         self.model, self.options = model, options
@@ -97,8 +110,9 @@ class Panels:
         whole = not (model.events.transitions or model.events.delay_parts or model.edges.count)
         self.integrator = Integrator(model, options, whole=whole, first=_FIRST_STEPS[whole])
         self.notices: list[str] = []
-        most = max(_LARGEST // (_LOOKS * (len(model.states) + len(model.implicit))), 1)
+        most = max(_LARGEST // (LOOKS * (len(model.states) + len(model.implicit))), 1)
         self._grids = [grid for grid in _EVEN if grid.pieces <= most]
+        self.most = self._grids[-1].pieces
         self._length, self._span = ((end - begin) / count for count in _FIRST)
         if not self._guarded:
             self._span = np.inf
@@ -106,8 +120,7 @@ class Panels:
         self._known: dict[bytes, _Segment] = {}
         self._modes, self._segment = b"", _Segment(begin, self._length)
         self._graded = self._cut = self._begins = False
-        self._begin, self._ends, self._wishes = begin, np.zeros(0), np.zeros(0)
-        self._telling = self._halved = np.zeros(0, bool)
+        self._begin, self._ends = begin, np.zeros(0)
         self._failures, self._failed_before, self._gave_up_at = 0, begin, -np.inf
 
     @property
@@ -115,11 +128,8 @@ class Panels:
         """Marks of the entries of d that equations of motion read: events that change no other end no panel."""
         return self.model.once(Cached.FELT, lambda: _felt(self.model))
 
-    def go_on(self, now: Point, limit: float, longest: float = np.inf) -> tuple[Vector, Vector]:
+    def go_on(self, now: Point, limit: float, longest: float = np.inf) -> None:
         """Integrate from a consistent point up to a time at most, in pieces that are not longer than asked for.
-
-        Returns:
-            Ends of the pieces in s, and knots: states and implicit unknowns, shape (4 pieces + 1, nx + nz).
 
         Raises:
             StepFailed: IDAS gave up.
@@ -129,27 +139,12 @@ class Panels:
             self._length, self._graded = min(self._length, longest), False
         while True:
             span, grid = self._plan(limit - now.t, _SHORTEST * time_resolution(now.t), begins=begins)
-            looks = self._looks(now, span, grid)
-            good = self._judge(now, span, grid, looks)
-            if good:
-                ends = now.t + span * grid.ends[:good]
-                if span == limit - now.t and good == grid.pieces:
-                    ends[-1] = limit
-                self._begin, (self._ends, knots) = now.t, self._pieces(now.t, ends, looks)
-                return self._ends, knots
+            if pieces := self._integrate(now, span, grid):
+                self._begin, self._ends = now.t, self.looks.ends[:pieces]
+                if span == limit - now.t and not self._cut:
+                    self._ends[-1] = limit
+                return
             begins = True
-
-    def _pieces(self, t: float, ends: Vector, looks: Vector) -> tuple[Vector, Vector]:
-        """Return ends and knots of the pieces; those that are not precise have become two, with all looks as knots."""
-        halved = self._halved[: len(ends)]
-        taken = np.ones((len(ends), _LOOKS), bool)
-        taken[~halved, 1::2] = False
-        middles = 0.5 * (np.append(t, ends[:-1]) + ends)
-        both = np.stack([middles, ends], axis=1)
-        kept = np.stack([halved, np.ones(len(ends), bool)], axis=1)
-        self._wishes = np.repeat(self._wishes[: len(ends)], 1 + halved)
-        self._telling = np.repeat(self._telling[: len(ends)], 1 + halved)
-        return both[kept], looks[: len(ends) * _LOOKS + 1][np.append(taken.ravel(), True)]
 
     def _plan(self, left: float, least: float, *, begins: bool) -> tuple[float, Grid]:
         """Return length in s and grid of a panel; of time there is so much left, and a panel has so much at least."""
@@ -160,62 +155,33 @@ class Panels:
         span = min(left if 1.1 * span >= left else span, self._grids[-1].pieces * self._length)
         return span, next(grid for grid in self._grids if grid.pieces * self._length >= span)
 
-    def _looks(self, now: Point, span: float, grid: Grid) -> Vector:
-        """Return states and implicit unknowns at the start and the grid, shape (looks + 1, nx + nz).
-
-        They are fewer if IDAS gave up.
-        """
-        y = np.concatenate([now.x, now.z])[None]
-        try:
-            x, z = self.integrator.run(now, span, grid, patient=False, partial=True, polish=False)
-        except StepFailed:
-            return y
-        return np.concatenate([y, np.concatenate([x, z]).T])
-
-    def _judge(self, now: Point, span: float, grid: Grid, looks: Vector) -> int:
-        """Return the number of pieces that are precise, and note how long they should be.
-
-        If none is, the next panel is shorter.
+    def _integrate(self, now: Point, span: float, grid: Grid) -> int:
+        """Return the number of pieces that are precise. If none is, the next panel is shorter.
 
         Raises:
             StepFailed: states change ever faster.
         """
-        count, t = (len(looks) - 1) // _LOOKS, now.t
-        if not count:
-            self._gave_up(t, span)
+        integrator, looks = self.integrator, self.looks
+        try:
+            x, z = integrator.run(now, span, grid, patient=False, partial=True, polish=False)
+        except StepFailed:
+            x = z = np.zeros((0, 0))
+        if x.shape[1] < LOOKS:
+            self._gave_up(now.t, span)
             return 0
-        errors = np.nan_to_num(self._errors(looks, count), nan=np.inf)
-        lengths = span * np.diff(grid.ends[:count], prepend=0.0)
-        with np.errstate(divide="ignore"):  # a straight line has none
-            self._telling = errors > _TELLING
-            self._wishes = lengths * np.clip((_AIM / errors) ** (1 / _ORDER), _SHRINKS, _GROWS)
-        precise = errors <= _HALVED
-        self._halved = errors > _PRECISE
-        rough = ~precise & (lengths > time_resolution(t))  # what happens in a shorter time is a jump
-        good = int(np.argmax(rough)) if rough.any() else count
-        if good and not precise[:good].any():
-            self.integrator.gave_up = self.integrator.too_fast(now)
-            self._relax(t)
+        finest = max(1.0, _FINEST / integrator.rtol)
+        relative, absolute = (finest * tolerance for tolerance in (integrator.rtol, integrator.atol))
+        pieces, precise = looks.take(x.T, z.T, grid.shares, span, relative, absolute)
+        if pieces and looks.errors[:pieces].min() > _HALVED:  # all of them are as short as jumps
+            integrator.gave_up = integrator.too_fast(now)
+            self._relax(now.t)
             return 0
-        self._cut = good < count
-        if not good:
+        self._cut = precise < grid.pieces
+        if not pieces:
             self._graded = True
-            self._span = _GRADED.pieces * float(self._wishes[0])
+            self._span = _GRADED.pieces * float(looks.wishes[0])
             self._length = self._span / _GRADED.pieces
-        return good
-
-    def _errors(self, looks: Vector, count: int) -> Vector:
-        """Return errors of the polynomials of pieces, in tolerances and in the norm of IDAS; shape (pieces,)."""
-        stride, width = looks.strides
-        shape = count, _LOOKS + 1, len(self.model.states)
-        pieces = np.lib.stride_tricks.as_strided(looks, shape, (_LOOKS * stride, stride, width), writeable=False)
-        relative, absolute = self.integrator.tolerances
-        relative, absolute = (tolerance * max(1.0, _FINEST / relative) for tolerance in (relative, absolute))
-        weights = 0.5 * relative * (np.abs(pieces[:, 0]) + np.abs(pieces[:, -1])) + absolute
-        # Term by term: a product of matrices would depend on the processor.
-        between = sum(_BETWEEN[:, k, None] * pieces[:, 2 * k, None] for k in range(_PARTS + 1))
-        doubts = np.abs(between - pieces[:, 1::2]).max(axis=1)
-        return np.sqrt(np.mean((doubts / weights) ** 2, axis=1))
+        return pieces
 
     def _learn(self, now: Point) -> bool:
         """Choose the next panel by the last one, as far as it was used, or by the last segment with the same modes.
@@ -229,11 +195,11 @@ class Panels:
         if len(ends) and now.t == self._begin and modes == self._modes:
             return self._begins  # the run-time asks again, for a shorter one
         if len(ends):
-            wishes = self._wishes[: int(np.searchsorted(ends, now.t)) + 1]
+            wishes = self.looks.wishes[: min(int(np.searchsorted(ends, now.t)) + 1, len(ends))]
             recent = np.sort(wishes[len(wishes) // 2 :])
             self._length = float(recent[int(_MOST * (len(recent) - 1))])
             if self._begin == segment.begin:
-                telling = wishes[self._telling[: len(wishes)]]
+                telling = wishes[self.looks.errors[: len(wishes)] > _TELLING]
                 segment.finest = float(telling.min(initial=ends[len(wishes[:-1])] - self._begin))
             passed = float(ends[-1] - self._begin)
             self._span = passed if self._cut else _LONGER * max(self._span, passed)
