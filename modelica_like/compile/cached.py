@@ -45,7 +45,7 @@ class Cached(StrEnum):
     # -- what is read --
     VARIABLES = "all variables"
     ENERGY = "all energy terms"
-    TERMS = "the same, densely, in one column"
+    TERMS = "the same, densely, in one column; all, or stored energies and their rates only"
     COLUMN = "expressions of all variables or all energy terms, by which of both"
     ROWS = "some of them as a function of what they need, by thread, which of both and rows"
     CURVES = "expressions along a run, by text"
@@ -53,6 +53,7 @@ class Cached(StrEnum):
     POWER_SLOPES = "slopes of the powers"
     ENERGIES = "stored energies, of which slopes are taken"
     ENERGY_CHANGES = "changes of stored energies along changes of states"
+    SIGNS = "changes of states in which changes of energies are taken"
     EXPRESSIONS = "the model with more variables, by their expressions"
     # -- derivatives --
     GUARDS = "guards and their rates, with the active ones of each mode"

@@ -14,7 +14,7 @@ from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import EnergyDrift, SingularAtStart
 from modelica_like.options import Options
-from modelica_like.runs.powers import COARSE, POWERS, Powers, results
+from modelica_like.runs.powers import Powers, drifts_of_results, energy_terms, results
 from modelica_like.runs.solution import Solution
 from modelica_like.solve.dense import Dense
 from modelica_like.solve.initialize import Point
@@ -99,20 +99,22 @@ def conserving(run: Solution, repeat: Callable[[Options], Solution]) -> Solution
 def find_astray(run: Solution) -> Astray | None:
     """Find the results between which the integration of a run is wrong.
 
-    First, all results are looked at as they are, which costs little; where that is too coarse to judge, they are
-    integrated again.
+    First, results are looked at as they are, which costs little; where that is too coarse to judge, they are integrated
+    again.
     """
-    model, segments, options, dense = run.model, run.segments, run.options, _dense(run)
+    model, segments, options = run.model, run.segments, run.options
     if not model.states or not model.components:
         return None
-    for finer in (False, True):
-        drifts, powers = _drifts(model, segments, options, dense, finer=finer)
-        suspects = np.flatnonzero(np.abs(drifts) > _SUSPICIOUS * options.rtol * powers.moved)
-        # Where the tolerances allow it anyway, finer results could only be limited by them, too.
-        if suspects.size and not finer:
-            suspects = suspects[np.abs(drifts[suspects]) > _allowed(run, segments)[suspects]]
-        if not suspects.size:
-            return None
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite has its notice in the balance
+        drifts, moved = drifts_of_results(model, segments)
+    suspects = np.flatnonzero(np.abs(drifts) > _SUSPICIOUS * options.rtol * moved)
+    # Where the tolerances allow it anyway, finer results could only be limited by them, too.
+    if suspects.size:
+        suspects = suspects[np.abs(drifts[suspects]) > _allowed(run, segments)[suspects]]
+    if not suspects.size:
+        return None
+    drifts, powers = _drifts(model, segments, options, _dense(run))
+    suspects = np.flatnonzero(np.abs(drifts) > _SUSPICIOUS * options.rtol * powers.moved)
     places = _Places(run)
     wrong = (places.wrong(k) for k in sorted(suspects.tolist(), key=lambda k: -abs(drifts[k])))
     return next((name for name in wrong if name is not None), None)
@@ -122,9 +124,9 @@ def _dense(run: Solution) -> Dense | None:
     return None if run.dense is None else run.dense()
 
 
-@np.errstate(over="ignore", invalid="ignore")  # what is not finite has its notice in the balance
+@np.errstate(over="ignore", invalid="ignore")
 def _drifts(
-    model: CompiledDae, segments: Sequence[Segment], options: Options, dense: Dense | None, *, finer: bool = True
+    model: CompiledDae, segments: Sequence[Segment], options: Options, dense: Dense | None
 ) -> tuple[Vector, Powers]:
     """Changes of stored energies minus integrals of their rates, in J, where these are known; shape (components,)."""
     powers = Powers(model, options, sum(len(segment.times) for segment in segments), dense)
@@ -132,7 +134,7 @@ def _drifts(
     for some in results(model, segments):
         places = np.arange(len(some.times))
         total += some.terms[0][:, places == some.last].sum(axis=1) - some.terms[0][:, places == some.first].sum(axis=1)
-        total -= powers.integrals(some, 0 if finer else COARSE)[-1]
+        total -= powers.integrals(some)[-1]
     return np.where(np.abs(total) > powers.unknown, total, 0.0), powers
 
 
@@ -219,23 +221,17 @@ def _changes(model: CompiledDae, point: Point, weights: Vector) -> Vector:
     """
     if model.implicit:
         return np.linalg.norm(
-            slopes(model, point, Cached.ENERGIES, function=lambda: _energies(model)).x * weights, axis=1
+            slopes(model, point, Cached.ENERGIES, function=lambda: energy_terms(model, stored=True)).x * weights, axis=1
         )
 
     def make() -> ca.Function:
-        energies, some = _energies(model), ca.SX.sym("changes", len(weights), _SIGNS)
+        energies, some = energy_terms(model, stored=True), ca.SX.sym("changes", len(weights), _SIGNS)
         arguments = list(model.arguments.values())
         changes = ca.jtimes(energies(*arguments), model.arguments["x"], some)
         return ca.Function("changes", [*arguments, some], [ca.densify(ca.sqrt(ca.sum2(changes**2) / _SIGNS))])
 
-    function = model.once(Cached.ENERGY_CHANGES, make)
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(weights), _SIGNS))
-    changed = function(point.t, point.x, point.z, model.p, model.u, point.d, weights[:, None] * signs)
-    changes = np.array(changed).ravel()
+    signs = model.once(Cached.SIGNS, lambda: np.random.default_rng(0).choice([-1.0, 1.0], (len(weights), _SIGNS)))
+    along = (weights[:, None] * signs).ravel("F")
+    function = model.fast(Cached.ENERGY_CHANGES, make)
+    (changes,) = function(point.t, point.x, point.z, model.p, model.u, point.d, along)
     return np.where(np.isfinite(changes), changes, math.inf)
-
-
-def _energies(model: CompiledDae) -> ca.Function:
-    arguments = list(model.arguments.values())
-    terms = model.energy(*arguments)
-    return ca.Function("energies", arguments, [ca.densify(ca.vertcat(terms[:, 0], terms[:, POWERS]))])

@@ -49,8 +49,6 @@ _MORE, _LEAST, _DEEPEST, _DEEPEST_READ = 4, 4, 12, 24
 off dense output, which costs little, and may show a start of nanoseconds between results that are hours apart."""
 _SHORTEST = 1e-13
 """Length of an interval, relative to the time, in which more results would differ in the last digits of time only."""
-COARSE = _DEEPEST_READ + 1
-"""Depth at which results are taken as they are."""
 _FINEST_RESULTS, _FOR_EACH = 100_000, 100
 """Finer results off dense output in all, and for each result: what is no number, or noise, never becomes fine."""
 _FAILURES = 20
@@ -96,8 +94,14 @@ class Results:
         return Point(float(self.times[k]), self.x[:, k].copy(), self.z[:, k].copy(), self.d[:, k].copy())
 
 
-def results(model: CompiledDae, segments: Sequence[Segment]) -> Iterator[Results]:
-    """Yield a run in pieces of bounded size; pieces of a long segment share a result."""
+def results(model: CompiledDae, segments: Sequence[Segment], *, stored: bool = False) -> Iterator[Results]:
+    """Yield a run in pieces of bounded size; pieces of a long segment share a result.
+
+    Args:
+        model: the compiled model.
+        segments: smooth pieces of its run.
+        stored: only stored energies and their rates are asked for, instead of all terms.
+    """
     held: list[Segment] = []
     count, most = 0, min(_PIECE, max(_LARGEST // (6 * max(len(model.components), 1)), 100))
     for segment in segments:
@@ -106,13 +110,13 @@ def results(model: CompiledDae, segments: Sequence[Segment]) -> Iterator[Results
             held.append(Segment(segment.times[part], segment.x[:, part], segment.z[:, part], segment.d))
             count += len(held[-1].times)
             if count > most:
-                yield _together(model, held)
+                yield _together(model, held, stored=stored)
                 held, count = [], 0
     if held:
-        yield _together(model, held)
+        yield _together(model, held, stored=stored)
 
 
-def _together(model: CompiledDae, segments: list[Segment]) -> Results:
+def _together(model: CompiledDae, segments: list[Segment], *, stored: bool) -> Results:
     sizes = np.array([len(segment.times) for segment in segments])
     ends = sizes.cumsum()
     count, nx = int(ends[-1]), len(segments[0].x)
@@ -125,7 +129,7 @@ def _together(model: CompiledDae, segments: list[Segment]) -> Results:
     whole[1::2, count:] *= 1.0 + _DIGITS * _SIGNS
     whole[2::2, count:] *= 1.0 - _DIGITS * _SIGNS
     d = np.array([segment.d for segment in segments]).T[:, np.append(owner, owner[some])]
-    function = model.along(Cached.TERMS, lambda: _terms(model))
+    function = model.along((Cached.TERMS, stored), lambda: energy_terms(model, stored=stored))
     columns = function(whole[0], whole[1 : 1 + nx], whole[1 + nx :], model.p, model.u, d)[0]
     columns, whole = columns.reshape(-1, len(model.components), count + 3), whole[:, :count]
     terms, first, last = columns[..., :count], (ends - sizes)[owner], (ends - 1)[owner]
@@ -133,9 +137,30 @@ def _together(model: CompiledDae, segments: list[Segment]) -> Results:
     return Results(whole[0], whole[1 : 1 + nx], whole[1 + nx :], d[:, :count], first, last, terms, shaken)
 
 
-def _terms(model: CompiledDae) -> ca.Function:
+def energy_terms(model: CompiledDae, *, stored: bool) -> ca.Function:
+    """Return the energy terms of all components, or only stored energies and their rates, as a function."""
     arguments = list(model.arguments.values())
-    return ca.Function("terms", arguments, [ca.densify(ca.vec(model.energy(*arguments)))], {"cse": True})
+    terms = model.energy(*arguments)
+    wanted = terms[:, [0, POWERS]] if stored else terms
+    return ca.Function("terms", arguments, [ca.densify(ca.vec(wanted))], {"cse": True})
+
+
+def drifts_of_results(model: CompiledDae, segments: Sequence[Segment]) -> tuple[Vector, float]:
+    """Return changes of stored energies minus integrals of their rates, from results as they are.
+
+    Returns:
+        In J, of each component, shape (components,); and how much energy the components store and exchange with their
+        stores, in J.
+    """
+    total, moved = np.zeros(len(model.components)), _NOTHING
+    for some in results(model, segments, stored=True):
+        steps, (stored, rates) = some.times[1:] - some.times[:-1], some.terms
+        kept, (_, places, weights) = _laid(some, steps)
+        moved = max(moved, *_moving(stored, rates, steps))
+        numbers = np.arange(len(some.times))
+        total += stored[:, numbers == some.last].sum(axis=1) - stored[:, numbers == some.first].sum(axis=1)
+        total -= _summed(rates, kept[places], weights[:, 0])
+    return total, moved
 
 
 class Powers:
@@ -170,15 +195,13 @@ class Powers:
         Where these are too coarse, finer ones are computed between them, if needed repeatedly.
         """
         steps = every.times[1:] - every.times[:-1]
-        kept = _apart(every, steps)
-        first, last = (kept.searchsorted(ends[kept]) for ends in (every.first, every.last))
-        intervals, places, weights = rules(every.times[kept], first, last)
-        first, last = first[intervals], last[intervals]
+        kept, (intervals, places, weights) = _laid(every, steps)
+        first, last = (kept.searchsorted(ends[kept])[intervals] for ends in (every.first, every.last))
         ends, places = kept[np.array([intervals, intervals + 1])], kept[places]
         powers = every.terms[1 : 1 + POWERS].reshape(-1, len(every.times))
-        self._move(every.terms[0], powers, steps)
-        if depth == COARSE:
-            return _summed(powers, places, weights[:, 0]).reshape(POWERS, -1)
+        stored, moved = _moving(every.terms[0], powers, steps)
+        self.stored = max(self.stored, stored)
+        self.moved = max(self.moved, self.stored, moved)
         if not depth:
             self._hear(every)
         bent, bends = intervals[:0], np.zeros((2, len(powers), 0))
@@ -255,15 +278,6 @@ class Powers:
         """Accepted error of an interval in J."""
         return _ASTRAY * self.options.rtol * max(self.moved, self.cancelled)
 
-    def _move(self, stored: Vector, powers: Vector, steps: Vector) -> None:
-        """Update the energies that results store and exchange."""
-        self.stored = max(self.stored, float(np.abs(stored).sum(axis=0).max()))
-        # After a sudden start, the power of a single result would fill an interval in which it decays at once.
-        sizes = np.abs(powers)
-        least = (np.minimum(sizes[:, :-1], sizes[:, 1:]) @ steps).max(initial=0.0)
-        most = 0.0 if least else (sizes[:, 1:] @ steps).max(initial=0.0)
-        self.moved = max(self.moved, self.stored, float(least), float(most))
-
     def _hear(self, every: Results) -> None:
         """Estimate the rounding of stored energies in J and of powers in W."""
         changes = every.shaken[0].sum(axis=0).max(), every.shaken[1:].sum(axis=(0, 1)).max()
@@ -307,6 +321,21 @@ class Powers:
         return ~(
             (errors <= np.maximum(self._share * allowed, noise)) & (change <= np.maximum(_ASTRAY * allowed, noise))
         )
+
+
+def _laid(every: Results, gaps: Vector) -> tuple[Places, tuple[Places, Places, Vector]]:
+    """Return the results that are not too close to others, and the rules over them."""
+    kept = _apart(every, gaps)
+    return kept, rules(every.times[kept], *(kept.searchsorted(ends[kept]) for ends in (every.first, every.last)))
+
+
+def _moving(stored: Vector, powers: Vector, steps: Vector) -> tuple[float, float]:
+    """Return the largest energy that all components store at one time, and that which one of them exchanges, in J."""
+    # After a sudden start, the power of a single result would fill an interval in which it decays at once.
+    sizes = np.abs(powers)
+    least = (np.minimum(sizes[:, :-1], sizes[:, 1:]) @ steps).max(initial=0.0)
+    most = 0.0 if least else (sizes[:, 1:] @ steps).max(initial=0.0)
+    return float(np.abs(stored).sum(axis=0).max()), max(float(least), float(most))
 
 
 def _summed(powers: Vector, places: Places, weights: Vector) -> Vector:

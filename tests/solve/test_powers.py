@@ -12,7 +12,7 @@ import pytest
 from modelica_like.errors import StepFailed
 from modelica_like.options import Options
 from modelica_like.runs import powers
-from modelica_like.runs.powers import _BESIDE, Powers, Results, _mixing, _together
+from modelica_like.runs.powers import _BESIDE, Powers, Results, _mixing, _moving, _together
 from modelica_like.solve.idas import Grid
 from modelica_like.solve.initialize import Point
 from modelica_like.solve.recorder import Segment
@@ -54,7 +54,7 @@ def test_results_of_several_pieces_with_their_energies() -> None:
         return [np.concatenate([(k + 1) * (t + x[:1] * z[:1] + d[:1]) for k in range(12)])]
 
     model: Any = SimpleNamespace(components=["a", "b"], p="p", u="u", along=lambda *_: energies)
-    found = _together(model, segments)
+    found = _together(model, segments, stored=False)
     t, x, z = (np.concatenate([getattr(one, name) for one in segments], axis=-1) for name in ("times", "x", "z"))
     d = np.concatenate([np.tile(one.d[:, None], n) for one, n in zip(segments, sizes, strict=True)], axis=1)
     for mine, theirs in ((found.times, t), (found.x, x), (found.z, z), (found.d, d)):
@@ -156,26 +156,16 @@ def test_a_stretch_that_fails_is_halved(bad: list[int], calls: int) -> None:
 
 def test_what_is_stored_and_moved() -> None:
     """The largest sum of stored energies; of each power the smaller end of each interval, for its time."""
-    work = bare(stored=0.0, moved=0.0)
     stored = np.array([[1.0, -3.0, 2.0], [0.5, 1.0, -1.5]])
     steps = np.array([2.0, 4.0])
-    quiet = np.zeros((3, 3))
-    work._move(stored, quiet, steps)
-    assert (work.stored, work.moved) == (4.0, 4.0)
-    work._move(0.1 * stored, np.array([[1.0, -2.0, 3.0], [1.5, 0.0, 9.0]]), steps)
-    assert (work.stored, work.moved) == (4.0, 1.0 * 2 + 2.0 * 4)
-    work._move(stored, 0.1 * np.array([[1.0, -2.0, 3.0], [1.5, 0.0, 9.0]]), steps)
-    assert work.moved == 10.0
+    assert _moving(stored, np.zeros((3, 3)), steps) == (4.0, 0.0)
+    powers = np.array([[1.0, -2.0, 3.0], [1.5, 0.0, 9.0]])
+    assert _moving(0.1 * stored, powers, steps) == (0.4, 1.0 * 2 + 2.0 * 4)
     # Where one of both ends is always zero, the power behind each interval has to do.
-    work._move(stored, np.array([[9.0, 0.0, -5.0], [0.0, 7.0, 0.0]]), steps)
-    assert (work.stored, work.moved) == (4.0, 20.0)
-    little = bare(stored=0.0, moved=0.0)
-    little._move(1e-6 * stored, 1e-6 * np.array([[1.0, -2.0, 3.0]]), steps)
-    assert little.moved == pytest.approx(1e-6 * (1.0 * 2 + 2.0 * 4))
-    work._move(stored[:, :1], np.ones((3, 1)), steps[:0])
-    assert work.moved == 20.0
-    work._move(stored[:, :1], np.array([[0.0, -3.0, 0.0, 5.0]]), np.array([4.0, 4.0, 2.0]))
-    assert work.moved == 3.0 * 4 + 5.0 * 2
+    assert _moving(stored, np.array([[9.0, 0.0, -5.0], [0.0, 7.0, 0.0]]), steps) == (4.0, 20.0)
+    assert _moving(1e-6 * stored, 1e-6 * powers[:1], steps)[1] == pytest.approx(1e-6 * (1.0 * 2 + 2.0 * 4))
+    assert _moving(stored[:, :1], np.ones((3, 1)), steps[:0]) == (1.5, 0.0)
+    assert _moving(stored[:, :1], np.array([[0.0, -3.0, 0.0, 5.0]]), np.array([4.0, 4.0, 2.0]))[1] == 3.0 * 4 + 5.0 * 2
 
 
 def test_the_largest_rounding_counts() -> None:

@@ -121,7 +121,7 @@ def test_pieces_have_a_bounded_size(
     monkeypatch: pytest.MonkeyPatch, components: int, sizes: list[int], told: list[list[int]]
 ) -> None:
     """20000 results, or 10 million numbers in the six energies of all components; a cut segment shares a result."""
-    monkeypatch.setattr("modelica_like.runs.powers._together", lambda _, held: [one.times for one in held])
+    monkeypatch.setattr("modelica_like.runs.powers._together", lambda _, held, **_kind: [one.times for one in held])
     model: Any = SimpleNamespace(components=range(components))
     segments = [
         Segment(10 * k + np.linspace(0, 1, size), np.zeros((1, size)), np.zeros((0, size)), np.zeros(0))
