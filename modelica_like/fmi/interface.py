@@ -308,7 +308,7 @@ class _Starts:
         number = self._of_variable.get(k)
         if number is None:
             return {"initial": "calculated"}
-        exact = number in self._rows or self.model.starts.entries[number].strength != "guess"
+        exact = number in self._rows or self.model.starts.entries[number].strength == "fixed"
         exact = exact and self.tables.steady is None
         start = float(self._values[number])
         return {"initial": "exact" if exact else "approx", "start": start, "start_entry": number}

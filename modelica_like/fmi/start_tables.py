@@ -8,7 +8,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.solve.initialize import Point, StartPlan, call, start_plan
-from modelica_like.solve.initialize.plan import is_near, start_name
+from modelica_like.solve.initialize.plan import is_near, near_states, start_name
 from modelica_like.solve.initialize.steady import moving_states
 
 AT_REST = -1
@@ -20,8 +20,8 @@ class StartTables:
 
     Attributes:
         direct: (state, start value, factor) of states that are given.
-        defaults: the same for defaults of states; only the steady start uses them.
-        x_guesses: (state, start value, factor) of guesses.
+        defaults: the same for defaults of states; the steady start keeps them where nothing depends on the state.
+        x_guesses: (state, start value, factor) of guesses; a default is one where equations determine the state.
         z_guesses: (implicit unknown, start value, factor) of guesses.
         rows: (start value, variable, row of the start system) of all equations between the unknowns; of explicit and
             implicit ones, and of variables at rest, the start value is `AT_REST`.
@@ -55,10 +55,8 @@ def start_tables(model: CompiledDae, plan: StartPlan | None = None) -> StartTabl
     row_of = {node: count + k for k, node in enumerate(plan.system.nodes)}
 
     def of_states(strength: str) -> tuple[tuple[int, int, float], ...]:
-        chosen = [
-            (e.state, k) for k, e in enumerate(model.starts.entries) if e.strength == strength and e.state is not None
-        ]
-        return tuple((state[0], k, state[1]) for state, k in chosen)
+        chosen = ((e, k) for k, e in enumerate(model.starts.entries) if e.strength == strength)
+        return tuple((e.state[0], k, e.state[1]) for e, k in chosen if e.state is not None)
 
     def as_rows(numbers: tuple[int, ...]) -> list[tuple[int, int, int]]:
         return [(k, model.starts.entries[k].node, row_of[model.starts.entries[k].node]) for k in numbers]
@@ -69,7 +67,7 @@ def start_tables(model: CompiledDae, plan: StartPlan | None = None) -> StartTabl
     return StartTables(
         direct=of_states("fixed"),
         defaults=of_states("default"),
-        x_guesses=of_states("guess"),
+        x_guesses=tuple((e.state[0], k, e.state[1]) for k, e in near_states(model) if e.state is not None),
         z_guesses=tuple((position, k, 1.0) for position, k in near if position is not None),
         rows=(*((AT_REST, 0, row) for row in plan.wanted[: plan.own]), *as_rows(plan.rows), *resting),
         dependent=tuple(as_rows(plan.dependent)),
@@ -85,7 +83,8 @@ def _plan(model: CompiledDae) -> StartPlan:
         if point.d[hold.mode] == hold.number and hold.loose >= 0:
             point.d[hold.mode] = hold.loose
     values = call(model, model.starts.values, point)
-    for k, entry in reversed([*enumerate(model.starts.entries)]):  # of several for one state, the first counts
-        if entry.strength == "fixed" and entry.state is not None:
+    fixed = [(k, e) for k, e in enumerate(model.starts.entries) if e.strength == "fixed"]
+    for k, entry in (*near_states(model), *reversed(fixed)):  # of several fixed ones for one state, the first counts
+        if entry.state is not None:
             point.x[entry.state[0]] = values[k] / entry.state[1]
     return start_plan(model, model.settings.get("start", "given"), point)

@@ -301,7 +301,8 @@ def var(
         description: one phrase.
         state: preference as a state: `always`, `prefer`, `default` or `avoid`.
         guess: first guess of its start value, SI.
-        default: start value if nothing else determines it, e.g. 0 for the angle of a prescribed speed.
+        default: start value if nothing else determines it, e.g. 0 for the angle of a prescribed speed, otherwise a
+            first guess.
         min: smallest sensible value, SI.
         max: largest sensible value, SI.
         nominal: order of magnitude, SI.

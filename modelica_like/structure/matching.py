@@ -94,18 +94,23 @@ class Elimination:
         """Column that the row accepted last determines."""
         return self._rows[-1][0]
 
-    def add(self, row: Mapping[int, float]) -> bool:
-        """Add a row, entries by columns; False if it depends on the rows so far."""
-        left = self._left(row)
+    def add(self, row: Mapping[int, float], first: int = 0) -> bool:
+        """Add a row, entries by columns; False if it depends on the rows so far.
+
+        Args:
+            row: the entries.
+            first: the row determines a column from this one on, if it can.
+        """
+        left = self.left(row)
         if not left:
             return False
-        pivot = max(left, key=lambda column: abs(left[column]))
+        pivot = max(left, key=lambda column: (column >= first, abs(left[column])))
         self._row_of[pivot] = len(self._rows)
         self._rows.append((pivot, left))
         return True
 
-    def _left(self, row: Mapping[int, float]) -> dict[int, float]:
-        """What is left of a row in the columns that have no row; nothing if it depends on the rows so far."""
+    def left(self, row: Mapping[int, float]) -> dict[int, float]:
+        """Return what is left of a row in the columns that have no row; nothing if it depends on the rows so far."""
         values = dict(row)
         sizes = {column: abs(value) for column, value in values.items()}
         pending = [self._row_of[column] for column in values if column in self._row_of]
@@ -127,4 +132,4 @@ class Elimination:
 
     def undetermined(self) -> list[int]:
         """Columns that another choice of pivots could leave open, in order: giving their value would be new."""
-        return [column for column in range(self.columns) if self._left({column: 1.0})]
+        return [column for column in range(self.columns) if self.left({column: 1.0})]

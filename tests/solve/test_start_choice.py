@@ -22,6 +22,7 @@ from modelica_like.solve.initialize.plan import (
     _to_give,
     direct_starts,
     is_near,
+    near_states,
     start_plan,
 )
 from modelica_like.solve.initialize.point import Point
@@ -187,11 +188,11 @@ def test_numbers_decide_where_structure_chose_dependent_rows(
     made: list[str] = []
     model: Any = SimpleNamespace(once=lambda key, make: make() if key == (Cached.START_PLAN, "rest") else None)
     point: Any = SimpleNamespace()
-    matrix = object() if generic else None
+    matrix, moving = object() if generic else None, object()
 
     class Choice:
         def __init__(self, *given: Any) -> None:
-            assert given == (model, "rest")
+            assert given == (model, "rest", moving)[: 3 if made else 2]
 
         def plan(self, given: Any) -> Any:
             assert given in (None, matrix)
@@ -202,7 +203,12 @@ def test_numbers_decide_where_structure_chose_dependent_rows(
     monkeypatch.setattr(
         module, "_is_regular", lambda *given: regular and (given[0], given[1].name, given[2]) == (model, made[0], point)
     )
-    monkeypatch.setattr(module, "_generic_matrix", lambda *given: matrix if given == (model, "system", point) else None)
+
+    def generic_matrix(*given: Any, **how: bool) -> Any:
+        assert given == (model, "system", point)
+        return moving if how == {"moving": True} else matrix
+
+    monkeypatch.setattr(module, "_generic_matrix", generic_matrix)
     assert getattr(start_plan(model, "rest", point), "name") == plans[-1]  # noqa: B009
     assert made == plans
 
@@ -246,10 +252,13 @@ def test_a_matrix_found_regular_is_not_looked_at_again(monkeypatch: pytest.Monke
 @pytest.mark.parametrize("strength", ["fixed", "guess", "default"])
 @pytest.mark.parametrize("state", [None, (0, 1.0)])
 @pytest.mark.parametrize("guess", [0.0, 2.0])
-def test_first_guesses_of_what_is_no_state(strength: str, state: Any, guess: float) -> None:
-    model: Any = SimpleNamespace(flat_variables=[None, SimpleNamespace(guess=guess)])
-    near = {"fixed": True, "guess": True, "default": not guess}[strength]
-    assert is_near(model, StartEntry(1, state, strength)) == (near and state is None)
+def test_where_the_search_for_a_variable_begins(strength: str, state: Any, guess: float) -> None:
+    entry = StartEntry(1, state, strength)
+    starts = SimpleNamespace(entries=[entry])
+    model: Any = SimpleNamespace(flat_variables=[None, SimpleNamespace(guess=guess)], starts=starts)
+    near = {"fixed": state is None, "guess": True, "default": not guess}[strength]
+    assert is_near(model, entry) == near
+    assert near_states(model) == ([(0, entry)] if near and state is not None else [])
 
 
 def test_what_can_get_a_start_value() -> None:

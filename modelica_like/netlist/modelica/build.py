@@ -186,11 +186,12 @@ class _Builder:
 
     def _parameter(self, name: str, member: Member, basic: Basic) -> None:
         given = member.given
-        if given.value is None and "start" in given.inner and given.inner["start"].value is not None:
-            given = given.inner["start"]
-            self.notes.tell(f"{f'{self.instance.path}.{name}'.lstrip('.')} has no value; its start value is taken.")
+        begins = given.value is None and "start" in given.inner and given.inner["start"].value is not None
+        given = given.inner["start"] if begins else given
         low, high = (self._number(basic.given.inner.get(limit)) for limit in ("min", "max"))
         fixed = self._known(basic.given.inner.get("fixed")) is not False
+        if begins and fixed:
+            self.notes.tell(f"{f'{self.instance.path}.{name}'.lstrip('.')} has no value; its start value is taken.")
         outside = given.scope is not None and given.scope[0] is not self.instance
         formula = None if given.value is None or given.scope is None else Resolver(*given.scope)(given.value)
         # What depends on a parameter of the initial equations is another one, by an equation of its own.
@@ -207,7 +208,8 @@ class _Builder:
         declare(self.component, name, parameter)
         if given.value is not None and outside:
             demand_determined(f"{self.instance.path}.{name}".lstrip("."), given)
-            self.component.give(name, self._value(given, self.instance.owner, ""))
+            value = self._value(given, self.instance.owner, "")
+            self.component.give(name, value if fixed or not begins else guess(value))
 
     def _value(self, given: Given, reader: Instance | None, prefix: str) -> Any:
         """Return a value as a number or a formula, read among the names of `reader`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -103,7 +103,7 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
     if plan.columns and not _is_regular(model, plan, point):
         matrix = _generic_matrix(model, plan.system, point)
         if matrix is not None:
-            return _Choice(model, kind).plan(matrix)
+            return _Choice(model, kind, _generic_matrix(model, plan.system, point, moving=True)).plan(matrix)
     return plan
 
 
@@ -160,10 +160,11 @@ def _regular(matrix: Any, entries: Vector) -> bool:
     return bool(factor.max() < _WELL_CONDITIONED * factor.min())
 
 
-def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> Any:
+def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point, *, moving: bool = False) -> Any:
     """Jacobian of the start system at a generic point nearby, None if it is not finite.
 
-    Where the start is from rest, nothing moves there: speeds that are zero do not determine positions.
+    Where the start is from rest, nothing moves there: speeds that are zero do not determine positions. With `moving`,
+    states move that do so at the point: those of which a start value says so.
     """
     moved, ends = point.copy(), np.cumsum([len(point.x), len(point.z)])
     of_x, of_z, y = np.split(spread(0.5, 1.0, ends[-1] + system.function.size1_out(0)), ends)
@@ -171,7 +172,8 @@ def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> An
         part += 0.1 * (1.0 + np.abs(part)) * by
     for k in system.rates:
         part, place = (moved.x, k) if k < len(moved.x) else (y, k - len(moved.x))
-        part[place] = 0.0
+        if not (moving and part is moved.x and point.x[place]):
+            part[place] = 0.0
     matrix, _ = matrix_and_values(model, system, moved, y)
     return matrix if np.all(np.isfinite(matrix.nonzeros())) else None
 
@@ -188,7 +190,7 @@ def direct_starts(model: CompiledDae) -> dict[int, int]:
 class _Choice:
     """Start values are taken as long as they add information: fixed ones, defaults, zeros."""
 
-    def __init__(self, model: CompiledDae, kind: StartKind) -> None:
+    def __init__(self, model: CompiledDae, kind: StartKind, moving: Any = None) -> None:
         self.model = model
         self.kind: StartKind = kind
         self.system = model.rest_system if kind == "rest" else model.start_system
@@ -199,6 +201,7 @@ class _Choice:
         self.place = {column: k for k, column in enumerate(self.columns)}
         self.own = ny + nz
         self.row_of = {node: self.own + k for k, node in enumerate(self.system.nodes)}
+        self.moving = None if moving is None else self._by_rows(moving)
 
     def plan(self, matrix: Any, still: Sequence[int] = ()) -> StartPlan:
         """Choose by structure, or by the numbers of a Jacobian.
@@ -215,7 +218,8 @@ class _Choice:
         implicit = self._begin(matrix, still)
         kept = self._keep(len(implicit) < self.own)
         by_modes = [] if still else self._at_rest_by_modes()
-        rows = [k for k in general if self._accept(self.model.starts.entries[k].node)]
+        moving = self._moving(own, general)
+        rows = [k for k in general if self._accept(self.model.starts.entries[k].node, moving.get(k))]
         taken = set(rows)
         dependent = [k for k in general if k not in taken]
         # What nothing else determines starts at its guess rather than at rest.
@@ -251,12 +255,7 @@ class _Choice:
 
     def _begin(self, matrix: Any, still: Sequence[int]) -> list[int]:
         """Start with the explicit equations, which determine y, and the implicit ones, which determine z."""
-        pattern = self.system.function.sparsity_out(1)
-        numbers = [1.0] * pattern.nnz() if matrix is None else matrix.nonzeros()
-        self.entries: list[dict[int, float]] = [{} for _ in range(pattern.size1())]
-        for row, column, number in zip(*pattern.get_triplet(), numbers, strict=True):
-            if column in self.place:
-                self.entries[row][self.place[column]] = number
+        self.entries = self._by_rows(matrix)
         self.choice: Matching | Elimination = (Matching if matrix is None else Elimination)(len(self.columns))
         if matrix is None:  # each has its own unknown, whatever structure solves it
             for row in range(self.own):
@@ -265,13 +264,33 @@ class _Choice:
             self.choice.add({self.place[state]: 1.0})
         return [row for row in range(self.own) if self.choice.add(self.entries[row])]
 
+    def _by_rows(self, matrix: Any) -> list[dict[int, float]]:
+        """Return the rows of a Jacobian by free columns; None has a one wherever there may be an entry."""
+        pattern = self.system.function.sparsity_out(1)
+        numbers = [1.0] * pattern.nnz() if matrix is None else matrix.nonzeros()
+        rows: list[dict[int, float]] = [{} for _ in range(pattern.size1())]
+        for row, column, number in zip(*pattern.get_triplet(), numbers, strict=True):
+            if column in self.place:
+                rows[row][self.place[column]] = number
+        return rows
+
     def _keep(self, some: bool) -> list[int]:
         """Implicit unknowns that keep their values."""
         implicit = self.columns[len(self.columns) - len(self.model.implicit) :] if some else []
         return [column for column in implicit if self.choice.add({self.place[column]: 1.0})]
 
-    def _accept(self, node: int) -> bool:
-        return self.choice.add(self.entries[self.row_of[node]])
+    def _accept(self, node: int, moving: Mapping[int, float] | None = None) -> bool:
+        return self.choice.add(moving or self.entries[self.row_of[node]])
+
+    def _moving(self, own: Sequence[int], general: Sequence[int]) -> dict[int, dict[int, float]]:
+        """Rows of what says nothing at rest, and something where speeds are not zero: an equation for an energy."""
+        if self.moving is None or isinstance(self.choice, Matching):
+            return {}
+        rows = {k: self.row_of[self.model.starts.entries[k].node] for k in general}
+        alone = Elimination(len(self.columns))
+        for row in own:
+            alone.add(self.moving[row], len(self.free))
+        return {k: alone.left(self.moving[row]) for k, row in rows.items() if not self.choice.left(self.entries[row])}
 
     def _defaults(self) -> list[int]:
         """Defaults in an order that does not depend on the order of lines."""
@@ -322,6 +341,14 @@ def start_name(model: CompiledDae, entry: StartEntry) -> str:
     return model.flat_variables[entry.node].path
 
 
+def near_states(model: CompiledDae) -> list[tuple[int, StartEntry]]:
+    """Return the start values at which the search for states begins, with their numbers; of several the last counts."""
+    near = ((k, e) for k, e in enumerate(model.starts.entries) if e.state is not None and is_near(model, e))
+    return sorted(near, key=lambda one: one[1].strength == "guess")
+
+
 def is_near(model: CompiledDae, entry: StartEntry) -> bool:
-    """Whether a start value is the first guess of a variable that is no state; a default, if there is no guess."""
-    return entry.state is None and (entry.strength != "default" or not model.flat_variables[entry.node].guess)
+    """Whether the search for a variable begins at a start value; at a default, if its class has no guess."""
+    if entry.strength == "default":
+        return not model.flat_variables[entry.node].guess
+    return entry.strength == "guess" or entry.state is None
