@@ -9,7 +9,8 @@ from typing import Any, cast
 import numpy as np
 
 from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.language import Assembly, Component, Input
+from modelica_like.language import Assembly, Component, Input, signal_out
+from modelica_like.language.assembly import declare
 from modelica_like.language.inside import inside
 from modelica_like.language.units import ANY, parse_unit, to_si
 from modelica_like.netlist.convert import as_assembly
@@ -126,16 +127,19 @@ def _drive(drive: Assembly, path: str, rows: list[list[float]]) -> None:
     """Connect an input with a table over time; an exposed one inside."""
     inner = dict(drive.exposed).get(path, path)
     owner, _, name = inner.rpartition(".")
-    if not owner or any(inner in ends or path in ends for ends in drive.wires.values()):
+    part = drive.find(owner)
+    own = not owner and path in inside(drive).own_fields  # its equations use it: a signal takes its place
+    if not (owner or own) or any(inner in ends or path in ends for ends in drive.wires.values()):
         raise LanguageError(
             f"The input '{path}' is connected already.", advice="Inputs over time are for open inputs of parts."
         )
-    part = drive.find(owner)
     inside(part).values.pop(name, None)  # the trajectory replaces the value
-    unit = part.fields[name].unit
+    field, unit = part.fields[name], part.fields[name].unit
     scale = 1.0 if unit == ANY or str(unit) == "1" else f"1 {unit}"
     label = f"{inner}_over_time".translate(str.maketrans(".[", "__", "]"))
     setattr(drive, label, find_type("Table")(table=rows, scale=scale))
     inside(drive).exposed = tuple(pair for pair in drive.exposed if pair[0] != path)
     inside(drive).own_fields = {key: field for key, field in inside(drive).own_fields.items() if key != path}
+    if own:
+        declare(drive, name, signal_out(field.unit_text, field.description))
     inside(drive).wires = {**drive.wires, label: (f"{label}.y", inner)}

@@ -60,6 +60,11 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model(f"{R}.Inertia a(w(displayUnit = true));"),
         f"a.w.displayUnit is a String, and true is none.\n  in a.mo:3 `{R}.Inertia a(w(displayUnit = true));`",
     ),
+    "a start of an input that changes": (
+        model("Real x = 1; Modelica.Blocks.Interfaces.RealInput u(start = x);"),
+        "A start value of u that only a run knows: that is not supported here.\n"
+        "  in a.mo:3 `Real x = 1; Modelica.Blocks.Interfaces.RealInput u(start = x);`",
+    ),
     "a displayUnit that is a variable": (
         model(f"Real x = 1; {R}.Inertia a(w(displayUnit = x));"),
         "A displayUnit of a.w that is no text: that is not supported here.\n"

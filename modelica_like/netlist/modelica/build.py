@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 from modelica_like.errors import (
     ModelicaLikeError,
     ModelicaTextError,
     Source,
-    UnitError,
     UnknownName,
     did_you_mean,
     raise_together_or_one,
@@ -32,7 +30,6 @@ from modelica_like.language import (
 from modelica_like.language.assembly import declare, end_at
 from modelica_like.language.fields import Discrete, Field, Input
 from modelica_like.language.inside import inside
-from modelica_like.language.units import parse_unit, same_dimension
 from modelica_like.netlist.modelica.attributes import check_attributes, check_declared
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
@@ -42,21 +39,9 @@ from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.statements import Statements
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside
+from modelica_like.netlist.modelica.values import Notes, known, nominal_of, number_of, shown_unit, unit_of
 from modelica_like.netlist.modelica.wiring import Wire, groups
 from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConnector, as_formula, written_class
-
-
-@dataclass
-class Notes:
-    """What a reader should know: values that were taken, units that were left out."""
-
-    told: list[str] = field(default_factory=list)
-    display: dict[str, str] = field(default_factory=dict)
-
-    def tell(self, sentence: str) -> None:
-        """Keep a sentence, once."""
-        if sentence not in self.told:
-            self.told.append(sentence)
 
 
 def build_component(instance: Instance, notes: Notes) -> Written:
@@ -92,7 +77,7 @@ class _Builder:
         self.component = component
         self.wires = groups(self.statements.connections, self.instance)
         for name, bound in self.statements.bound.items():
-            declare(component, name, signal_out(self.unit(bound.basic), f"value of {bound.end}"))
+            declare(component, name, signal_out(unit_of(bound.basic, self.notes), f"value of {bound.end}"))
             self.wires.append(Wire([name, bound.end], bound.source))
         for name, member in self.instance.members.items():
             place = member.text.place(member.declaration.line)
@@ -188,8 +173,8 @@ class _Builder:
         given = member.given
         begins = given.value is None and "start" in given.inner and given.inner["start"].value is not None
         given = given.inner["start"] if begins else given
-        low, high = (self._number(basic.given.inner.get(limit)) for limit in ("min", "max"))
-        fixed = self._known(basic.given.inner.get("fixed")) is not False
+        low, high = (number_of(basic.given.inner.get(limit)) for limit in ("min", "max"))
+        fixed = known(basic.given.inner.get("fixed")) is not False
         if begins and fixed:
             self.notes.tell(f"{f'{self.instance.path}.{name}'.lstrip('.')} has no value; its start value is taken.")
         outside = given.scope is not None and given.scope[0] is not self.instance
@@ -197,14 +182,14 @@ class _Builder:
         # What depends on a parameter of the initial equations is another one, by an equation of its own.
         follows = fixed and not outside and formula is not None and bool(undetermined(self.instance, formula))
         parameter = param(
-            self.unit(basic), member.declaration.description, min=low, max=high, fixed=fixed and not follows
+            unit_of(basic, self.notes), member.declaration.description, min=low, max=high, fixed=fixed and not follows
         )
         if follows and formula is not None:
             place = member.text.place(member.declaration.line)
             self.statements.initial.append((Expr("name", ((name, ()),)), formula, place))
         elif given.value is not None and not outside:
             parameter.default = self._value(given, self.instance, "")
-        parameter.nominal = self.nominal(basic)
+        parameter.nominal = nominal_of(basic)
         declare(self.component, name, parameter)
         if given.value is not None and outside:
             demand_determined(f"{self.instance.path}.{name}".lstrip("."), given)
@@ -241,38 +226,41 @@ class _Builder:
         elif basic.kind == "Integer" and not signal:
             declared = integer(description)
         elif path in self.statements.assigned or "discrete" in basic.prefixes:
-            declared = discrete(self.unit(basic), description, start=0.0)
+            declared = discrete(unit_of(basic, self.notes), description, start=0.0)
         elif "input" in basic.prefixes and signal:
-            declared = signal_in(self.unit(basic), description)
+            declared = signal_in(unit_of(basic, self.notes), description)
         elif "output" in basic.prefixes and signal:
-            declared = signal_out(self.unit(basic), description)
+            declared = signal_out(unit_of(basic, self.notes), description)
         else:
-            select: Any = _STATE_SELECT.get(self._known(basic.given.inner.get("stateSelect")), "default")
-            declared = var(self.unit(basic), description, state=select)
-        declared.nominal = self.nominal(basic)
+            select: Any = _STATE_SELECT.get(known(basic.given.inner.get("stateSelect")), "default")
+            declared = var(unit_of(basic, self.notes), description, state=select)
+        declared.nominal = nominal_of(basic)
         if path in self.statements.outputs:
             memory = boolean(description)
             declare(self.component, f"{path}{MEMORY}", memory)
             self._start(path, basic, memory)
         declare(self.component, path, declared)
-        self._display(path, basic)
+        shown = shown_unit(basic, self.notes)
+        if shown:
+            self.notes.display[f"{self.instance.path}.{path}".lstrip(".")] = shown
         self._start(path, basic, declared)
 
     def _start(self, path: str, basic: Basic, declared: Field) -> None:
         """Give the start value; it is fixed, or a first guess."""
         prefix = f"{self.instance.name}." if self.instance.owner is not None else ""
         given = basic.given.inner.get("start")
-        fixed = self._known(basic.given.inner.get("fixed")) is True
+        fixed = known(basic.given.inner.get("fixed")) is True
         if isinstance(declared, Discrete):
             before = self.statements.memory.get(path)
             start = (
-                self._known(given)
-                if before is None
-                else Resolver(self.instance, self.instance.text).known()(before).args[0]
+                known(given) if before is None else Resolver(self.instance, self.instance.text).known()(before).args[0]
             )
             declared.default = float(start) if isinstance(start, bool | int | float) else 0.0
             return
-        if isinstance(declared, Input) or basic.kind == "Boolean" or (given is None and not fixed):
+        if isinstance(declared, Input):
+            self._start_input(path, given, declared)
+            return
+        if basic.kind == "Boolean" or (given is None and not fixed):
             return
         outside = given is not None and given.scope is not None and given.scope[0] is not self.instance
         if given is not None:
@@ -291,39 +279,17 @@ class _Builder:
         elif value != 0.0:
             self.component.give(path, guess(value))
 
-    def _known(self, given: Given | None) -> Any:
-        if given is None or given.value is None or given.scope is None:
-            return None
+    def _start_input(self, path: str, given: Given | None, declared: Input) -> None:
+        """Give an input of the whole model its value for where it has no other."""
+        if self.instance.owner is not None or given is None or given.value is None or given.scope is None:
+            return
+        demand_determined(f"{path}.start", given)
         value = Resolver(*given.scope, numeric=True)(given.value)
-        return value.args[0] if value.args else None
-
-    def _number(self, given: Given | None) -> float | None:
-        value = self._known(given)
-        return value if isinstance(value, float) and abs(value) < 1e50 else None
-
-    def nominal(self, basic: Basic) -> float:
-        """Return the nominal value, or 1."""
-        value = self._known(basic.given.inner.get("nominal"))
-        return value if isinstance(value, float) else 1.0
-
-    def unit(self, basic: Basic) -> str:
-        """Return the unit; one that is not coherent is left out, because Modelica converts nothing."""
-        unit = self._known(basic.given.inner.get("unit"))
-        try:
-            read = parse_unit(str(unit or "1"))
-        except UnitError:
-            self.notes.tell(f"The unit '{unit}' is not known here and is left out.")
-            return "1"
-        if (read.factor, read.offset) == (1.0, 0.0):
-            return str(read)
-        self.notes.tell(f"The unit '{unit}' is left out: numbers of the text stay as they are.")
-        return "1"
-
-    def _display(self, path: str, basic: Basic) -> None:
-        unit = str(self._known(basic.given.inner.get("displayUnit")) or "")
-        with suppress(UnitError):  # it is only shown
-            if unit and same_dimension(parse_unit(unit), parse_unit(self.unit(basic))):
-                self.notes.display[f"{self.instance.path}.{path}".lstrip(".")] = unit
+        if value.kind not in ("number", "boolean"):
+            raise refused(f"a start value of {path} that only a run knows", given.scope[1], given.value.line)
+        declared.default = float(value.args[0])
+        if Resolver(*given.scope)(given.value) != value:
+            self.notes.tell(f"{path}.start is a number now: parameters that it depends on do not change it.")
 
     # -- equations and connections -----------------------------------------------------------------------------------
 
@@ -379,10 +345,9 @@ def _connector(instance: Instance) -> WrittenConnector:
         if basic is None or basic.kind != "Real" or member.declaration.dimensions:
             raise refused(f"{name} in a connector", member.text, member.declaration.line)
         check_attributes(name, basic, member.text)
-        builder = _Builder(instance, Notes())
-        unit = builder.unit(basic)
+        unit = unit_of(basic, Notes())
         quantity = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
-        quantity.owner, quantity.name, quantity.nominal = instance.text.name, name, builder.nominal(basic)
+        quantity.owner, quantity.name, quantity.nominal = instance.text.name, name, nominal_of(basic)
         quantity.check()
         inside(connector).own_fields = {**inside(connector).own_fields, name: quantity}
     connector.kind = instance.text.path

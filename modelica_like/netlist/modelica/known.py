@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from modelica_like.errors import Source, UnknownName, did_you_mean
 from modelica_like.language import Component, Parameter, Variable, guess
@@ -19,12 +19,10 @@ from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import Expr, names_in, substituted
 from modelica_like.netlist.modelica.types import Basic
+from modelica_like.netlist.modelica.values import Notes
 from modelica_like.netlist.modelica.written import as_formula
 from modelica_like.netlist.read import new_component
 from modelica_like.netlist.registry import find_type
-
-if TYPE_CHECKING:
-    from modelica_like.netlist.modelica.build import Notes
 
 
 def library_part(

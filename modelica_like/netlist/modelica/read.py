@@ -6,9 +6,10 @@ from pathlib import Path
 
 from modelica_like.errors import ModelicaTextError
 from modelica_like.language.inside import inside
-from modelica_like.netlist.modelica.build import Notes, build_component
+from modelica_like.netlist.modelica.build import build_component
 from modelica_like.netlist.modelica.classes import Classes
 from modelica_like.netlist.modelica.instance import Given, Instance
+from modelica_like.netlist.modelica.values import Notes
 from modelica_like.netlist.modelica.written import Written
 
 
