@@ -67,6 +67,8 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
         advice = (
             f"{driven} is an input of a part: inputs are connected, not set by equations. "
             f"Declare an output in {kind}, and yield connect(self.…, self.{driven})."
+            if component.units_checked
+            else f"{driven} is an input of a part: connect it, or write one equation, {driven} = …"
         )
     else:
         advice = "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."

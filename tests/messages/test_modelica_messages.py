@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from modelica_like import load
-from modelica_like.errors import ModelicaLikeError, ModelicaTextError, UnknownName, ValueOutOfRange
+from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, ModelicaTextError, UnknownName, ValueOutOfRange
 from modelica_like.netlist.modelica.write import modelica_text
 
 R = "Modelica.Mechanics.Rotational.Components"
@@ -430,6 +430,19 @@ def test_errors_of_the_drive_point_into_the_text(tmp_path: Path) -> None:
         "A declares 3 equations for 2 unknowns (x, y).\n"
         "  in a.mo:6 `y = x; y = 2;`\n"
         "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."
+    )
+
+
+def test_an_input_of_a_part_with_a_connection_and_an_equation(tmp_path: Path, check_message) -> None:
+    from modelica_like import build
+
+    block = "block G input Real u; output Real y; equation y = 3*u; end G;"
+    (tmp_path / "a.mo").write_text(model("G g; G h(u = 1);", "connect(h.y, g.u);\ng.u = time;", block))
+    check_message(
+        ComponentUnbalanced,
+        lambda: build(load(tmp_path / "a.mo")),
+        "A declares 2 equations for 1 unknowns (h_u).\n  in a.mo:6 `g.u = time;`\n"
+        "g.u is an input of a part: connect it, or write one equation, g.u = …",
     )
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
+
+import casadi as ca
 
 from modelica_like.errors import (
     ModelicaLikeError,
@@ -28,7 +31,7 @@ from modelica_like.language import (
     var,
 )
 from modelica_like.language.assembly import declare, end_at
-from modelica_like.language.fields import Discrete, Field, Input
+from modelica_like.language.fields import Discrete, Field, Input, Parameter
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.attributes import check_attributes, check_declared
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
@@ -38,7 +41,7 @@ from modelica_like.netlist.modelica.members import demand_determined, element, e
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.statements import Statements
 from modelica_like.netlist.modelica.tree import Expr
-from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside
+from modelica_like.netlist.modelica.types import Basic, basic_type, is_signal
 from modelica_like.netlist.modelica.values import Notes, known, nominal_of, number_of, shown_unit, unit_of
 from modelica_like.netlist.modelica.wiring import Wire, groups
 from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConnector, as_formula, written_class
@@ -86,6 +89,7 @@ class _Builder:
             self._attempt(place, self._member, name, member)
         if self.errors:
             raise raise_together_or_one(self.errors)
+        self._drive()
         record, statements = inside(component), self.statements
         record.text, record.statements = text.path, tuple(statements.equations)
         record.initial, record.happenings = tuple(statements.initial), tuple(statements.happenings)
@@ -94,6 +98,32 @@ class _Builder:
         if self.errors:
             raise raise_together_or_one(self.errors)
         return component
+
+    def _drive(self) -> None:
+        """Connect inputs of parts with a signal each, which an equation determines that own variables do not need."""
+        component, joined = self.component, {end for wire in self.wires for end in wire.ends}
+        ends = component.connectors.items()
+        flows = (f"{name}.{key}" for name, c in ends for key, quantity in c.quantities.items() if quantity.is_flow)
+        own = [name for name, field in component.fields.items() if not isinstance(field, Input | Parameter)]
+        own = [name for name in (*own, *flows) if name.partition(".")[0] not in joined]
+        rows = [([*_paths(left), *_paths(right)], source) for left, right, source in self.statements.equations]
+        for names, source in list(rows):
+            end = next((end for end in names if self._is_open(end) and end not in joined), "")
+            rest = [row for row in rows if row[0] is not names]
+            if end and _rank(rest, own) == _rank(rows, own):
+                rows = rest
+                joined.add(end)
+                signal = end.replace(".", "_")
+                while signal in self.instance.members or signal in component.fields:
+                    signal += "_"
+                declare(component, signal, signal_out("1", f"value of {end}"))
+                self.wires.append(Wire([signal, end], source))
+
+    def _is_open(self, end: str) -> bool:
+        """Tell whether a path is that of an input of a part without a value."""
+        path, _, name = end.rpartition(".")
+        part = self.component.parts.get(path)
+        return part is not None and isinstance(part.fields.get(name), Input) and part.value(name) is None
 
     def _attempt(self, place: Source, action: Any, *arguments: Any) -> None:
         """Collect an error, with the place of its declaration."""
@@ -216,11 +246,7 @@ class _Builder:
     def _variable(self, path: str, name: str, member: Member, basic: Basic) -> None:
         description = member.declaration.description
         declared: Field
-        signal = bool(basic.prefixes & {"input", "output"}) and (
-            not {"input", "output"} & member.declaration.prefixes
-            or member.text.kind == "block"
-            or is_bound_outside(self.instance, member, basic)
-        )
+        signal = is_signal(self.instance, member, basic)
         if basic.kind == "Boolean" and not signal:
             declared = boolean(description)
         elif basic.kind == "Integer" and not signal:
@@ -327,6 +353,25 @@ class _Builder:
                     f"{end} is true for instants only, which a connection does not carry here.",
                     advice="Write the 'when' in the class of the sample, or name the variable: when block.y then.",
                 )
+
+
+def _paths(node: Expr) -> Iterator[str]:
+    """Yield the paths of variables in a resolved expression."""
+    if node.kind in ("name", "condition"):
+        yield node.args[0][0]
+        return
+    inner = node.args[1] if node.kind == "call" else node.args
+    for one in inner:
+        if isinstance(one, Expr):
+            yield from _paths(one)
+
+
+def _rank(rows: list[tuple[list[str], Source]], columns: list[str]) -> int:
+    """Return how many columns rows with these names can determine, one each."""
+    place = {name: k for k, name in enumerate(columns)}
+    entries = [(k, place[name]) for k, (names, _) in enumerate(rows) for name in names if name in place]
+    lists = map(list, zip(*entries, strict=True)) if entries else ([], [])
+    return ca.sprank(ca.DM(ca.Sparsity.triplet(len(rows), len(columns), *lists)))
 
 
 def _elements(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:

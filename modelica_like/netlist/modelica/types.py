@@ -81,6 +81,14 @@ def is_bound_outside(instance: Instance, member: Member, basic: Basic | None) ->
     )
 
 
+def is_signal(instance: Instance, member: Member, basic: Basic) -> bool:
+    """Return whether a member is an input or output to connect: an input with an equation of its own class is none."""
+    if "input" in basic.prefixes:
+        return member.given.value is None or is_bound_outside(instance, member, basic)
+    is_connector = not {"input", "output"} & member.declaration.prefixes
+    return "output" in basic.prefixes and (is_connector or member.text.kind == "block")
+
+
 def with_article(basic: Basic) -> str:
     """Return the type in words."""
     if basic.kind == "enumeration":
