@@ -24,14 +24,14 @@ KEPT = {
     "Clock", "previous", "hold",
 }  # fmt: skip
 _ARGUMENTS = {
-    **dict.fromkeys(("der", "pre", "noEvent", "edge", "change", "previous", "hold"), (1, 1)), "initial": (0, 0),
+    **dict.fromkeys(("der", "pre", "noEvent", "edge", "change", "previous", "hold"), (1, 1)),
+    **dict.fromkeys(("initial", "terminal"), (0, 0)),
     **dict.fromkeys(("sample", "Clock", "size"), (1, 2)), "smooth": (2, 2), "reinit": (2, 2), "delay": (2, 3),
 }  # fmt: skip
 """Least and largest number of arguments."""
 _STATE_SELECT = ("never", "avoid", "default", "prefer", "always")
 _REFUSED = {
     "spatialDistribution": "spatialDistribution", "cardinality": "cardinality(…)",
-    "terminal": "terminal()",
     "inStream": "a stream connector", "actualStream": "a stream connector",
     "subSample": "a clock that follows another",
     "superSample": "a clock that follows another", "shiftSample": "a clock that follows another",

@@ -32,6 +32,7 @@ from modelica_like.language import (
     previous,
     sample,
     sign,
+    terminal,
     when,
     where,
 )
@@ -238,7 +239,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(ca, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")},
     **{name: getattr(ca, name) for name in ("tanh", "exp", "log", "log10", "sqrt")},
     "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax, "noEvent": lambda x: x,
-    "der": der, "pre": pre, "edge": edge, "change": change, "initial": initial,
+    "der": der, "pre": pre, "edge": edge, "change": change, "initial": initial, "terminal": terminal,
     "delay": lambda value, time, most=None: delay(value, time),
     "sample": lambda value, period=None: sample(value) if period is None else clock(period, value),
     "Clock": lambda period, parts=1: clock(period / parts), "previous": previous, "hold": hold, "homotopy": homotopy,
