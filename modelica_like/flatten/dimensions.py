@@ -163,8 +163,8 @@ def check_equation(left: Expr, right: Expr, dimensions: Dimensions, component: s
 
 def check_expression(
     expression: Expr | float, expected: Unit, dimensions: Dimensions, label: str, source: Source | None = None
-) -> Unit:
-    """Check that an expression has the expected dimension, and return its unit.
+) -> None:
+    """Check that an expression has the expected dimension.
 
     Args:
         expression: the expression.
@@ -180,10 +180,18 @@ def check_expression(
     where = (source,) if source else ()
     with _told(label, where, label, source):
         unit = dimensions.unit(expression)
+    expect_unit(unit, expected, label, where)
+
+
+def expect_unit(unit: Unit, expected: Unit, label: str, where: tuple[Source, ...] = ()) -> None:
+    """Check that a unit has the dimension of the expected one; the other arguments are those of `check_expression`.
+
+    Raises:
+        UnitMismatch: it has another one.
+    """
     if not same_dimension(unit, expected):
         actual = "has no unit" if unit == ONE else f"is {unit}"
         raise UnitMismatch(f"{label} expects {expected}; the expression {actual}.", where=where)
-    return unit
 
 
 @contextmanager

@@ -9,18 +9,17 @@ from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import CyclicAssembly, MissingValue, ValueOutOfRange
+from modelica_like.errors import CyclicAssembly, MissingValue, UnitError, UnitMismatch, ValueOutOfRange
 from modelica_like.flatten.checks import unit_of_field
-from modelica_like.flatten.dimensions import Dimensions, check_expression
+from modelica_like.flatten.dimensions import expect_unit
 from modelica_like.flatten.model import FlatParameter
 from modelica_like.flatten.template import column
 from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
-from modelica_like.language.expr import leaf_id
 from modelica_like.language.fields import Input, Parameter, Value
 from modelica_like.language.inside import inside
 from modelica_like.language.scopes import scope_for, scopes_of
-from modelica_like.language.units import Unit, coherent, read_quantity
+from modelica_like.language.units import ANY, Unit, coherent, read_quantity
 
 
 class Parameters:
@@ -38,11 +37,7 @@ class Parameters:
         self._q: list[Any] = []
         self._position: dict[tuple[int, str], int] = {}
         self._open: list[str] = []
-        self._by_leaf: dict[int, int] = {}
-        self._quantities: dict[int, tuple[Any, Any, Unit]] = {}
-        self._dimensions = Dimensions(self._unit_of_leaf)
         self._units: dict[int, Unit] = {}
-        self._unit: Unit | None = None
 
     def declare(self, component: Component, name: str, path: str) -> int | None:
         """Give a parameter its place in q; None if it has no value.
@@ -61,7 +56,6 @@ class Parameters:
         if value.formula is None:
             field = component.fields[name]
             expression = ca.SX.sym(path)
-            self._by_leaf[leaf_id(expression)] = len(self.flat)
             unit = coherent(unit_of_field(component, name))
             read = read_quantity(value.given) if field.unit_text == "*" and isinstance(value.given, str) else None
             tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
@@ -70,18 +64,17 @@ class Parameters:
             self._symbols.append(expression)
         else:
             with component.at_its_place(name):
-                expression = self._dependent(component, name, path, value)
-        self._position[key] = self.add(expression)
-        if value.formula is not None and self._unit is not None:
-            self._units[self._position[key]] = self._unit
-        return self._position[key]
+                expression, unit = self._dependent(component, name, path, value)
+        self._position[key] = position = self.add(expression)
+        self._units[position] = unit
+        return position
 
     def add(self, expression: Any) -> int:
         """Append an expression to q; return its position."""
         self._q.append(expression)
         return len(self._q) - 1
 
-    def _dependent(self, component: Component, name: str, path: str, value: Value) -> Any:
+    def _dependent(self, component: Component, name: str, path: str, value: Value) -> tuple[Any, Unit]:
         if path in self._open:
             circle = " → ".join([*self._open[self._open.index(path) :], path])
             raise CyclicAssembly(
@@ -89,13 +82,13 @@ class Parameters:
             )
         self._open.append(path)
         scopes = scopes_of(component, value, given=name in inside(component).values)
-        expression = self.evaluate(value, scopes, path)
+        expression, written = self._read(value, scopes, path)
         self._open.pop()
         field = component.fields[name]
-        unit = coherent(value.unit)
+        unit = coherent(written if value.unit == ANY else value.unit)
         self.derived.append(FlatParameter(path, unit, field.description, math.nan, *field.bounds, False))
         self._formulas.append(expression)
-        return expression
+        return expression, unit
 
     def evaluate(self, value: Value, scopes: Sequence[Component], label: str) -> Any:
         """Return the number or the expression of a value.
@@ -111,48 +104,41 @@ class Parameters:
             CyclicAssembly: the formula depends on itself.
             ValueOutOfRange: the result is not finite.
         """
+        return self._read(value, scopes, label)[0]
+
+    def _read(self, value: Value, scopes: Sequence[Component], label: str) -> tuple[Any, Unit]:
+        """Return the number or the expression of a value, and its unit; `ANY` is that of a plain number."""
         if value.formula is None:
-            return value.number
-        expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scopes, path, label), self._quantity))
-        quantities = [symbol for symbol in ca.symvar(expression) if leaf_id(symbol) in self._quantities]
-        result = ca.substitute(
-            expression, column(quantities), column(self._quantities[leaf_id(quantity)][1] for quantity in quantities)
-        )
+            return value.number, value.unit
+        units: dict[str, Unit] = {}
+
+        def look_up(path: str) -> Any:
+            position = self._sought(scopes, path, label)
+            units[path] = self._units[position]
+            return self._q[position]
+
+        result = ca.SX(value.formula.evaluate(look_up, _number))
         if result.is_constant() and not math.isfinite(float(result)):
             raise ValueOutOfRange(f"{label} must be a finite number, not {float(result):g}.")
-        self._unit = None
-        if scopes[0].units_checked:
-            self._unit = check_expression(expression, value.unit, self._dimensions, f"{label} = {value.formula}")
-        return result
+        if not scopes[0].units_checked:
+            return result, ANY
+        told = f"{label} = {value.formula}"
+        try:
+            unit = value.formula.unit(units.__getitem__, plain=True)
+        except UnitError as error:
+            raise UnitMismatch(f"{told}: {error.what}") from None
+        expect_unit(unit, value.unit, told)
+        return result, unit
 
-    def _quantity(self, text: str) -> Any:
-        """Return a symbol for a number with a unit, so that the unit is checked with the formula."""
-        number, unit = cast("tuple[float, Unit]", read_quantity(text))
-        return self._constant(text, number * unit.factor + unit.offset, unit)
-
-    def _constant(self, text: str, value: Any, unit: Unit) -> Any:
-        symbol = ca.SX.sym(text)
-        self._quantities[leaf_id(symbol)] = symbol, value, unit
-        return symbol
-
-    def _unit_of_leaf(self, leaf: Any) -> Unit:
-        key = leaf_id(leaf)
-        return self._quantities[key][2] if key in self._quantities else self.flat[self._by_leaf[key]].unit
-
-    def _look_up(self, scopes: Sequence[Component], path: str, label: str) -> Any:
+    def _sought(self, scopes: Sequence[Component], path: str, label: str) -> int:
+        """Return the position of a name in a formula."""
         owner_path, _, name = path.rpartition(".")
         owner = scope_for(scopes, path).find(owner_path)
         field = owner.fields.get(name)
         if not isinstance(field, Parameter | Input):
             names = [key for key, f in owner.fields.items() if isinstance(f, Parameter)]
             raise unknown("parameter", f"{label}: {owner.label}", path, names, {path: owner.renamed.get(name, "")})
-        position = self.position(owner, name)
-        value = self._q[position]
-        if value.is_symbolic():
-            return value
-        # A constant has a unit, too; that of a formula is known, which would be read again in every one that uses it.
-        unit = unit_of_field(owner, name) if value.is_constant() else self._units.get(position)
-        return value if unit is None else self._constant(path, value, unit)
+        return self.position(owner, name)
 
     def position(self, component: Component, name: str) -> int:
         """Return the position of a parameter in q.
@@ -200,3 +186,9 @@ class Parameters:
     def expressions(self) -> Any:
         """Return the vector q."""
         return column(self._q)
+
+
+def _number(text: str) -> Any:
+    """Return the number of a quantity in a formula, in SI units."""
+    number, unit = cast("tuple[float, Unit]", read_quantity(text))
+    return ca.SX(number * unit.factor + unit.offset)

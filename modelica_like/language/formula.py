@@ -49,6 +49,14 @@ _SAME, _ALIKE = ("neg", "abs"), ("+", "-", "min", "max")
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
 
 
+def _product(left: Unit, right: Unit, *, plain: bool) -> Unit:
+    if not plain or ANY not in (left, right):
+        return left * right
+    known = right if left == ANY else left
+    # A number in it can still have the unit of its place, as long as nothing says which one it has.
+    return ANY if known == ONE else known
+
+
 def _operator(sign: str, *, turned: bool = False) -> Callable[[Any, Any], Formula]:
     def apply(part: Any, other: Any) -> Formula:
         return Formula(sign, tuple(as_formula(side) for side in ((other, part) if turned else (part, other))))
@@ -120,37 +128,49 @@ class Formula(Arithmetic):
             return lookup(self._name())
         return _OPERATIONS[self.operation](*(operand.evaluate(lookup, quantity) for operand in self.operands))
 
-    def unit(self, lookup: Callable[[str], Unit]) -> Unit:
-        """Return its unit.
+    def unit(self, lookup: Callable[[str], Unit], *, plain: bool = False) -> Unit:
+        """Return its unit, by what is written: numbers that cancel take no unit away. Zero fits everything.
 
         Args:
             lookup: returns the unit of a path.
+            plain: whether `ANY` is that of a plain number, with which a product keeps its unit; otherwise it is an
+                unknown one.
 
         Raises:
             UnitError: units do not fit together.
         """
         kind, operands = self.operation, self.operands
-        if kind in ("number", "quantity", "name"):
+        if kind == "name":
+            return lookup(self._name())
+        if kind in ("number", "quantity"):
             given = read_quantity(operands[0]) if kind == "quantity" else None
-            return lookup(self._name()) if kind == "name" else coherent(given[1]) if given else ONE
-        units = [operand.unit(lookup) for operand in operands]
-        if kind in _ALIKE and not same_dimension(units[0], units[1]):
-            raise UnitError(f"'{self}' mixes {units[0]} and {units[1]}.")
+            return coherent(given[1]) if given else ONE if operands[0] else ANY
+        units = [operand.unit(lookup, plain=plain) for operand in operands]
+        if kind in _ALIKE:
+            if not same_dimension(units[0], units[1]):
+                raise UnitError(f"'{self}' mixes {units[0]} and {units[1]}.")
+            return units[1] if units[0] == ANY else units[0]
         if kind in ("*", "/"):
-            return units[0] * units[1] if kind == "*" else units[0] / units[1]
-        if kind == "**" and units[0] == ANY:
-            return ANY
-        if kind == "**" and not same_dimension(units[0], ONE):
-            return units[0] ** operands[1]._exponent(self)
+            return _product(units[0], units[1] if kind == "*" else units[1] ** -1, plain=plain)
+        if kind == "**":
+            return self._power(*units)
         if kind == "sqrt":
             return units[0] ** 0.5
-        return units[0] if kind in (*_SAME, *_ALIKE) else ONE
+        if kind not in _SAME and not same_dimension(units[0], ONE):
+            raise UnitError(f"'{self}' takes a number; '{operands[0]}' is in {units[0]}.")
+        return units[0] if kind in _SAME else ONE
 
-    def _exponent(self, power: Formula) -> float:
-        number = self.operands[0] if self.operation == "neg" else self
-        if number.operation != "number":
-            raise UnitError(f"'{power}': the exponent of something with a unit must be a number.")
-        return -number.operands[0] if number is not self else number.operands[0]
+    def _power(self, base: Unit, exponent: Unit) -> Unit:
+        power = self.operands[1]
+        if base == ANY or (same_dimension(base, ONE) and same_dimension(exponent, ONE)):
+            return base if base == ANY else ONE
+        if not power._is_number():
+            raise UnitError(f"'{self}': the exponent of something with a unit must be a number.")
+        return base ** float(power.evaluate(lookup=str))
+
+    def _is_number(self) -> bool:
+        """Return whether it consists of plain numbers only."""
+        return self.operation == "number" or all(isinstance(o, Formula) and o._is_number() for o in self.operands)
 
     def _name(self) -> str:
         # In a class body a parameter is used before its class and name exist: resolve it later.

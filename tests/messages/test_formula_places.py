@@ -33,6 +33,14 @@ PUSH = '  in bench.toml:7 `push = { is = "Torque" }`'
             'Parameters depend on each other in a circle: a → b → a.\n  in bench.toml:3 `a = "b"`\n'
             "Give one of them a number.",
         ),
+        (
+            {"a": '"2 kg.m2"', "w": '"b*1 s"'},
+            f"disc.w = b * 1 s expects rad/s; the expression is kg.m2.s.\n{DISC % 'b'}",
+        ),
+        (
+            {"a": '"2 kg.m2"', "w": '"exp(a)"'},
+            f"disc.w = exp(a): 'exp(a)' takes a number; 'a' is in kg.m2.\n{DISC % 'b'}",
+        ),
         ({"w": '"b"'}, f"disc.w = b expects rad/s; the expression is kg.m2.\n{DISC % 'b'}"),
         (
             {},
@@ -41,7 +49,14 @@ PUSH = '  in bench.toml:7 `push = { is = "Torque" }`'
             f"push.tau is an input without a value.\n{PUSH}\nConnect it or give it a value.",
         ),
     ],
-    ids=["unknown name", "circle", "wrong unit of a start value", "free flange and missing input"],
+    ids=[
+        "unknown name",
+        "circle",
+        "numbers that cancel",
+        "function of a quantity",
+        "wrong unit of a start value",
+        "free flange and missing input",
+    ],
 )
 def test_a_formula_has_its_line(wrong: dict[str, str], message: str) -> None:
     with pytest.raises(ModelicaLikeError) as caught:

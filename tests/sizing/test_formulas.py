@@ -46,6 +46,7 @@ def test_value(text: str, number: float, unit: str) -> None:
         ("force + arm", "'force + arm' mixes N and m."),
         ("force - 1", "'force - 1.0' mixes N and 1."),
         ("force**arm", "the exponent of something with a unit must be a number"),
+        ("sin(force)", "'sin(force)' takes a number; 'force' is in N."),
         ("2*times", "'times' has 2 values; a formula takes single numbers."),
         ("force/0", "'force/0' is not a finite number."),
         ("force force", "neither a quantity nor a formula"),

@@ -6,10 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
-
 from modelica_like.errors import ModelicaLikeError, ModelicaTextError, UnitError
-from modelica_like.flatten.dimensions import Dimensions
 from modelica_like.language import Assembly, Component, Connector, Input, Output, Parameter, guess
 from modelica_like.language.assembly import end_at
 from modelica_like.language.fields import Field, Value
@@ -186,15 +183,15 @@ class _Form:
 
     def _formula_unit(self, formula: Formula) -> Unit | None:
         """Return the unit of a formula of this model's parameters, None if its terms do not fit."""
-        leaves: dict[str, Any] = {}
 
-        def unit_of(leaf: Any) -> Unit:
-            path = leaf.name()
+        def unit_of(path: str) -> Unit:
             owner, _, name = path.rpartition(".")
             return self.parameters[path] if not owner else self.model.find(owner).fields[name].unit
 
-        expression = formula.evaluate(lambda path: leaves.setdefault(path, ca.SX.sym(path)))
-        unit = Dimensions(unit_of).unit_or_any(expression)
+        try:
+            unit = formula.unit(unit_of)
+        except UnitError:
+            return None
         return None if unit == ANY else unit
 
     # -- values ------------------------------------------------------------------------------------------------------
