@@ -218,7 +218,7 @@ class _Choice:
         implicit = self._begin(matrix, still)
         kept = self._keep(len(implicit) < self.own)
         by_modes = [] if still else self._at_rest_by_modes()
-        moving = self._moving(own, general)
+        moving = self._moving(implicit, general)
         rows = [k for k in general if self._accept(self.model.starts.entries[k].node, moving.get(k))]
         taken = set(rows)
         dependent = [k for k in general if k not in taken]
