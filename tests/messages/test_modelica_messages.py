@@ -446,12 +446,14 @@ def test_an_input_of_a_part_with_a_connection_and_an_equation(tmp_path: Path, ch
     )
 
 
-def test_a_class_does_not_know_what_is_outside(tmp_path: Path, check_message) -> None:
-    (tmp_path / "box.toml").write_text('[parameters]\ni = 3\n[parts]\na = { is = "Inertia", J = "i * 1 kg.m2" }\n')
-    (tmp_path / "drive.toml").write_text('[parameters]\nn = 7\n[parts]\nq = { is = "./box.toml", i = "2*n" }\n')
+def test_a_formula_with_names_inside_and_outside_of_a_class(tmp_path: Path, check_message) -> None:
+    (tmp_path / "box.toml").write_text('[parameters]\ni = 3\n[parts]\na = { is = "Inertia", J = "1 kg.m2" }\n')
+    (tmp_path / "drive.toml").write_text(
+        '[parameters]\nn = 7\n[parts]\nq = { is = "./box.toml", "a.J" = "2*n*i*1 kg.m2" }\n'
+    )
     told = (
-        "q.i = 2.0 * n uses n, which is outside of q.\n"
-        '  in drive.toml:4 `q = { is = "./box.toml", i = "2*n" }`\n'
+        "q.a.J = 2.0 * n * i * 1 kg.m2 uses n, which is outside of q, and names in it.\n"
+        '  in drive.toml:4 `q = { is = "./box.toml", "a.J" = "2*n*i*1 kg.m2" }`\n'
         "q becomes a class, which knows its own names only.\n"
         "Give it a number."
     )

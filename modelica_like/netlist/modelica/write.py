@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,11 @@ from modelica_like.language.fields import Value
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import declarations, inside
 from modelica_like.language.places import located
-from modelica_like.language.scopes import scope_for, scopes_of
 from modelica_like.language.units import coherent, parse_unit, read_quantity, to_si
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.library import Known, by_component, table
+from modelica_like.netlist.modelica.lift import is_given, lifted
 from modelica_like.netlist.modelica.own_classes import class_of_equations, connector_class
 from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.tokens import identifier
@@ -39,7 +40,7 @@ def modelica_text(model: Component) -> str:
         NetlistError: the model has equations of its own.
     """
     assembly = model if isinstance(model, Assembly) else as_assembly(model)
-    return "\n\n".join(_Writer().classes(assembly)) + "\n"
+    return "\n\n".join(_Writer().classes(lifted(assembly))) + "\n"
 
 
 class _Writer:
@@ -49,7 +50,11 @@ class _Writer:
         self.made: dict[str, str] = {}
 
     def classes(self, assembly: Assembly) -> list[str]:
-        text = self.model(assembly, _class_name(assembly))
+        name = _class_name(assembly)
+        text = self.model(assembly, name)
+        while name in self.made:
+            name = f"{name}_"
+            text = self.model(assembly, name)
         return [*self.made.values(), text]
 
     def model(self, assembly: Assembly, name: str) -> str:
@@ -66,12 +71,7 @@ class _Writer:
         lines = [f'model {name} "{quoted}"' if quoted else f"model {name}"]
         for key, field in assembly.fields.items():
             if isinstance(field, Parameter):
-                value = assembly.value(key)
-                if value is None:
-                    raise ModelicaTextError(f"{assembly.label}.{key} has no value.")
-                unit = str(coherent(value.unit))
-                attribute = f'(unit = "{unit}")' if unit not in ("1", "") else ""
-                lines.append(f"  parameter Real {identifier(key)}{attribute} = {self.value(value, assembly)};")
+                lines.append(self._parameter(assembly, key, field))
         lines += [f"  {connector_class(c)} {identifier(key)};" for key, c in assembly.connectors.items()]
         for key, field in assembly.fields.items():
             if isinstance(field, Input | Output):
@@ -87,6 +87,18 @@ class _Writer:
         return "\n".join([*lines, f"end {name};"])
 
     # -- declarations ------------------------------------------------------------------------------------------------
+
+    def _parameter(self, assembly: Assembly, key: str, field: Parameter) -> str:
+        """Return the declaration of a parameter, by its default if the owner's modification has its value."""
+        value = assembly.value(key)
+        if value is None:
+            raise ModelicaTextError(f"{assembly.label}.{key} has no value.")
+        if is_given(assembly, key):
+            value = replace(value, formula=None, number=None) if field.default is None else field.read(field.default)
+        unit = str(coherent(value.unit))
+        attribute = f'(unit = "{unit}")' if unit not in ("1", "*", "") else ""
+        text = "" if value.formula is None and value.number is None else f" = {self.value(value, assembly)}"
+        return f"  parameter Real {identifier(key)}{attribute}{text};"
 
     def _declaration(self, owner: Assembly, name: str, part: Component | list[Component], joined: set[str]) -> str:
         if not isinstance(part, list):
@@ -111,14 +123,14 @@ class _Writer:
     def _part(self, owner: Assembly, path: str, part: Component, joined: set[str]) -> tuple[str, dict[str, str]]:
         """Return the class of a part and the arguments of its modification."""
         if isinstance(part, Assembly):
-            _refuse_names_from_outside(part)
             name = _class_name(part)
             text = self.model(part, name)
-            while self.made.get(name, text) != text:
+            while self.made.get(name, text) != text or name in owner.parts:
                 name = f"{name}_"
                 text = self.model(part, name)
             self.made[name] = text
-            return name, {}
+            values = inside(part).values.items()
+            return name, {identifier(key): self.value(value, owner) for key, value in values if is_given(part, key)}
         entry = by_component().get(type(part).__name__)
         if entry is None or entry.type is not type(part):
             for key, connector in part.connectors.items():
@@ -313,22 +325,6 @@ class _Arguments:
         )
 
 
-def _refuse_names_from_outside(assembly: Assembly) -> None:
-    """Refuse formulas inside an assembly that use parameters outside, which its class does not know."""
-    within = [*assembly.walk()]
-    for part in within:
-        for key, value in (*inside(part).values.items(), *inside(part).starts.items()):
-            scopes = scopes_of(part, value, given=True)
-            names = () if value.formula is None else value.formula.names()
-            outer = next((name for name in names if all(scope_for(scopes, name) is not s for s in within)), None)
-            if outer is not None:
-                raise ModelicaTextError(
-                    f"{part.path}.{key} = {value.formula} uses {outer}, which is outside of {assembly.path}.",
-                    where=part.place_of(key), why=f"{assembly.path} becomes a class, which knows its own names only.",
-                    advice="Give it a number.",
-                )  # fmt: skip
-
-
 def formula_text(formula: Formula, owner: Component, outer: int = 0) -> str:
     """Return a formula as Modelica text; quantities become numbers in SI units."""
     kind, operands = formula.operation, formula.operands
@@ -380,9 +376,8 @@ def _path(assembly: Assembly, end: Any) -> str:
 
 
 def _class_name(assembly: Assembly) -> str:
-    name = re.sub(
-        r"\W", "_", (inside(assembly).description and Path(inside(assembly).origin).stem) or inside(assembly).name
-    )
+    told = (inside(assembly).description and Path(inside(assembly).origin).stem) or inside(assembly).name
+    name = re.sub(r"\W", "_", re.sub(r"\[\d+\]$", "", told))  # elements of an array have one class
     name = name or "drive"
     return name[:1].upper() + name[1:] if not name[0].isdigit() else f"Drive_{name}"
 
