@@ -266,9 +266,9 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("Real x;", 'x = (if "x" > 1 then 1 else 0);'),
         'A text and a number cannot be compared.\n  in a.mo:5 `x = (if "x" > 1 then 1 else 0);`',
     ),
-    "an order of an enumeration": (
-        model("type M = enumeration(a, b); parameter M m = M.a; Real x;", "x = (if m < M.b then 1 else 0);"),
-        "M.a and M.b have no order here: compare them by == or <>.\n  in a.mo:5 `x = (if m < M.b then 1 else 0);`",
+    "an order of two enumerations": (
+        model("parameter M m = M.a; Real x;", "x = (if m < N.b then 1 else 0);", TYPES),
+        "M.a and N.b have no order here: compare them by == or <>.\n  in a.mo:5 `x = (if m < N.b then 1 else 0);`",
     ),
     "a large array": (
         model("Real v[100000000];"),

@@ -34,6 +34,7 @@ from modelica_like.language.assembly import declare, end_at
 from modelica_like.language.fields import Discrete, Field, Input, Parameter
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.attributes import check_attributes, check_declared
+from modelica_like.netlist.modelica.fold import numbered
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
 from modelica_like.netlist.modelica.library import Known, connector_type
@@ -42,7 +43,7 @@ from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.statements import Statements
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_signal
-from modelica_like.netlist.modelica.values import Notes, known, nominal_of, number_of, shown_unit, unit_of
+from modelica_like.netlist.modelica.values import Notes, known, nominal_of, number_of, shown_unit, unit_of, value_of
 from modelica_like.netlist.modelica.wiring import Wire, groups
 from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConnector, as_formula, written_class
 
@@ -188,7 +189,7 @@ class _Builder:
     def _basic(self, name: str, member: Member, basic: Basic) -> None:
         declared = member.declaration
         check_declared(self.instance, member, basic)
-        if "constant" in declared.prefixes or basic.kind in ("String", "enumeration", "StateSelect"):
+        if "constant" in declared.prefixes or basic.kind in ("String", "StateSelect"):
             return
         if "parameter" in declared.prefixes:
             if basic.kind == "Real" and not declared.dimensions:
@@ -249,7 +250,7 @@ class _Builder:
         signal = is_signal(self.instance, member, basic)
         if basic.kind == "Boolean" and not signal:
             declared = boolean(description)
-        elif basic.kind == "Integer" and not signal:
+        elif basic.kind in ("Integer", "enumeration") and not signal:
             declared = integer(description)
         elif path in self.statements.assigned or "discrete" in basic.prefixes:
             declared = discrete(unit_of(basic, self.notes), description, start=0.0)
@@ -278,10 +279,10 @@ class _Builder:
         fixed = known(basic.given.inner.get("fixed")) is True
         if isinstance(declared, Discrete):
             before = self.statements.memory.get(path)
-            start = (
-                known(given) if before is None else Resolver(self.instance, self.instance.text).known()(before).args[0]
-            )
-            declared.default = float(start) if isinstance(start, bool | int | float) else 0.0
+            value = value_of(given) if before is None else Resolver(self.instance, self.instance.text).known()(before)
+            start = None if value is None else numbered(value).args[0]
+            first = 1.0 if basic.kind == "enumeration" else 0.0
+            declared.default = float(start) if isinstance(start, bool | int | float) else first
             return
         if isinstance(declared, Input):
             self._start_input(path, given, declared)

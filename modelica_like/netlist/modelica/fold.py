@@ -100,6 +100,8 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
         if not left:
             return Expr("boolean", (not decides,), line)
         return left[0] if len(left) == 1 else Expr(kind, args, line)
+    if kind in _RELATIONS and not all(argument.kind in KNOWN for argument in args):
+        args = tuple(map(numbered, args))
     if kind in _RELATIONS and all(argument.kind in KNOWN for argument in args):
         return Expr("boolean", (_related(kind, *args),), line)
     if kind in _BINARY and all(argument.kind == "number" for argument in args):
@@ -107,6 +109,15 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
     if kind == "+" and all(argument.kind == "string" for argument in args):
         return Expr("string", (args[0].args[0] + args[1].args[0],), line)
     return Expr(kind, args, line)
+
+
+def numbered(expression: Expr) -> Expr:
+    """Return an expression with numbers in place of literals, 1 for the first: variables of enumerations have them."""
+    if expression.kind == "literal" and len(expression.args) > 1:
+        return number(expression.args[1], expression.line)
+    if expression.kind not in ("if", "array"):
+        return expression
+    return Expr(expression.kind, tuple(map(numbered, expression.args)), expression.line)
 
 
 def is_condition(expression: Expr) -> bool:
@@ -202,6 +213,10 @@ def _related(kind: str, left: Expr, right: Expr) -> bool:
     if left.kind != right.kind:
         raise Unfit(f"{_KINDS[left.kind].capitalize()} and {_KINDS[right.kind]} cannot be compared")
     if left.kind == "literal" and kind not in ("==", "<>"):
+        kinds = {str(one.args[0]).rpartition(".")[0] for one in (left, right)}
+        places = numbered(left), numbered(right)
+        if len(kinds) == 1 and places[0].kind == "number":
+            return _RELATIONS[kind](places[0].args[0], places[1].args[0])
         raise Unfit(f"{left.args[0]} and {right.args[0]} have no order here: compare them by == or <>")
     return _RELATIONS[kind](left.args[0], right.args[0])
 

@@ -129,7 +129,7 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
     if name == "Integer":
         if len(given) != 1:
             raise fold.Unfit(f"Integer(…) has 1 argument, not {len(given)}")
-        return given[0]
+        return fold.numbered(given[0])
     if not isinstance(text, ClassText) or text.kind not in ("function", "record"):
         raise refused(f"the function {name}", resolver.text, line, "Own functions with an algorithm are read.")
     if text.kind == "record":

@@ -271,7 +271,7 @@ class Resolver:
                 raise members.unknown_name(
                     f"{package} has no '{name}'{did_you_mean(name, class_text.literals) or '.'}", self.text, line
                 )
-            return Expr("literal", (f"{class_text.name}.{name}",), line)
+            return Expr("literal", (f"{class_text.name}.{name}", class_text.literals.index(name) + 1), line)
         holder = class_text if isinstance(class_text, ClassText) else None
         if holder is None and not package:
             holder = self._around(name)

@@ -273,17 +273,23 @@ class Statements:
         else:
             if left.kind == "number" and right.kind == "name":
                 left, right = right, left
-            self._check_type(left, right, text, line)
-            self.equations.append((left, right, text.place(line)))
+            self.equations.append((left, self._fitting(left, right, text, line), text.place(line)))
 
-    def _check_type(self, left: Expr, right: Expr, text: ClassText, line: int) -> None:
-        """Refuse a value of another type for an own variable."""
+    def _check_type(self, left: Expr, right: Expr, text: ClassText, line: int) -> Basic | None:
+        """Return the type of an own variable; refuse a value of another one."""
         name = left.args[0][0] if left.kind in ("name", "condition") and len(left.args) == 1 else ""
         member = self.instance.members.get(name.partition("[")[0])
         basic = basic_type(self.instance, member) if member is not None else None
         wrong = misfit(right, basic) if basic is not None else ""
         if wrong:
             raise ModelicaTextError(f"{name} {wrong}.", where=text.place(line))
+        return basic
+
+    def _fitting(self, left: Expr, right: Expr, text: ClassText, line: int) -> Expr:
+        """Return a value that has the type of an own variable; those of an enumeration are numbers."""
+        target = left.args[1][0] if left.kind == "call" and left.args[0] == "pre" else left
+        basic = self._check_type(target, right, text, line)
+        return fold.numbered(right) if basic is not None and basic.kind == "enumeration" else right
 
     # -- events ------------------------------------------------------------------------------------------------------
 
@@ -318,7 +324,8 @@ class Statements:
                 target, value = resolver(statement.parts[0]), resolver(statement.parts[1])
                 if target.kind not in ("name", "condition"):
                     raise refused("a 'when' with an equation that is not solved for a variable", text, statement.line)
-                values[target.args[0][0]] = _condition(value) if target.kind == "condition" else value
+                fitting = self._fitting(target, value, text, statement.line)
+                values[target.args[0][0]] = _condition(value) if target.kind == "condition" else fitting
             elif call is not None and call.args[0] == "reinit" and len(call.args[1]) == 2:
                 targets, given = (fold.elements(resolver(side)) for side in call.args[1])
                 if len(targets) != len(given) or any(target.kind != "name" for target in targets):

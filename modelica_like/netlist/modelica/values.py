@@ -10,6 +10,7 @@ from modelica_like.errors import UnitError
 from modelica_like.language.units import parse_unit, same_dimension
 from modelica_like.netlist.modelica.instance import Given
 from modelica_like.netlist.modelica.resolve import Resolver
+from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import Basic
 
 
@@ -26,12 +27,17 @@ class Notes:
             self.told.append(sentence)
 
 
-def known(given: Given | None) -> Any:
-    """Return the value of an attribute, None if it has none."""
+def value_of(given: Given | None) -> Expr | None:
+    """Return the value of an attribute as an expression, None if it has none."""
     if given is None or given.value is None or given.scope is None:
         return None
-    value = Resolver(*given.scope, numeric=True)(given.value)
-    return value.args[0] if value.args else None
+    return Resolver(*given.scope, numeric=True)(given.value)
+
+
+def known(given: Given | None) -> Any:
+    """Return the value of an attribute, None if it has none."""
+    value = value_of(given)
+    return value.args[0] if value is not None and value.args else None
 
 
 def number_of(given: Given | None) -> float | None:
