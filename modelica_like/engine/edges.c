@@ -169,7 +169,7 @@ static double window_error(Instance *c, double begin, double end, int parts, int
     for (int k = 0; k < m->n_x; k++) change[k] -= point[k];
     if (with_matrix) {
         for (int k = 0; k < m->n_x; k++) change[k] *= step_diagonal(h);
-        qr_solve(&m->step, c, change);
+        solve_step(c, change);
     }
     return error_norm(c, c->piece->points, last_of(m, c->piece), change);
 }

@@ -89,7 +89,7 @@ static void take_stage(Instance *c, Tangent *one, int i, double h) {
         for (int j = 0; j < i; j++) begin[k] += h * WEIGHTS[i][j] * one->stages[j * n_x + k];
         solved[k] += 4 / h * begin[k];
     }
-    qr_solve(&m->step, c, solved);
+    solve_step(c, solved);
     for (int k = 0; k < n_x; k++) one->stages[i * n_x + k] = 4 / h * (solved[k] - begin[k]);
     if (i == N_STAGES - 1) memcpy(x, solved, n_x * sizeof(double));
 }

@@ -75,7 +75,7 @@ int factor_step(Instance *c, double diagonal) {
     memset(c->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
     for (int k = 0; k < m->n_jacobian; k++) c->matrix[m->jacobian_to_step[k]] = -c->jacobian[k];
     for (int k = 0; k < m->n_x; k++) c->matrix[m->step_diagonal[k]] += diagonal;
-    return qr_factor(&m->step, c->matrix, c);
+    return factor_matrix(c);
 }
 
 /* As a step of length h from a point would. */
@@ -123,7 +123,7 @@ double rosenbrock_step(Instance *c, double t, const double *first, double h, int
             stage[k] = right + h * D_TIME[i] * slope[k];
             if (!isfinite(stage[k])) return -1;
         }
-        qr_solve(&c->model->step, c, stage);
+        solve_step(c, stage);
     }
     for (int k = 0; k < n; k++) {
         last[k] = y[k] + c->stages[(STAGES - 1) * n + k];

@@ -3,7 +3,7 @@
  * resources, which importers name in many ways. */
 #include "model.h"
 
-#define FORMAT 10
+#define FORMAT 11
 #define UNKNOWN (-1)
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
 
@@ -40,10 +40,12 @@ static const struct {
     TABLE(start_direct, n_start_direct), TABLE(start_default, n_start_default), TABLE(start_guess, n_start_guess),
     TABLE(start_rows, n_start_unknowns), TABLE(start_dependent, n_start_dependent), TABLE(start_zero, n_start_zero),
     TABLE(start_columns, n_start_unknowns), TABLE(steady, n_steady), TABLE(jacobian_to_step, n_jacobian),
-    TABLE(step_diagonal, n_x), QR(step), QR(start), TAPE(rates), TAPE(jacobian), TAPE(alg), TAPE(alg_jacobian),
-    TAPE(variables), TAPE(guards), TAPE(edges), TAPE(guards_soon), TAPE(moments), TAPE(resets), TAPE(updates),
-    TAPE(start_conditions), TAPE(start_values), TAPE(discrete_starts), TAPE(hold_terms), TAPE(determinants),
-    TAPE(start_system), TAPE(start_jacobian), TAPE(derived), TAPE(delays)};
+    TABLE(step_diagonal, n_x), QR(step), QR(start), TABLE(lu.l_colind, lu.n_ends), TABLE(lu.l_row, lu.n_l),
+    TABLE(lu.u_colind, step.n_ends), TABLE(lu.u_row, lu.n_u), TABLE(lu.row_place, step.size),
+    TABLE(lu.column_order, step.size), TAPE(rates), TAPE(jacobian), TAPE(alg), TAPE(alg_jacobian), TAPE(variables),
+    TAPE(guards), TAPE(edges), TAPE(guards_soon), TAPE(moments), TAPE(resets), TAPE(updates), TAPE(start_conditions),
+    TAPE(start_values), TAPE(discrete_starts), TAPE(hold_terms), TAPE(determinants), TAPE(start_system),
+    TAPE(start_jacobian), TAPE(derived), TAPE(delays)};
 enum { N_TABLES = sizeof tables / sizeof tables[0] };
 
 /* Tells that a file is no model; returns 0. */
@@ -177,35 +179,41 @@ typedef struct { /* integers of records, not below `low` and below `end` */
     const char *name;
     const void *first;
     size_t stride;
-    int count, low, end;
+    int count, low;
+    int64_t end;
 } Range;
 #define COLUMN(table, field, n, low, end) {#table "." #field, &m->table[0].field, sizeof m->table[0], m->n, low, end}
 #define INDEX(table, field, end) COLUMN(table, field, n_##table, 0, m->end)
 #define TEXT(table, field) INDEX(table, field, n_text)
 #define ARRAY(table, n, end) {#table, m->table, sizeof(int), m->n, 0, m->end}
+#define QR_ROWS(matrix)                                                                                  \
+    ARRAY(matrix.row, matrix.n_nonzeros, matrix.size), ARRAY(matrix.v_row, matrix.n_v, matrix.size),     \
+        ARRAY(matrix.r_row, matrix.n_r, matrix.size), ARRAY(matrix.row_place, matrix.size, matrix.size), \
+        ARRAY(matrix.column_order, matrix.size, matrix.size)
 
 /* Every index is one of the table that it points into. */
 static int check_indices(const Model *m, char *message) {
     const Range ranges[] = {COLUMN(settings, terminal, n_settings, -1, m->n_modes),
         COLUMN(settings, homotopy, n_settings, -1, m->n_modes),
         COLUMN(settings, n_edges, n_settings, 0, m->tapes.edges.n_outputs + 1),
-        COLUMN(settings, n_slope_edges, n_settings, 0, m->settings->n_edges + 1),
-        COLUMN(settings, n_kinks, n_settings, 0, m->settings->n_slope_edges + 1), ARRAY(state_names, n_x, n_text),
-        ARRAY(implicit_names, n_z, n_text), ARRAY(singular_names, n_determinants, n_text),
-        COLUMN(variables, kind, n_variables, 0, N_KINDS), COLUMN(variables, type, n_variables, 0, N_TYPES),
-        TEXT(variables, name), COLUMN(variables, count, n_variables, 1, m->n_p + 2), INDEX(rising, below, n_p),
-        INDEX(rising, above, n_p), TEXT(rising, below_name), TEXT(rising, above_name),
-        ARRAY(mode_names, n_mode_names, n_text), INDEX(modes, first_name, n_mode_names + 1),
-        INDEX(modes, n_names, n_mode_names + 1), INDEX(transitions, mode, n_modes), TEXT(transitions, name),
-        TEXT(transitions, notice), ARRAY(guard_transition, n_guards, n_transitions),
-        ARRAY(reset_nodes, n_reset_nodes, n_nodes), INDEX(resets, place, n_x + m->n_d + m->n_reset_nodes),
-        INDEX(updates, place, n_x + m->n_d + m->n_reset_nodes), COLUMN(updates, at_start, n_updates, -1, m->n_d),
-        INDEX(resets, value, n_reset_values), INDEX(resets, transition, n_transitions),
-        INDEX(updates, value, n_updates), INDEX(holds, mode, n_modes), INDEX(holds, motion, n_nodes),
-        COLUMN(holds, state, n_holds, -1, m->n_x), COLUMN(holds, reaction, n_holds, -1, m->n_nodes),
-        INDEX(holds, approach, n_d), TEXT(holds, name), ARRAY(members, n_members, n_holds), INDEX(ideals, row, n_z),
-        INDEX(ideals, mode, n_modes), INDEX(ideals, zero, n_nodes), INDEX(ideals, other, n_nodes), TEXT(ideals, name),
-        TEXT(delays, name), INDEX(delays, first, n_d - DELAY_TERMS - 1), INDEX(circuits, first_member, n_members + 1),
+        COLUMN(settings, n_slope_edges, n_settings, 0, (int64_t)m->settings->n_edges + 1),
+        COLUMN(settings, n_kinks, n_settings, 0, (int64_t)m->settings->n_slope_edges + 1),
+        ARRAY(state_names, n_x, n_text), ARRAY(implicit_names, n_z, n_text),
+        ARRAY(singular_names, n_determinants, n_text), COLUMN(variables, kind, n_variables, 0, N_KINDS),
+        COLUMN(variables, type, n_variables, 0, N_TYPES), TEXT(variables, name),
+        COLUMN(variables, count, n_variables, 1, m->n_p + 2), INDEX(rising, below, n_p), INDEX(rising, above, n_p),
+        TEXT(rising, below_name), TEXT(rising, above_name), ARRAY(mode_names, n_mode_names, n_text),
+        INDEX(modes, first_name, n_mode_names + 1), INDEX(modes, n_names, n_mode_names + 1),
+        INDEX(transitions, mode, n_modes), TEXT(transitions, name), TEXT(transitions, notice),
+        ARRAY(guard_transition, n_guards, n_transitions), ARRAY(reset_nodes, n_reset_nodes, n_nodes),
+        INDEX(resets, place, n_x + m->n_d + m->n_reset_nodes), INDEX(updates, place, n_x + m->n_d + m->n_reset_nodes),
+        COLUMN(updates, at_start, n_updates, -1, m->n_d), INDEX(resets, value, n_reset_values),
+        INDEX(resets, transition, n_transitions), INDEX(updates, value, n_updates), INDEX(holds, mode, n_modes),
+        INDEX(holds, motion, n_nodes), COLUMN(holds, state, n_holds, -1, m->n_x),
+        COLUMN(holds, reaction, n_holds, -1, m->n_nodes), INDEX(holds, approach, n_d), TEXT(holds, name),
+        ARRAY(members, n_members, n_holds), INDEX(ideals, row, n_z), INDEX(ideals, mode, n_modes),
+        INDEX(ideals, zero, n_nodes), INDEX(ideals, other, n_nodes), TEXT(ideals, name), TEXT(delays, name),
+        INDEX(delays, first, n_d - DELAY_TERMS - 1), INDEX(circuits, first_member, n_members + 1),
         INDEX(circuits, n_members, n_members + 1), INDEX(circuits, first, n_d + 1), INDEX(start_modes, mode, n_modes),
         INDEX(start_direct, position, n_x), INDEX(start_direct, start, n_starts), INDEX(start_default, position, n_x),
         INDEX(start_default, start, n_starts), INDEX(start_guess, position, n_unknowns),
@@ -213,7 +221,9 @@ static int check_indices(const Model *m, char *message) {
         COLUMN(start_rows, row, n_start_unknowns, 0, m->n_start_values), INDEX(start_dependent, start, n_starts),
         INDEX(start_dependent, node, n_nodes), ARRAY(start_zero, n_start_zero, n_x),
         ARRAY(start_columns, n_start_unknowns, n_unknowns + m->n_y), ARRAY(steady, n_steady, n_unknowns),
-        ARRAY(jacobian_to_step, n_jacobian, step.n_nonzeros), ARRAY(step_diagonal, n_x, step.n_nonzeros)};
+        ARRAY(jacobian_to_step, n_jacobian, step.n_nonzeros), ARRAY(step_diagonal, n_x, step.n_nonzeros), QR_ROWS(step),
+        QR_ROWS(start), ARRAY(lu.l_row, lu.n_l, step.size), ARRAY(lu.u_row, lu.n_u, lu.n_ends - 1),
+        ARRAY(lu.row_place, step.size, step.size), ARRAY(lu.column_order, step.size, step.size)};
     for (size_t k = 0; k < sizeof ranges / sizeof ranges[0]; k++)
         for (int i = 0; i < ranges[k].count; i++) {
             int value;
@@ -257,29 +267,31 @@ static int check_variables(const Model *m, char *message) {
     return 1;
 }
 
-/* Columns of a sparse matrix; `least` entries in each. */
-static int check_columns(int size, const int *colind, const int *row, int count, int least) {
-    if (colind[0] != 0 || colind[size] != count) return 0;
+/* Where columns of a sparse matrix end; `least` entries in each. */
+static int check_ends(int size, int n_ends, const int *colind, int count, int least) {
+    if (n_ends != size + 1 || colind[0] != 0 || colind[size] != count) return 0;
     for (int k = 0; k < size; k++)
         if (colind[k + 1] > count || colind[k + 1] < colind[k] + least) return 0;
-    for (int k = 0; k < count; k++)
-        if (row[k] < 0 || row[k] >= size) return 0;
     return 1;
 }
 
 static int check_pattern(const QrPattern *a) {
     int n = a->size;
-    if (a->n_ends != n + 1 || !check_columns(n, a->colind, a->row, a->n_nonzeros, 0) ||
-        !check_columns(n, a->v_colind, a->v_row, a->n_v, 1) || !check_columns(n, a->r_colind, a->r_row, a->n_r, 1))
+    if (!check_ends(n, a->n_ends, a->colind, a->n_nonzeros, 0) || !check_ends(n, a->n_ends, a->v_colind, a->n_v, 1) ||
+        !check_ends(n, a->n_ends, a->r_colind, a->n_r, 1))
         return 0;
     for (int k = 0; k < n; k++) {
-        if (a->row_place[k] < 0 || a->row_place[k] >= n || a->column_order[k] < 0 || a->column_order[k] >= n) return 0;
         /* The diagonal of R stands last in its column, and ends the search for it. */
         for (int r = a->r_colind[k]; r < a->r_colind[k + 1]; r++)
             if ((r < a->r_colind[k + 1] - 1) != (a->r_row[r] < k)) return 0;
         if (a->r_row[a->r_colind[k + 1] - 1] != k) return 0;
     }
     return 1;
+}
+
+static int check_lu(const LuPattern *a, int n) {
+    return a->n_ends > 0 && a->n_ends <= n + 1 && check_ends(a->n_ends - 1, a->n_ends, a->l_colind, a->n_l, 0) &&
+           check_ends(n, n + 1, a->u_colind, a->n_u, 0);
 }
 
 /* Reads a model from bytes that are aligned as numbers and outlive it. Returns NULL and a message for `message`, which
@@ -293,6 +305,7 @@ Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Re
     if (find_tables(m, bytes, size, message) && find_sizes(m, size, message) && check_sizes(m, message) &&
         check_indices(m, message) && check_variables(m, message) && check_events(m, message) &&
         (check_pattern(&m->step) || damaged(message, "step")) &&
+        (check_lu(&m->lu, m->step.size) || damaged(message, "lu")) &&
         (check_pattern(&m->start) || damaged(message, "start")))
         return m;
     release(m);

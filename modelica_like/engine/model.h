@@ -32,10 +32,15 @@ typedef struct { /* see tape.py */
     const int *outputs;       /* slots */
 } Tape;
 
-typedef struct { /* pattern of a square matrix and of its QR factors, see sparse.py */
+typedef struct { /* pattern of a square matrix and of its QR factors, see tables.py */
     int size, n_ends, n_nonzeros, n_v, n_r;
     const int *colind, *row, *v_colind, *v_row, *r_colind, *r_row, *row_place, *column_order;
 } QrPattern;
+
+typedef struct { /* of its LU factors, see elimination.py: without what comes last, as many as have no end */
+    int n_ends, n_l, n_u;
+    const int *l_colind, *l_row, *u_colind, *u_row, *row_place, *column_order;
+} LuPattern;
 
 typedef enum {
     KIND_TIME,
@@ -143,6 +148,7 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     /* Nonzeros of the step matrix: for every nonzero of the Jacobian, and for the diagonal of state k. */
     const int *jacobian_to_step, *step_diagonal;
     QrPattern step, start;
+    LuPattern lu; /* of the step matrix */
     struct {
         Tape rates, jacobian, alg, alg_jacobian, variables, guards, edges, guards_soon, moments, resets, updates,
             start_conditions, start_values, discrete_starts, hold_terms, determinants, start_system, start_jacobian,

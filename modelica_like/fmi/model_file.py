@@ -30,7 +30,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
 """Path of the file in an FMU."""
-FORMAT = 10
+FORMAT = 11
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
 _ENTRY = struct.Struct("<4i")
@@ -48,6 +48,7 @@ _RESET = _record("place value transition at_start", "factor")
 _START_OF = _record("position start", "factor")
 _START_ROW = _record("start node row")
 _QR = ("colind", "row", "v_colind", "v_row", "r_colind", "r_row", "row_place", "column_order")
+_LU = ("l_colind", "l_row", "u_colind", "u_row", "row_place", "column_order")
 _TAPES = (
     "rates", "jacobian", "alg", "alg_jacobian", "variables", "guards", "edges", "guards_soon", "moments", "resets",
     "updates", "start_conditions", "start_values", "discrete_starts", "hold_terms", "determinants", "start_system",
@@ -87,6 +88,7 @@ SECTIONS: dict[str, Any] = {
     **dict.fromkeys(("start_rows", "start_dependent"), _START_ROW),
     **dict.fromkeys(("start_zero", "start_columns", "steady", "jacobian_to_step", "step_diagonal"), _INTEGER),
     **{f"{matrix}.{field}": _INTEGER for matrix in ("step", "start") for field in _QR},
+    **{f"lu.{field}": _INTEGER for field in _LU},
     **{
         f"tapes.{tape}.{field}": kind
         for tape in _TAPES
@@ -226,6 +228,7 @@ def _contents(
     )
     for name, pattern in (("step", tables.step), ("start", tables.start_pattern)):
         contents |= {f"{name}.{field}": pattern[field] for field in _QR}
+    contents |= {f"lu.{field}": tables.lu[field] for field in _LU}
     for tape in tables.tapes.values():
         contents |= _tape(tape)
     return contents

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.compile.compiled import CompiledDae
+from modelica_like.fmi.elimination import SURE, doubts_of, lu_pattern
 from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.fmi.tape import ARGUMENTS, Slots, Tape, write_tapes
 
@@ -27,6 +28,7 @@ class Tables:
     Attributes:
         step: pattern of M/(h gamma) - J.
         to_step: its positions of the nonzeros of the Jacobian; `diagonal`: of the diagonal of every state.
+        lu: what `lu_pattern` says of it.
     """
 
     model: CompiledDae
@@ -36,6 +38,7 @@ class Tables:
     step: Pattern
     to_step: tuple[int, ...]
     diagonal: tuple[int, ...]
+    lu: Pattern
     start_pattern: Pattern
 
     @property
@@ -75,10 +78,15 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
     sizes = {name: model.equations.ode.size1_in(name) for name in ARGUMENTS[:-1]} | {
         "y": start.plan.system.function.size1_out(0)
     }
-    slots, tapes = write_tapes(functions, sizes)
+    slots, written = write_tapes(functions, sizes)
+    tapes, to_step = {tape.name: tape for tape in written}, _places(jacobian, step)
+    doubts = [SURE] * step.nnz()
+    for place, doubt in zip(to_step, doubts_of(tapes["jacobian"], slots), strict=True):
+        doubts[place] = doubt
+    entries = list(zip(*step.get_triplet(), strict=True))
     return Tables(
-        model, start, slots, {tape.name: tape for tape in tapes}, qr_pattern(step), _places(jacobian, step),
-        tuple(_places(diagonal, step)), qr_pattern(start_pattern),
+        model, start, slots, tapes, qr_pattern(step), to_step, _places(diagonal, step),
+        lu_pattern(entries, doubts, states), qr_pattern(start_pattern),
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 import ctypes
 import subprocess
 from collections.abc import Callable
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,14 @@ const Tape *tape(const Model *m, int k) { return (const Tape *)(const void *)&m-
 
 Instance *made(const Model *m) {
     return instance_new((Instance){.model = m, .name = "one", .allocate = calloc, .release = free}, m->token);
+}
+
+/* Solves with the step matrix. Tells whether LU without exchanges has done it, or that the matrix is singular. */
+int solved(Instance *c, const double *matrix, double *x) {
+    memcpy(c->matrix, matrix, (size_t)c->model->step.n_nonzeros * sizeof(double));
+    if (!factor_matrix(c)) return -1;
+    solve_step(c, x);
+    return c->by_lu;
 }
 """
 TAPES = [name.split(".")[1] for name in SECTIONS if name.startswith("tapes.") and name.endswith(".runs")]
@@ -239,3 +247,56 @@ def test_the_integrator_has_order_five_and_dense_output_of_order_four(inside):
     assert np.all(orders > 4.7), (orders, errors)
     assert np.all(np.log2(np.array(between[:-1]) / between[1:]) > 3.7), between
     assert errors[-1] < 1e-11
+
+
+STEP_MATRICES = ["msl/rotational/CoupledClutches.toml", "lepelletier.toml", "elements/full_turns.toml"]
+
+
+def solve_by(code: Inside, matrix: np.ndarray, right: np.ndarray) -> tuple[int, np.ndarray]:
+    """Solve with a matrix of the model's step pattern in C."""
+    columns, x = np.array(code.tables.step["colind"]), right.copy()
+    values = np.concatenate(
+        [matrix[list(code.tables.step["row"][a:b]), k] for k, (a, b) in enumerate(pairwise(columns))]
+    )
+    c = ctypes.c_void_p(code.library.made(code.read))
+    how = code.library.solved(c, pointer(values), pointer(x))
+    code.library.instance_free(c)
+    return how, x
+
+
+def step_matrix(code: Inside, diagonal: float, seed: int) -> np.ndarray:
+    """A matrix of the pattern with entries about one, and what comes from a step's length for the states."""
+    step, random = code.tables.step, np.random.default_rng(seed)
+    matrix = np.zeros((len(step["row_place"]),) * 2)
+    for column, (first, end) in enumerate(pairwise(step["colind"])):
+        matrix[list(step["row"][first:end]), column] = random.normal(size=end - first)
+    states = range(len(code.model.states))
+    matrix[states, states] += diagonal
+    return matrix
+
+
+@pytest.mark.parametrize("drive", STEP_MATRICES)
+@pytest.mark.parametrize("diagonal", [30.0, 1e5])
+def test_step_matrices_are_solved_without_exchanges(inside, drive, diagonal):
+    code = inside(drive)
+    for seed in range(20):
+        matrix = step_matrix(code, diagonal, seed)
+        right = np.random.default_rng(seed + 100).normal(size=len(matrix))
+        how, x = solve_by(code, matrix, right)
+        backward = np.abs(right - matrix @ x) / (np.abs(matrix) @ np.abs(x) + np.abs(right))
+        assert how == 1
+        # The limit of the growth times the rounding unit: an equation's error beside its terms.
+        assert np.max(backward) < 1e4 * np.finfo(float).eps
+
+
+@pytest.mark.parametrize("pivot", [0.0, 1e-20])
+def test_step_matrices_whose_pivots_vanish_are_solved_by_qr(inside, pivot):
+    """[pivot 1; 1 pivot] has the inverse [-pivot 1; 1 -pivot] / (1 - pivot²)."""
+    code = inside(Circle())
+    matrix = np.array([[pivot, 1.0, 0.5], [1.0, pivot, 0.0], [0.0, 0.0, 2.0]])
+    how, x = solve_by(code, matrix, np.array([3.0, 5.0, 4.0]))
+    assert how == 0
+    assert x == pytest.approx([5.0, 2.0, 2.0], rel=1e-15)
+    for singular in (0.0, np.nan):
+        matrix[2, 2] = singular
+        assert solve_by(code, matrix, np.ones(3))[0] == -1

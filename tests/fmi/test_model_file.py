@@ -34,7 +34,7 @@ def test_both_sides_know_the_same_sections():
         kind: re.search(rf"#define {kind}\((\w+)\)(.*?)\n\n?(?=#|static)", text, re.DOTALL) for kind in ("QR", "TAPE")
     }
     found: list[str] = []
-    for kind, name in re.findall(r"(TABLE|QR|TAPE)\((\w+)", table[1]):
+    for kind, name in re.findall(r"(TABLE|QR|TAPE)\(([\w.]+)", table[1]):
         part = parts.get(kind)
         if part is None:
             found.append(name)
@@ -90,7 +90,7 @@ def test_damage_is_told(reader):
     count = len(SECTIONS)
     newer = data[:8] + struct.pack("<i", 99) + data[12:]
     assert told(reader, newer) == (
-        f"The model file has format 99 with {count} tables, but this library reads format 10 with {count}. {AGAIN}"
+        f"The model file has format 99 with {count} tables, but this library reads format 11 with {count}. {AGAIN}"
     )
     number = list(SECTIONS).index("variables")
     offset = struct.unpack_from("<4i", data, 24 + 16 * number)[2]
