@@ -121,23 +121,23 @@ typedef struct {
  * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
  * steady state began; `impact_x` and `impact_d` are states before the first impact at an instant, `trials` points
  * without and with it, whose powers differ by what sources give in its duration. */
-#define WORK_NUMBERS(A)                                                                                                \
-    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),           \
-        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),    \
-        A(qr_work, system), A(lu_l, m->lu.n_l), A(lu_u, m->lu.n_u), A(lu_pivots, n), A(lu_weights, n), A(lu_sizes, n), \
-        A(lu_last, last *last), A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),       \
-        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),           \
-        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS),   \
-        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),              \
-        A(start_unknowns, system), A(start_errors, system), A(start_sizes, system),                                    \
-        A(kept_starts, N_KEPT_STARTS *(n + 2 * n_d)), A(start_values, starts),                                         \
-        A(start_residual, larger(m->n_start_values, resets)), A(delayed, 2 * delays),                                  \
-        A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(motions, holds), A(d_before, n_d), A(d_begun, n_d),    \
-        A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),                         \
-        A(target_missing, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x),                  \
-        A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d),    \
-        A(kept_z, n_z), A(reactions, members), A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges),     \
-        A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n), A(edge_guards, 2 * guards),             \
+#define WORK_NUMBERS(A)                                                                                              \
+    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),         \
+        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),  \
+        A(qr_work, 2 * system), A(lu, m->lu.n_rows), A(lu_pivots, n), A(lu_sizes, n), A(lu_last, last *last),        \
+        A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),                             \
+        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),         \
+        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS), \
+        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),            \
+        A(start_unknowns, system), A(start_errors, system), A(start_sizes, system),                                  \
+        A(kept_starts, N_KEPT_STARTS *(n + 2 * n_d)), A(start_values, starts),                                       \
+        A(start_residual, larger(m->n_start_values, resets)), A(delayed, 2 * delays),                                \
+        A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(motions, holds), A(d_before, n_d), A(d_begun, n_d),  \
+        A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),                       \
+        A(target_missing, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x),                \
+        A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d),  \
+        A(kept_z, n_z), A(reactions, members), A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges),   \
+        A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n), A(edge_guards, 2 * guards),           \
         A(trials, 2 * (n + n_d))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; jolted: what new

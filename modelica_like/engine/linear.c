@@ -110,15 +110,17 @@ void lu_solve_transposed(int n, const double *m, const int *order, double *x) {
 }
 
 /* LU of the step matrix: equations have been matched with unknowns, and ordered, when the model was written; the last
- * ones are eliminated with exchanges. Returns 0 where a pivot vanishes, or so much is subtracted that rounding counts.
- * What is subtracted is measured beside the matrix with its rows, and then its columns, made one. */
-static int lu_of_step(Instance *c) {
+ * ones are eliminated with exchanges. Where a pivot vanishes, or so much is subtracted that rounding counts, QR. What
+ * is subtracted is measured beside the matrix with its rows, and then its columns, made one. Returns 0 if it is
+ * singular. */
+int factor_matrix(Instance *c) {
     const QrPattern *a = &c->model->step;
     const LuPattern *lu = &c->model->lu;
-    int first = lu->n_ends - 1, last = a->size - first;
-    double *x = c->qr_work, *weights = c->lu_weights, size, subtracted, largest, inverse;
-    memset(x, 0, (size_t)a->size * sizeof(double));
-    memset(weights, 0, (size_t)a->size * sizeof(double));
+    int first = lu->n_ends - 1 - a->size, last = a->size - first;
+    const int *l_end = lu->ends, *u_end = l_end + first;
+    double *x = c->qr_work, *weights = x + a->size, size, subtracted, largest, inverse;
+    c->by_lu = 0;
+    memset(x, 0, 2 * (size_t)a->size * sizeof(double));
     for (int k = 0; k < a->n_nonzeros; k++) raise_to(&weights[lu->row_place[a->row[k]]], fabs(c->matrix[k]));
     for (int k = 0; k < a->size; k++) weights[k] = 1 / weights[k];
     for (int column = 0; column < a->size; column++) {
@@ -129,14 +131,14 @@ static int lu_of_step(Instance *c) {
             x[row] = c->matrix[k];
             raise_to(&size, weights[row] * fabs(x[row]));
         }
-        for (int k = lu->u_colind[column]; k < lu->u_colind[column + 1]; k++) {
-            int row = lu->u_row[k];
-            double factor = c->lu_u[k] = x[row];
+        for (int k = u_end[column]; k < u_end[column + 1]; k++) {
+            int row = lu->rows[k];
+            double factor = c->lu[k] = x[row];
             x[row] = 0;
             raise_to(&subtracted, fabs(factor) * c->lu_sizes[row]);
-            for (int r = lu->l_colind[row]; r < lu->l_colind[row + 1]; r++) x[lu->l_row[r]] -= c->lu_l[r] * factor;
+            for (int r = l_end[row]; r < l_end[row + 1]; r++) x[lu->rows[r]] -= c->lu[r] * factor;
         }
-        if (!(subtracted <= MOST_GROWTH * size)) return 0;
+        if (!(subtracted <= MOST_GROWTH * size)) return qr_factor(a, c->matrix, c);
         if (column >= first) {
             memcpy(c->lu_last + (size_t)(column - first) * (size_t)last, x + first, (size_t)last * sizeof(double));
             memset(x + first, 0, (size_t)last * sizeof(double));
@@ -144,39 +146,35 @@ static int lu_of_step(Instance *c) {
         }
         inverse = c->lu_pivots[column] = 1 / x[column];
         x[column] = 0;
-        if (!isfinite(inverse) || inverse == 0) return 0;
-        for (int r = lu->l_colind[column]; r < lu->l_colind[column + 1]; r++) {
-            int row = lu->l_row[r];
-            c->lu_l[r] = x[row] * inverse;
+        if (!isfinite(inverse) || inverse == 0) return qr_factor(a, c->matrix, c);
+        for (int r = l_end[column]; r < l_end[column + 1]; r++) {
+            int row = lu->rows[r];
+            c->lu[r] = x[row] * inverse;
             x[row] = 0;
-            raise_to(&largest, weights[row] * fabs(c->lu_l[r]));
+            raise_to(&largest, weights[row] * fabs(c->lu[r]));
         }
         c->lu_sizes[column] = largest;
     }
-    return lu_factor(last, c->lu_last, c->last_order);
-}
-
-/* Factorises the step matrix. Returns 0 if it is singular. */
-int factor_matrix(Instance *c) {
-    c->by_lu = lu_of_step(c);
-    return c->by_lu || qr_factor(&c->model->step, c->matrix, c);
+    c->by_lu = lu_factor(last, c->lu_last, c->last_order);
+    return c->by_lu || qr_factor(a, c->matrix, c);
 }
 
 void solve_step(const Instance *c, double *x) {
     const LuPattern *lu = &c->model->lu;
     double *y = c->qr_work;
-    int n = c->model->step.size, first = lu->n_ends - 1;
+    int n = c->model->step.size, first = lu->n_ends - 1 - n;
+    const int *l_end = lu->ends, *u_end = l_end + first;
     if (!c->by_lu) {
         qr_solve(&c->model->step, c, x);
         return;
     }
     for (int k = 0; k < n; k++) y[lu->row_place[k]] = x[k];
     for (int k = 0; k < first; k++)
-        for (int r = lu->l_colind[k]; r < lu->l_colind[k + 1]; r++) y[lu->l_row[r]] -= c->lu_l[r] * y[k];
+        for (int r = l_end[k]; r < l_end[k + 1]; r++) y[lu->rows[r]] -= c->lu[r] * y[k];
     lu_solve(n - first, c->lu_last, c->last_order, y + first);
     for (int k = n - 1; k >= 0; k--) {
         double solved = x[lu->column_order[k]] = k < first ? y[k] * c->lu_pivots[k] : y[k];
-        for (int r = lu->u_colind[k]; r < lu->u_colind[k + 1]; r++) y[lu->u_row[r]] -= c->lu_u[r] * solved;
+        for (int r = u_end[k]; r < u_end[k + 1]; r++) y[lu->rows[r]] -= c->lu[r] * solved;
     }
 }
 

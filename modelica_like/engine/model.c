@@ -28,7 +28,7 @@ typedef struct {
 
 static const struct {
     const char *name;
-    size_t record, table, count;
+    unsigned record, table, count;
 } tables[] = {TABLE(settings, n_settings), TABLE(text, n_text), TABLE(token, n_token), TABLE(constants, n_constants),
     TABLE(parameters, n_p), TABLE(parameter_min, n_p), TABLE(parameter_max, n_p), TABLE(inputs, n_u),
     TABLE(guesses, n_guesses), TABLE(nominals, n_x), TABLE(state_names, n_x), TABLE(implicit_names, n_z),
@@ -40,12 +40,11 @@ static const struct {
     TABLE(start_direct, n_start_direct), TABLE(start_default, n_start_default), TABLE(start_guess, n_start_guess),
     TABLE(start_rows, n_start_unknowns), TABLE(start_dependent, n_start_dependent), TABLE(start_zero, n_start_zero),
     TABLE(start_columns, n_start_unknowns), TABLE(steady, n_steady), TABLE(jacobian_to_step, n_jacobian),
-    TABLE(step_diagonal, n_x), QR(step), QR(start), TABLE(lu.l_colind, lu.n_ends), TABLE(lu.l_row, lu.n_l),
-    TABLE(lu.u_colind, step.n_ends), TABLE(lu.u_row, lu.n_u), TABLE(lu.row_place, step.size),
-    TABLE(lu.column_order, step.size), TAPE(rates), TAPE(jacobian), TAPE(alg), TAPE(alg_jacobian), TAPE(variables),
-    TAPE(guards), TAPE(edges), TAPE(guards_soon), TAPE(moments), TAPE(resets), TAPE(updates), TAPE(start_conditions),
-    TAPE(start_values), TAPE(discrete_starts), TAPE(hold_terms), TAPE(determinants), TAPE(start_system),
-    TAPE(start_jacobian), TAPE(derived), TAPE(delays)};
+    TABLE(step_diagonal, n_x), QR(step), QR(start), TABLE(lu.ends, lu.n_ends), TABLE(lu.rows, lu.n_rows),
+    TABLE(lu.row_place, step.size), TABLE(lu.column_order, step.size), TAPE(rates), TAPE(jacobian), TAPE(alg),
+    TAPE(alg_jacobian), TAPE(variables), TAPE(guards), TAPE(edges), TAPE(guards_soon), TAPE(moments), TAPE(resets),
+    TAPE(updates), TAPE(start_conditions), TAPE(start_values), TAPE(discrete_starts), TAPE(hold_terms),
+    TAPE(determinants), TAPE(start_system), TAPE(start_jacobian), TAPE(derived), TAPE(delays)};
 enum { N_TABLES = sizeof tables / sizeof tables[0] };
 
 /* Tells that a file is no model; returns 0. */
@@ -179,17 +178,12 @@ typedef struct { /* integers of records, not below `low` and below `end` */
     const char *name;
     const void *first;
     size_t stride;
-    int count, low;
-    int64_t end;
+    int64_t count, low, end;
 } Range;
 #define COLUMN(table, field, n, low, end) {#table "." #field, &m->table[0].field, sizeof m->table[0], m->n, low, end}
 #define INDEX(table, field, end) COLUMN(table, field, n_##table, 0, m->end)
 #define TEXT(table, field) INDEX(table, field, n_text)
 #define ARRAY(table, n, end) {#table, m->table, sizeof(int), m->n, 0, m->end}
-#define QR_ROWS(matrix)                                                                                  \
-    ARRAY(matrix.row, matrix.n_nonzeros, matrix.size), ARRAY(matrix.v_row, matrix.n_v, matrix.size),     \
-        ARRAY(matrix.r_row, matrix.n_r, matrix.size), ARRAY(matrix.row_place, matrix.size, matrix.size), \
-        ARRAY(matrix.column_order, matrix.size, matrix.size)
 
 /* Every index is one of the table that it points into. */
 static int check_indices(const Model *m, char *message) {
@@ -221,11 +215,10 @@ static int check_indices(const Model *m, char *message) {
         COLUMN(start_rows, row, n_start_unknowns, 0, m->n_start_values), INDEX(start_dependent, start, n_starts),
         INDEX(start_dependent, node, n_nodes), ARRAY(start_zero, n_start_zero, n_x),
         ARRAY(start_columns, n_start_unknowns, n_unknowns + m->n_y), ARRAY(steady, n_steady, n_unknowns),
-        ARRAY(jacobian_to_step, n_jacobian, step.n_nonzeros), ARRAY(step_diagonal, n_x, step.n_nonzeros), QR_ROWS(step),
-        QR_ROWS(start), ARRAY(lu.l_row, lu.n_l, step.size), ARRAY(lu.u_row, lu.n_u, lu.n_ends - 1),
+        ARRAY(jacobian_to_step, n_jacobian, step.n_nonzeros), ARRAY(step_diagonal, n_x, step.n_nonzeros),
         ARRAY(lu.row_place, step.size, step.size), ARRAY(lu.column_order, step.size, step.size)};
     for (size_t k = 0; k < sizeof ranges / sizeof ranges[0]; k++)
-        for (int i = 0; i < ranges[k].count; i++) {
+        for (int64_t i = 0; i < ranges[k].count; i++) {
             int value;
             memcpy(&value, (const char *)ranges[k].first + (size_t)i * ranges[k].stride, sizeof value);
             if (value < ranges[k].low || value >= ranges[k].end) return damaged(message, ranges[k].name);
@@ -267,20 +260,24 @@ static int check_variables(const Model *m, char *message) {
     return 1;
 }
 
-/* Where columns of a sparse matrix end; `least` entries in each. */
-static int check_ends(int size, int n_ends, const int *colind, int count, int least) {
-    if (n_ends != size + 1 || colind[0] != 0 || colind[size] != count) return 0;
+/* Columns of a sparse matrix; `least` entries in each. */
+static int check_columns(int size, int rows, const int *colind, const int *row, int count, int least) {
+    if (colind[0] != 0 || colind[size] != count) return 0;
     for (int k = 0; k < size; k++)
         if (colind[k + 1] > count || colind[k + 1] < colind[k] + least) return 0;
+    for (int k = 0; k < count; k++)
+        if (row[k] < 0 || row[k] >= rows) return 0;
     return 1;
 }
 
 static int check_pattern(const QrPattern *a) {
     int n = a->size;
-    if (!check_ends(n, a->n_ends, a->colind, a->n_nonzeros, 0) || !check_ends(n, a->n_ends, a->v_colind, a->n_v, 1) ||
-        !check_ends(n, a->n_ends, a->r_colind, a->n_r, 1))
+    if (a->n_ends != n + 1 || !check_columns(n, n, a->colind, a->row, a->n_nonzeros, 0) ||
+        !check_columns(n, n, a->v_colind, a->v_row, a->n_v, 1) ||
+        !check_columns(n, n, a->r_colind, a->r_row, a->n_r, 1))
         return 0;
     for (int k = 0; k < n; k++) {
+        if (a->row_place[k] < 0 || a->row_place[k] >= n || a->column_order[k] < 0 || a->column_order[k] >= n) return 0;
         /* The diagonal of R stands last in its column, and ends the search for it. */
         for (int r = a->r_colind[k]; r < a->r_colind[k + 1]; r++)
             if ((r < a->r_colind[k + 1] - 1) != (a->r_row[r] < k)) return 0;
@@ -290,8 +287,11 @@ static int check_pattern(const QrPattern *a) {
 }
 
 static int check_lu(const LuPattern *a, int n) {
-    return a->n_ends > 0 && a->n_ends <= n + 1 && check_ends(a->n_ends - 1, a->n_ends, a->l_colind, a->n_l, 0) &&
-           check_ends(n, n + 1, a->u_colind, a->n_u, 0);
+    int eliminated = a->n_ends - 1 - n;
+    if (eliminated < 0 || eliminated > n || !check_columns(a->n_ends - 1, n, a->ends, a->rows, a->n_rows, 0)) return 0;
+    for (int k = a->ends[eliminated]; k < a->n_rows; k++)
+        if (a->rows[k] >= eliminated) return 0;
+    return 1;
 }
 
 /* Reads a model from bytes that are aligned as numbers and outlive it. Returns NULL and a message for `message`, which

@@ -37,9 +37,9 @@ typedef struct { /* pattern of a square matrix and of its QR factors, see tables
     const int *colind, *row, *v_colind, *v_row, *r_colind, *r_row, *row_place, *column_order;
 } QrPattern;
 
-typedef struct { /* of its LU factors, see elimination.py: without what comes last, as many as have no end */
-    int n_ends, n_l, n_u;
-    const int *l_colind, *l_row, *u_colind, *u_row, *row_place, *column_order;
+typedef struct { /* of its LU factors, see elimination.py: columns of L, which the last ones have not, and then of U */
+    int n_ends, n_rows;
+    const int *ends, *rows, *row_place, *column_order;
 } LuPattern;
 
 typedef enum {

@@ -4,9 +4,9 @@
 #define OFFSET 1e-12
 
 const Variable *find_variable(const Model *m, uint32_t reference) {
-    int low = 0, high = m->n_variables - 1;
-    while (low <= high) {
-        int middle = low + (high - low) / 2;
+    uint32_t place = m->n_variables > 0 ? reference - m->variables[0].reference : 0; /* where no number is left out */
+    int low = 0, high = m->n_variables - 1, middle = place < (uint32_t)m->n_variables ? (int)place : high;
+    for (; low <= high; middle = low + (high - low) / 2) {
         if (m->variables[middle].reference == reference) return &m->variables[middle];
         if (m->variables[middle].reference < reference) low = middle + 1;
         else high = middle - 1;

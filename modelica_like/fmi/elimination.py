@@ -30,9 +30,9 @@ def lu_pattern(entries: Entries, doubts: Sequence[int], states: int) -> dict[str
         states: number of states, the first unknowns.
 
     Returns:
-        Patterns by their names in model.h: `l_colind`, `l_row`: columns below the diagonal of L, without the last ones;
-        `u_colind`, `u_row`: above that of U, in rows without the last ones; `row_place`: permuted position of every
-        row; `column_order`: columns by position.
+        By their names in model.h: `ends` and `rows` of columns of L below the diagonal, without the last ones, and then
+        of columns of U above it, in rows without the last ones; `row_place`: permuted position of every row;
+        `column_order`: columns by position.
     """
     size = 1 + max((row for row, _ in entries), default=-1)
     rows, pivot_doubts = _matching(entries, doubts, states, size)
@@ -46,9 +46,9 @@ def lu_pattern(entries: Entries, doubts: Sequence[int], states: int) -> dict[str
     place = {column: k for k, column in enumerate(order)}
     lower, upper = _filled([{place[row] for row in columns[column]} for column in order], size - len(late))
     tables = {"row_place": tuple(place[column_of[row]] for row in range(size)), "column_order": tuple(order)}
-    for name, factor in (("l", lower), ("u", upper)):
-        tables[f"{name}_colind"] = (0, *accumulate(map(len, factor)))
-        tables[f"{name}_row"] = tuple(row for column in factor for row in column)
+    factors = lower + upper
+    tables["ends"] = (0, *accumulate(map(len, factors)))
+    tables["rows"] = tuple(row for column in factors for row in column)
     return tables
 
 

@@ -48,7 +48,7 @@ _RESET = _record("place value transition at_start", "factor")
 _START_OF = _record("position start", "factor")
 _START_ROW = _record("start node row")
 _QR = ("colind", "row", "v_colind", "v_row", "r_colind", "r_row", "row_place", "column_order")
-_LU = ("l_colind", "l_row", "u_colind", "u_row", "row_place", "column_order")
+_LU = ("ends", "rows", "row_place", "column_order")
 _TAPES = (
     "rates", "jacobian", "alg", "alg_jacobian", "variables", "guards", "edges", "guards_soon", "moments", "resets",
     "updates", "start_conditions", "start_values", "discrete_starts", "hold_terms", "determinants", "start_system",
