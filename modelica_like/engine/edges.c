@@ -174,12 +174,29 @@ static double window_error(Instance *c, double begin, double end, int parts, int
     return error_norm(c, c->piece->points, last_of(m, c->piece), change);
 }
 
+/* The matrix of a step over a piece of another integrator, at one of its ends. */
+static int factor_piece(Instance *c, int at_end) {
+    Piece *piece = c->piece;
+    double t = at_end ? piece->end : piece->begin;
+    return factor_at(c, t, at_end ? last_of(c->model, piece) : piece->points, piece->end - piece->begin);
+}
+
 /* Is it more than a step, or another integrator in a part of a piece, explains? Where it seems so, the window is taken
  * in parts: its slopes may be curved. */
-static int is_unseen(Instance *c, double begin, double end, int with_matrix) {
+static int is_more(Instance *c, double begin, double end, int with_matrix) {
     double h = c->piece->end - c->piece->begin, most = UNSEEN + takes_panels(c) * UNEXPLAINED * (end - begin) / h;
     return window_error(c, begin, end, 1, with_matrix) > most &&
            window_error(c, begin, end, CURVED, with_matrix) > most;
+}
+
+/* Has the step, or another integrator, not seen a window? A piece that begins on the edge of a stiff one, or ends
+ * there, takes it all for what decays: at one end it does not. */
+static int is_unseen(Instance *c, double begin, double end) {
+    if (!takes_panels(c)) return is_more(c, begin, end, 1);
+    if (!is_more(c, begin, end, 0)) return 0;
+    for (int at_end = 0; at_end < 2; at_end++)
+        if (factor_piece(c, at_end) && is_more(c, begin, end, 1)) return 1;
+    return 0;
 }
 
 /* Guards at a time of the piece. */
@@ -226,19 +243,11 @@ static int has_risen(Instance *c, double t) {
     return 0;
 }
 
-/* The matrix of a step over a piece of another integrator, at one of its ends. */
-static int factor_piece(Instance *c, int at_end) {
-    Piece *piece = c->piece;
-    double t = at_end ? piece->end : piece->begin;
-    return factor_at(c, t, at_end ? last_of(c->model, piece) : piece->points, piece->end - piece->begin);
-}
-
 /* Goes through the windows of a step and returns the smaller length that it must have, or infinity. */
-static double judge_windows(Instance *c, double least, int of_slopes, int of_guards, int precisely, int at_end) {
+static double judge_windows(Instance *c, double least, int of_slopes, int of_guards, int precisely) {
     double begin = c->piece->begin, h = c->piece->end - begin, landing = h, *now = c->edges_middle;
     double resolved = begin + TIME_RESOLUTION * fmax(1, fabs(begin));
     int unseen = 0, noise = 0, windows = 0;
-    if (of_slopes && takes_panels(c) && !factor_piece(c, at_end)) return INFINITY;
     memcpy(now, c->edges, (size_t)c->model->tapes.edges.n_outputs * sizeof(double));
     for (double before = begin, edge = begin; edge < c->piece->end && !(unseen && landing < h); before = edge) {
         edge = fmin(next_edge(c, before, now, precisely), c->piece->end);
@@ -250,7 +259,7 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
         double between = 0.5 * (before + edge);
         if (of_guards && between > resolved && has_risen(c, between)) return between - begin;
         if (of_guards && edge > resolved && has_risen(c, edge)) return edge - begin;
-        unseen |= of_slopes && is_unseen(c, before, edge, 1);
+        unseen |= of_slopes && is_unseen(c, before, edge);
         if (landing == h && edge - begin > fmax(least, ALREADY * h)) landing = edge - begin;
     }
     if (unseen && landing >= h && takes_panels(c)) return 0.5 * h; /* the piece ends at its only edge */
@@ -261,11 +270,8 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
  * integrator may be longer than pieces: one that goes over a force shows it in pieces beside its edges, too. */
 static double explained_length(Instance *c) {
     double begin = c->piece->begin, end = c->piece->end;
-    if (!takes_panels(c) || c->model->settings->n_slope_edges == 0) return INFINITY;
-    if (!is_unseen(c, begin, end, 0)) return INFINITY;
-    for (int at_end = 0; at_end < 2; at_end++)
-        if (factor_piece(c, at_end) && is_unseen(c, begin, end, 1)) return 0.5 * (end - begin);
-    return INFINITY;
+    int judged = takes_panels(c) && c->model->settings->n_slope_edges > 0;
+    return judged && is_unseen(c, begin, end) ? 0.5 * (end - begin) : INFINITY;
 }
 
 /* Are all edges farther away than they come by their changes in this step, and in the one before? */
@@ -303,11 +309,8 @@ double seen_length(Instance *c, double least, double *most) {
     if (!of_slopes && !of_guards) return explained_length(c);
     memset(c->positive, 0, (size_t)m->n_guards);
     if (of_guards) note_positive(c, begin), note_positive(c, c->piece->end);
-    /* A piece that begins on the edge of a stiff window, or ends there, takes it all for what decays. */
-    for (int at_end = 0; at_end <= (of_slopes && takes_panels(c)); at_end++)
-        if (isfinite(judge_windows(c, least, of_slopes, of_guards, 0, at_end)))
-            return judge_windows(c, least, of_slopes, of_guards, 1, at_end);
-    return INFINITY;
+    if (!isfinite(judge_windows(c, least, of_slopes, of_guards, 0))) return INFINITY;
+    return judge_windows(c, least, of_slopes, of_guards, 1);
 }
 
 /* Is there an edge within the piece? Where slopes jump, no step is short enough for its error to be small. */

@@ -28,7 +28,7 @@ _WRONG = 100.0
 err by one of them, IDAS makes about ten between two results, and errors are estimates, ten times as large at worst."""
 _STEPS = 10
 """Steps between two results up to which that holds; above, more may add up."""
-_PIECES = 8
+_PIECES = 4
 """Smooth pieces of a run at which the tolerances are looked at."""
 _SIGNS = 8
 """Combinations of signs along which changes of energies are looked at: their mean errs by a third."""
