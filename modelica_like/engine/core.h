@@ -78,8 +78,8 @@ typedef struct {
 } Terms; /* of a motion that modes hold */
 
 typedef struct { /* of another integrator: where its pieces end, and five knots of each, shared with the next one */
-    double begin, longest;  /* longest: what pieces may have, as waves ask for */
-    int64_t pieces, number; /* number: of the present one */
+    double begin, longest, soon; /* longest: what pieces may have, as waves ask for; soon: until a guard may be zero */
+    int64_t pieces, number;      /* number: of the present one */
     const double *ends, *knots;
 } Panel;
 
@@ -364,6 +364,7 @@ void take_looks(Instance *c, Looks *looks);
 #define MOST_LOOKS 11 /* at guards, that there is room for */
 double cubic_guess(double g0, double r0, double g1, double r1);
 int search_events(Instance *c);
+double soonest_zero(Instance *c);
 const double *rounding_of_guards(Instance *c, const Piece *piece, double t);
 /* edges.c */
 double seen_length(Instance *c, double least, double *most);
