@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import accumulate
 from typing import Any, Literal
 
 import casadi as ca
@@ -13,11 +14,13 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.language.formula import Formula
 from modelica_like.language.units import ONE, Unit, parse_unit, to_si
 from modelica_like.runs.signals import formula_of, si_value, unit_of
 from modelica_like.solve.recorder import Event
 
 _CALL = re.compile(r"\s*(max|min|peak|integral|mean|rms|at|first|duration|series|time)\s*\((.*)\)\s*$")
+_INSIDE = re.compile(r"\b(max|min|peak|integral|mean|rms|at|first|duration|series|time)\s*\(")
 _CONDITION = re.compile(r"(.+?)(<=?|>=?)(.+)")
 _CHANGE = re.compile(
     r"\s*(?P<mode>[^:\s]+)\s*(?::\s*(?P<before>\w+)\s*)?(?:→|->)\s*(?P<after>\w+)\s*(?:,\s*(?P<number>-?\d+))?\s*$"
@@ -205,7 +208,7 @@ def read_output(model: CompiledDae, name: str) -> Output:
         UnknownName: the model has no such output.
     """
     called = _CALL.match(name)
-    if called is None:
+    if called is None or not _is_closed(called.group(2)):
         return _plain(model, name.strip())
     kind, inside = called.group(1), called.group(2).strip()
     if kind in ("max", "min") and _is_formula(name):
@@ -223,6 +226,12 @@ def read_output(model: CompiledDae, name: str) -> Output:
     if kind == "integral":
         unit = _JOULE if str(unit) == "W" else unit * _SECOND
     return Output(name, unit, kind, path.strip(), to_si(moment.strip(), _SECOND, name) if kind == "at" else 0.0)
+
+
+def _is_closed(text: str) -> bool:
+    """Whether no bracket is closed that was not opened: `a)*max(b` is no argument."""
+    depths = accumulate((char == "(") - (char == ")") for char in text)
+    return all(depth >= 0 for depth in depths)
 
 
 def _is_formula(name: str) -> bool:
@@ -257,13 +266,31 @@ def _plain(model: CompiledDae, name: str) -> Output:
     whole = _of_whole_run(model, name)
     if whole is not None:
         return whole
-    formula = None if _is_variable(model, name) else formula_of(name)
+    formula = None if _is_variable(model, name) else _formula(name)
     names = [] if formula is None else list(dict.fromkeys(formula.names()))
     if formula is None or not any(_of_whole_run(model, path) for path in names):
         return Output(name, expression_of(model, name)[1], "end", name)
     operands = tuple(_plain(model, path) for path in names)
     unit = unit_of(formula, {operand.name: str(operand.unit) for operand in operands}, model.name)
     return Output(name, parse_unit(unit), "formula", name, operands=operands)
+
+
+def _formula(name: str) -> Formula | None:
+    """Return a formula, None for a plain name.
+
+    Raises:
+        NetlistError, UnknownName: it is none, or calculates with readings.
+    """
+    try:
+        return formula_of(name)
+    except NetlistError as error:
+        if _INSIDE.search(name) is None:
+            raise
+        raise UnknownName(
+            f"'{name}' calculates with readings of a run, which formulas cannot.",
+            advice="Ask for each reading and calculate with the numbers; a formula may stand inside: "
+            "max(a.tau + b.tau).",
+        ) from error
 
 
 def _is_variable(model: CompiledDae, name: str) -> bool:

@@ -34,6 +34,12 @@ def unsteady(times: int) -> RecordedSolution:
 
 
 CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
+    "a formula of readings": (UnknownName, lambda: run().read("rms(clutch.tau)*max(clutch.tau)"), """\
+'rms(clutch.tau)*max(clutch.tau)' calculates with readings of a run, which formulas cannot.
+Ask for each reading and calculate with the numbers; a formula may stand inside: max(a.tau + b.tau)."""),
+    "half a reading": (UnknownName, lambda: run().read("max(clutch.tau)/2"), """\
+'max(clutch.tau)/2' calculates with readings of a run, which formulas cannot.
+Ask for each reading and calculate with the numbers; a formula may stand inside: max(a.tau + b.tau)."""),
     "a trajectory in a sweep": (ValueOutOfRange, lambda: sweep(DRIVE, {"clutch.capacity": [90.0]}, ["series(clutch.tau)"]), """\
 series(clutch.tau) is a trajectory, not a number.
 Take it from the results."""),
