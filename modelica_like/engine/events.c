@@ -9,7 +9,6 @@
 #define LATER 1e3     /* time resolutions, for the difference of a rate: what turns round in less is at rest */
 #define NEVER 1e29    /* s: a moment that does not come */
 #define CONVERGES 0.9 /* length of a crowd over the one before: rebounds come to their end, chattering does not */
-#define REACHED 1e-9  /* of the largest value of its unit, and of what moves: what a new value may be missed by */
 #define CROWDED 1e-6  /* of the run: in less time, CROWD further instants follow each other ever faster */
 
 /* A guard that is not a number is false; what is nothing but rounding is zero. */
@@ -102,35 +101,6 @@ static void drop_returning(Instance *c, const double *modes, double *soon) {
     }
 }
 
-/* Move the states as little as possible, so that variables that follow from them take new values, or vanish. */
-void move_states(Instance *c, const int *nodes, const double *values, int count) {
-    double *slopes = c->square, *change = c->start_residual, *step = c->point;
-    variables_now(c);
-    for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->variables[nodes[k]];
-    for (int k = 0; k < count; k++) slope_of_node(c, nodes[k], k > 0, slopes + (size_t)k * c->model->n_x);
-    least_squares(count, c->model->n_x, slopes, change, step);
-    for (int k = 0; k < c->model->n_x; k++) c->x[k] += step[k];
-}
-
-/* Gives variables their new values. An error if something else determines one of them: others, or what is given. */
-static Result move_targets(Instance *c, int count) {
-    const Model *m = c->model;
-    double *missing = c->target_missing;
-    if (count < 0) return fail(c, TWO_NEW_VALUES, c->state.t, -1 - count);
-    if (count == 0) return RESULT_OK;
-    variables_now(c);
-    for (int k = 0; k < count; k++) missing[k] = c->target_values[k] - c->variables[c->targets[k]];
-    move_states(c, c->targets, c->target_values, count);
-    for (int k = 0; k < count; k++) {
-        double *slope = c->square, size = fmax(largest_like(m, c->variables, c->targets[k]), fabs(c->target_values[k]));
-        slope_of_node(c, c->targets[k], 0, slope);
-        size += sqrt(dot(m->n_x, slope, slope) * dot(m->n_x, c->point, c->point));
-        if (fabs(missing[k] - dot(m->n_x, slope, c->point)) <= REACHED * size) continue;
-        return fail(c, NEW_VALUE_CONTRADICTS, c->state.t, c->targets[k], c->target_values[k]);
-    }
-    return RESULT_OK;
-}
-
 void note_change(Instance *c, int name, int transition, int mode, int target) {
     const Model *m = c->model;
     const Mode *one = &m->modes[mode];
@@ -141,44 +111,6 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
     if (before >= 0 && before < one->n_names && target >= 0 && target < one->n_names)
         report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, text_of(m, name),
             text_of(m, names[(int)before]), text_of(m, names[target]));
-}
-
-/* Gives a state or a discrete value its new value, or notes a variable for move_targets; tells whether it changes. What
- * is to keep its value is noted where it gets no other one. A state that gets two values makes `count` negative. */
-static int take_value(Instance *c, const Reset *one, double value, double *d, int *count) {
-    int entry = one->place - c->model->n_x, node = entry - c->model->n_d, discrete = entry >= 0 && node < 0;
-    if (!discrete && isinf(value) && d == c->d) return 0; /* an update that sets nothing now */
-    if (!discrete) c->stopped = 0;
-    if (node >= 0 && *count < 0) return 1;
-    if (node >= 0) {
-        int target = c->model->reset_nodes[node];
-        for (int k = 0; k < *count && one->factor == 0; k++)
-            if (c->targets[k] == target) return 0;
-        c->targets[*count] = target;
-        c->target_values[(*count)++] = one->factor == 0 ? value : value / one->factor;
-        return 1;
-    }
-    double *place = discrete ? &d[entry] : &c->x[one->place], before = *place;
-    *place = value / one->factor;
-    if (!discrete && c->renewed[one->place] && fabs(*place - before) > REACHED * fabs(before)) *count = -1 - one->place;
-    if (!discrete) c->renewed[one->place] = 1;
-    return before != *place;
-}
-
-/* Whether what gets a new value at this event is one that keeps its value, which is noted last. */
-static int comes(const Reset *one, int keeping) { return (one->factor == 0) == keeping; }
-
-/* Carries out the resets of transitions, whose values have been evaluated; returns how many variables have been noted
- * for move_targets. */
-int take_resets(Instance *c, const unsigned char *firing, double *d) {
-    const Model *m = c->model;
-    int count = 0;
-    memset(c->renewed, 0, (size_t)m->n_x);
-    for (int keeping = 0; keeping < 2; keeping++)
-        for (const Reset *one = m->resets; one < m->resets + m->n_resets; one++)
-            if (firing[one->transition] && comes(one, keeping))
-                take_value(c, one, c->reset_values[one->value], d, &count);
-    return count;
 }
 
 /* Fire transitions together; of one mode only the one declared first. An error if one of them ends the run. */
@@ -208,16 +140,9 @@ static Result fire(Instance *c, unsigned char *wanting) {
 
 /* Evaluate the discrete equations once; tells whether something changes. */
 static Result update_once(Instance *c, int *changes) {
-    const Model *m = c->model;
-    double *values = c->reset_values;
-    int count = 0;
     *changes = 0;
-    if (m->n_updates == 0) return RESULT_OK;
-    evaluate_now(c, &m->tapes.updates, values);
-    memset(c->renewed, 0, (size_t)m->n_x);
-    for (int keeping = 0; keeping < 2; keeping++)
-        for (const Reset *one = m->updates; one < m->updates + m->n_updates; one++)
-            if (comes(one, keeping)) *changes |= take_value(c, one, values[one->value], c->d, &count);
+    if (c->model->n_updates == 0) return RESULT_OK;
+    int count = take_updates(c, changes);
     if (!*changes) return RESULT_OK;
     c->state.n_events++;
     return move_targets(c, count) && share_and_solve(c) && check_singular(c);
@@ -319,15 +244,6 @@ static void want_jumped(Instance *c, const double *before, unsigned char *wantin
     evaluate_now(c, &c->model->tapes.guards, c->guards_before);
     for (int g = 0; g < c->model->n_guards; g++)
         if (before[g] < 0 && c->guards_before[g] > 0 && guard_active(c, g)) wanting[c->model->guard_transition[g]] = 1;
-}
-
-/* Whether what is held may get a new speed. */
-static int may_jolt(const Model *m) {
-    int any = 0;
-    for (int k = 0; k < m->n_resets; k++) any |= m->resets[k].place < m->n_x || m->resets[k].place >= m->n_x + m->n_d;
-    for (int k = 0; k < m->n_updates; k++)
-        any |= m->updates[k].place < m->n_x || m->updates[k].place >= m->n_x + m->n_d;
-    return any && m->n_holds > 0;
 }
 
 /* Fire what wants to fire until nothing does. `wanting` holds the state events that were located, if `located`. */

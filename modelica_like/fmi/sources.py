@@ -18,8 +18,9 @@ Face = Literal["2.0", "3.0", "native"]
 _ENGINE = Path(__file__).parents[1] / "engine"
 
 RUNTIME = (
-    "model.c", "tape.c", "linear.c", "start.c", "steady.c", "holds.c", "impacts.c", "events.c", "panels.c", "locate.c",
-    "edges.c", "integrate.c", "fixed.c", "values.c", "delay.c", "derivatives.c", "gradient.c", "instance.c",
+    "model.c", "tape.c", "linear.c", "start.c", "steady.c", "holds.c", "impacts.c", "ideal.c", "events.c",
+    "resets.c", "panels.c", "locate.c", "edges.c", "integrate.c", "fixed.c", "values.c", "delay.c", "derivatives.c",
+    "gradient.c", "instance.c",
 )  # fmt: skip
 LOG_CATEGORIES = {
     "logStatusError": "errors: what went wrong, where, and what to do",
@@ -62,7 +63,8 @@ def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
 def own_sources(faces: Iterable[Face]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
     files = (name for face in faces for name in _FACES[face])
-    names = ("codes.h", "core.h", "model.h", "modelica_like.h", "operations.h", "model_data.c", *RUNTIME, *files)
+    headers = ("codes.h", "core.h", "types.h", "model.h", "modelica_like.h", "operations.h")
+    names = (*headers, "model_data.c", *RUNTIME, *files)
     return {name: (_ENGINE / name).read_text(encoding="utf-8") for name in names}
 
 

@@ -45,7 +45,7 @@ class BatchArguments(c.Structure):
 
 
 class Failure(c.Structure):
-    """`Failure` in core.h."""
+    """`Failure` in types.h."""
 
     _fields_ = [("code", c.c_int), ("place", _NUMBER), ("numbers", 2 * _NUMBER)]
 
@@ -55,7 +55,7 @@ POINT = 5 * c.POINTER(_NUMBER)
 
 
 class Panel(c.Structure):
-    """`Panel` in core.h."""
+    """`Panel` in types.h."""
 
     _fields_ = [
         *((name, _NUMBER) for name in ("begin", "longest", "soon")),
@@ -65,7 +65,7 @@ class Panel(c.Structure):
 
 
 class Looks(c.Structure):
-    """`Looks` in core.h."""
+    """`Looks` in types.h."""
 
     _fields_ = [
         *((name, _POINTER) for name in ("x", "z", "shares")),
@@ -76,7 +76,7 @@ class Looks(c.Structure):
 
 
 INTEGRATOR = c.CFUNCTYPE(c.c_int, _NUMBER, c.POINTER(Panel))
-"""`Integrator` in core.h."""
+"""`Integrator` in types.h."""
 
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "open": (_POINTER, [c.c_char_p, c.c_size_t, c.c_char_p]),
