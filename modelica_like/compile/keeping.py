@@ -48,15 +48,15 @@ class Keeping:
         placed = self._reduced.system.node_level[variable]
         if placed is None:
             return variable, 1.0
-        other = self._first[placed[0]]
-        return other, placed[1] / self._reduced.system.node_level[other][1]
+        other, factor = self._first[placed[0]]
+        return other, placed[1] / factor
 
     @cached_property
-    def _first(self) -> dict[int, int]:
-        """Of each level the variable with the shortest name."""
+    def _first(self) -> dict[int, tuple[int, float]]:
+        """Of each level the variable with the shortest name, and its factor."""
         variables, levels = self._reduced.flat.variables, self._reduced.system.node_level
         ordered = sorted(range(len(variables)), key=lambda k: (len(variables[k].path), variables[k].path), reverse=True)
-        return {placed[0]: k for k in ordered if (placed := levels[k])}
+        return {placed[0]: (k, placed[1]) for k in ordered if (placed := levels[k])}
 
     def _beside(self, variable: int) -> tuple[int, ...]:
         rows, tried = self._slopes([variable]), set[int]()
@@ -73,7 +73,7 @@ class Keeping:
             change = np.linalg.pinv(rows)[:, 0]
             sizes = np.abs(slopes) @ np.abs(change)
             moved = np.flatnonzero(np.abs(slopes @ change) > _ROUNDING * sizes)
-            row = next((k for k in moved if k not in tried), None)
+            row = next((k for k in moved.tolist() if k not in tried), None)
             if row is None:
                 return tuple(kept)
             tried.add(row)
