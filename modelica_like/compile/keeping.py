@@ -35,8 +35,8 @@ class Keeping:
     def beside(self, variable: int) -> tuple[int, ...]:
         """Return the variables that keep their values where one gets a new value.
 
-        They are bodies (whatever joins a derivative with a force, a torque, a current, …), first those that depend on
-        the fewest states; and positions, if a speed gets the new value. There are none where a variable is neither a
+        They are bodies (whatever joins a derivative with a force, a torque, a current, …), the neighbours first; and
+        positions, if a speed gets the new value. There are none where a variable is neither a
         speed nor a position nor stored, where it does not depend on the states, and where no slope is finite.
         """
         if variable not in self._found:
@@ -66,16 +66,20 @@ class Keeping:
         speed = placed is not None and self._reduced.system.levels[placed[0]].order > 0
         if not (speed or position or variable in self._bodies):
             return ()  # such as a force, which follows from positions and speeds
-        candidates = [*(self._positions if speed and not position else ()), *self._bodies]
+        positions = self._positions if speed and not position else []
+        candidates = [*positions, *self._bodies]
         slopes = self._slopes(candidates)
+        lengths = np.maximum(np.linalg.norm(slopes, axis=1), _ROUNDING)
         kept: list[int] = []
         while True:
             change = np.linalg.pinv(rows)[:, 0]
-            sizes = np.abs(slopes) @ np.abs(change)
-            moved = np.flatnonzero(np.abs(slopes @ change) > _ROUNDING * sizes)
-            row = next((k for k in moved.tolist() if k not in tried), None)
-            if row is None:
+            moves = np.abs(slopes @ change) / lengths
+            moved = [k for k in np.flatnonzero(moves > _ROUNDING * np.linalg.norm(change)).tolist() if k not in tried]
+            if not moved:
                 return tuple(kept)
+            # No position moves at once. The body that goes along most is the next neighbour: in a chain two are enough.
+            moved = [k for k in moved if k < len(positions)] or moved
+            row = moved[int(np.argmax(moves[moved] > (1.0 - _ROUNDING) * moves[moved].max()))]
             tried.add(row)
             left = slopes[row] - (slopes[row] @ np.linalg.pinv(rows)) @ rows
             if np.linalg.norm(left) > _ROUNDING * np.linalg.norm(slopes[row]):
@@ -99,13 +103,10 @@ class Keeping:
 
     @cached_property
     def _bodies(self) -> list[int]:
-        """What bodies store, and its integrals; those of fewest states first, whatever their order in the model."""
+        """What bodies store, and its integrals, by their names, whatever their order in the model."""
         flat = self._reduced.flat
         found = {node for instance in flat.instances for node in self._stored(instance)}
-        variables = [*found]
-        counts = np.count_nonzero(self._slopes(variables), axis=1) if variables else ()
-        ordered = sorted(zip(counts, (flat.variables[k].path for k in variables), variables, strict=True))
-        return [variable for *_, variable in ordered]
+        return sorted(found, key=lambda node: flat.variables[node].path)
 
     def _stored(self, instance: Instance) -> set[int]:
         """Variables whose derivatives an equation of an instance joins with flows, and their integrals."""
