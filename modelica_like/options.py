@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
-from numbers import Integral, Real
 from typing import Literal, get_args
 
+from modelica_like.arguments import fits, wrong_kind
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 
 SMALLEST_ATOL = 1e-20
@@ -31,10 +31,6 @@ _RANGES = (
     ("max_events", 1, 10**9), ("iterations", 1, 10**6),
 )  # fmt: skip
 """Of the numbers of options: least and largest, whole ones where these are."""
-
-
-def _fits(value: object, *, whole: bool) -> bool:
-    return isinstance(value, Integral if whole else Real)
 
 
 @dataclass(frozen=True)
@@ -71,12 +67,14 @@ class Options:
 
     def __post_init__(self) -> None:
         for name, low, high in _RANGES:
-            value, whole = getattr(self, name), isinstance(low, int)
-            if not _fits(value, whole=whole):
-                raise ValueOutOfRange(f"{name} = {value!r} is no {'whole ' * whole}number.")
+            value = getattr(self, name)
+            if not fits(value, type(low)):
+                raise wrong_kind(name, value, type(low))
             if not low <= value <= high:
                 given, least, most = (f"{x:,}" if isinstance(x, int) else f"{x:g}" for x in (value, low, high))
                 raise ValueOutOfRange(f"{name} = {given} is out of range: it must be between {least} and {most}.")
+        if not fits(self.max_step, float):
+            raise wrong_kind("max_step", self.max_step, float)
         if not self.max_step > 0:
             raise ValueOutOfRange(f"max_step = {self.max_step:g} s is out of range: it must be positive.")
         for name, kinds in (("on_chattering", get_args(OnChattering)), ("on_energy_drift", get_args(OnEnergyDrift))):

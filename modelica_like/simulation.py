@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from modelica_like import upper
+from modelica_like.arguments import checked
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.sliding import as_asked
@@ -54,6 +55,7 @@ Solver = Literal["idas", "native"]
 Model = Component | CompiledDae | str | Path
 
 
+@checked
 def build(
     drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = (), on_chattering: OnChattering | None = None
 ) -> CompiledDae:
@@ -74,18 +76,11 @@ def build(
     if on_chattering is not None:
         model = build(drive, free, tables=tables)
         return model.twin(settings={**model.settings, "on_chattering": on_chattering})
+    drive = loaded(drive)
     if isinstance(drive, CompiledDae):
         if tables:
             raise LanguageError("Tables of a compiled model cannot change.", advice="Build it with `tables`.")
         return drive
-    if isinstance(drive, Trajectories):
-        raise needs_equations(drive)
-    if isinstance(drive, str | Path):
-        from modelica_like.netlist import load
-
-        drive = load(drive)
-    if not isinstance(drive, Component):
-        raise _no_drive(drive)
     if tables:
         drive = with_tunable_tables(drive, tables)
     model = _compiled(drive)
@@ -97,6 +92,24 @@ def build(
     for name in bound:
         drive.set(name, float(values[model.derived_position[name]]))
     return _compiled(drive)
+
+
+def loaded(drive: Model) -> CompiledDae | Component:
+    """Return what a drive is: a compiled model, or a component, also that of a netlist file.
+
+    Raises:
+        LanguageError: it is no drive.
+        NetlistError: the file cannot be read.
+    """
+    if isinstance(drive, str | Path):
+        from modelica_like.netlist import load
+
+        return load(drive)
+    if isinstance(drive, Trajectories):
+        raise needs_equations(drive)
+    if not isinstance(drive, CompiledDae | Component):
+        raise _no_drive(drive)
+    return drive
 
 
 def _no_drive(given: Any) -> LanguageError:
@@ -125,6 +138,7 @@ def _compiled(drive: Component) -> CompiledDae:
     return compile(reduce(flatten(drive)))
 
 
+@checked
 def simulate(
     drive: Model, until: float | str | None = None, *, parameters: Mapping[str, Any] | None = None,
     start: StartKind | None = None, t0: float = 0.0, rtol: float | None = None, atol: float | None = None,

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import get_args
 
 from modelica_like import upper
+from modelica_like.arguments import checked
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.sliding import as_asked
@@ -32,7 +33,7 @@ from modelica_like.language import Assembly, Component
 from modelica_like.language.inside import inside
 from modelica_like.language.tunable import with_tunable_tables
 from modelica_like.options import Options
-from modelica_like.simulation import Model, positive_step, seconds, without_garbage_search
+from modelica_like.simulation import Model, loaded, positive_step, seconds, without_garbage_search
 from modelica_like.structure import reduce
 from modelica_like.writing import replacing
 
@@ -75,8 +76,9 @@ class Export:
 
 
 @without_garbage_search()
+@checked
 def export_fmu(
-    drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] = ("me", "cs"),
+    drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] | str = ("me", "cs"),
     platforms: Sequence[str] | str = "native", *, outputs: Sequence[str] = (), ends: Sequence[str] = (),
     takes: Takes = "flow", embed: bool = False, modes: ModesAs | str = "output",
     fixed_step: float | str | None = None, tables: Sequence[str] = (), check: bool = True, strict: bool = False,
@@ -115,7 +117,7 @@ def export_fmu(
     chosen, kinds, names = known_version(version, Version, "FMI"), _kinds(kind), chosen_platforms(platforms)
     fixed, as_what = _fixed_step(fixed_step, kinds), _modes(modes)
     tell("compiling the model")
-    drive = _loaded(drive)
+    drive = loaded(drive)
     model, description, equations = compiled_open(drive, ends, takes, tables)
     variables = interface(model, outputs, as_what)
     tell("writing the model")
@@ -169,7 +171,7 @@ def compiled_open(
     drive: Model, ends: Sequence[str], takes: Takes, tables: Sequence[str] = ()
 ) -> tuple[CompiledDae, str, Listing]:
     """Return a compiled model with its ends open, its description and its equations."""
-    drive = _loaded(drive)
+    drive = loaded(drive)
     if isinstance(drive, CompiledDae):
         if ends or tables:
             what = "ends that could be opened" if ends else "tables whose numbers could become parameters"
@@ -182,14 +184,6 @@ def compiled_open(
     equations = [(instance.path, instance.template.component, texts) for instance, texts in lines if texts]
     about = inside(drive).description if isinstance(drive, Assembly) else ""
     return as_asked(compile(reduce(flat))), about, equations
-
-
-def _loaded(drive: Model) -> CompiledDae | Component:
-    if isinstance(drive, str | Path):
-        from modelica_like.netlist import load
-
-        return load(drive)
-    return drive
 
 
 def _pictures(drive: CompiledDae | Component) -> tuple[bytes, bytes]:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from modelica_like.arguments import checked
 from modelica_like.errors import FmuFailed, ValueOutOfRange
 from modelica_like.fmi.failures import tell_error
 from modelica_like.fmi.process import run_child, workplace
@@ -25,6 +26,7 @@ _HEADER = 100_000_000
 _CHILD = Path(__file__).with_name("child.py")
 
 
+@checked
 def run_fmu(
     path: str | Path, inputs: Mapping[str, Any] | None = None, parameters: Mapping[str, Any] | None = None, *,
     start: float = 0.0, stop: float | None = None, kind: Kind | None = None, tolerance: float | None = None,
@@ -157,7 +159,10 @@ def _numbers(name: str, value: Any) -> Any:
 def _series(name: str, value: Any) -> Any:
     if isinstance(value, int | float | np.number):
         return float(value)
-    pairs = np.asarray(value, dtype=float)
+    try:
+        pairs: Any = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        pairs = np.empty(0)  # as what has another shape
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.all(np.isfinite(pairs)) or np.any(np.diff(pairs[:, 0]) < 0):
         raise ValueOutOfRange(f"The input '{name}' must be a number, or pairs of rising time and value.")
     return pairs.tolist()

@@ -69,9 +69,11 @@ def unpack(path: Path, target: Path, limits: Limits = LIMITS, kind: Kind = FMU) 
         The folder.
 
     Raises:
-        FmuRefused: the file is not an archive, is damaged, has paths outside, links or a bomb, or is not of this kind.
+        FmuRefused: there is no such file, or it is not an archive, is damaged, has paths outside, links or a bomb, or
+            is not of this kind.
         OSError: the file cannot be read.
     """
+    refuse_missing(path, kind)
     try:
         with zipfile.ZipFile(path) as archive:
             _look_through(path.name, archive.infolist(), limits, kind)
@@ -88,6 +90,17 @@ def unpack(path: Path, target: Path, limits: Limits = LIMITS, kind: Kind = FMU) 
         ) from None
     refuse_document_type(path.name, target / kind.description)
     return target
+
+
+def refuse_missing(path: Path, kind: Kind = FMU) -> None:
+    """Refuse a path without a file.
+
+    Raises:
+        FmuRefused: there is none.
+    """
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "does not exist"
+        raise FmuRefused(f"The {kind.name} '{path}' {what}.", advice=f"Give the path of an {kind.name}.")
 
 
 def refuse_document_type(name: str, file: Path) -> None:

@@ -15,12 +15,13 @@ import fmpy
 import fmpy.validation
 import lxml.etree as etree
 
+from modelica_like.arguments import checked
 from modelica_like.errors import FmuFailed, FmuRefused, ModelicaLikeError
 from modelica_like.fmi import importers
 from modelica_like.fmi.failures import tell_error
 from modelica_like.fmi.process import run_child, workplace
 from modelica_like.fmi.run import TIMEOUT, Kind, Solver, run_fmu
-from modelica_like.fmi.unpack import unpack
+from modelica_like.fmi.unpack import refuse_missing, unpack
 from modelica_like.runs.curves import ranges
 from modelica_like.runs.recorded import RecordedSolution
 from modelica_like.runs.trajectories import Values
@@ -127,6 +128,7 @@ class _Subject:
         return run.at(min(time, run.final.time)) if time >= self.step else self.run("me", time, time).final
 
 
+@checked
 def validate_fmu(path: str | Path, *, timeout: float = TIMEOUT) -> Validation:
     """Check an FMU against the standard, and run it with several importers.
 
@@ -139,9 +141,12 @@ def validate_fmu(path: str | Path, *, timeout: float = TIMEOUT) -> Validation:
         timeout: time limit of each run in s.
 
     Raises:
+        FmuRefused: there is no such file.
         OSError: the file cannot be read.
     """
-    path = Path(path).resolve()
+    path = Path(path)
+    refuse_missing(path)
+    path = path.resolve()
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as work:
         try:
             unpack(path, Path(work))

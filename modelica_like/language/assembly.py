@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
 
+from modelica_like.arguments import checked
 from modelica_like.errors import DuplicateName, ModelicaLikeError, Source, WrongConnection, raise_together_or_one
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, unknown
@@ -37,6 +38,7 @@ class Assembly(Component):
     _kept: ClassVar[type[Inside]] = InsideAssembly
     _inside: InsideAssembly  # pyright: ignore[reportIncompatibleVariableOverride]
 
+    @checked
     def __init__(
         self, name: str = "", *, parts: Mapping[str, Component | list[Component]] | None = None,
         connect: Mapping[str, Sequence[str]] | None = None, series: Mapping[str, Sequence[str]] | None = None,

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.native.buffers import Buffers
@@ -53,6 +54,7 @@ class Native:
         outputs: read by the last step, shape (outputs,); the next step overwrites it.
     """
 
+    @checked
     def __init__(
         self, model: CompiledDae, inputs: Sequence[str] = (), outputs: Sequence[str] = (), *, by: Sequence[str] = (),
         start: StartKind | None = None, rtol: float = Options.rtol, atol: float | None = None,

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from modelica_like.arguments import checked
 from modelica_like.errors import (
     CyclicAssembly,
     ModelicaLikeError,
@@ -31,6 +32,7 @@ FMU_PART = "FMU"
 """Type `is` of parts that are FMUs."""
 
 
+@checked
 def load(path: str | Path, *, trust: bool = False) -> Assembly:
     """Read a netlist file and the netlists it uses.
 

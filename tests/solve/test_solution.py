@@ -362,8 +362,8 @@ def test_the_end_may_be_a_quantity(until):
         ),
         ({"until": 1.0, "rtol": 1.0}, ValueOutOfRange, "rtol = 1 is out of range: it must be between 1e-14 and 0.1."),
         ({"until": 1.0, "atol": -1.0}, ValueOutOfRange, "atol = -1 is out of range: it must be between 1e-20 and 1."),
-        ({"until": 1.0, "rtol": "1e-6"}, ValueOutOfRange, "rtol = '1e-6' is no number."),
-        ({"until": 1.0, "points": 2.5}, ValueOutOfRange, "points = 2.5 is no whole number."),
+        ({"until": 1.0, "rtol": "1e-6"}, ValueOutOfRange, "simulate: rtol = '1e-6' is no number."),
+        ({"until": 1.0, "points": 2.5}, ValueOutOfRange, "simulate: points = 2.5 is no whole number."),
         ({"until": float("nan")}, ValueOutOfRange, "until must be a finite number, not nan."),
         ({"until": float("inf")}, ValueOutOfRange, "until must be a finite number, not inf."),
     ],
@@ -377,7 +377,7 @@ def test_wrong_options(arguments, kind, message):
 def test_wrong_limits():
     with pytest.raises(ValueOutOfRange, match=r"^max_steps = 0 is out of range: it must be between 1 and 1,000,000,"):
         Options(max_steps=0)
-    with pytest.raises(ValueOutOfRange, match=r"^iterations = 1\.5 is no whole number\.$"):
+    with pytest.raises(ValueOutOfRange, match=r"^iterations = 1\.5 is no whole number\.\nGive one, such as 1\.$"):
         Options(iterations=1.5)  # type: ignore[arg-type]
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.analyse.linear.model import LinearModel
+from modelica_like.arguments import checked
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.runs.results import along
@@ -79,6 +80,7 @@ class OrderResponse:
         return "\n".join([head, *lines])
 
 
+@checked
 def order_response(linear: LinearModel, excitation: Mapping[float, complex], speeds: Any) -> OrderResponse:
     """Return the steady vibration that torques or forces at orders of a rotation excite.
 
@@ -134,6 +136,7 @@ class OrderMap:
         return figure
 
 
+@checked
 def order_map(run: Trajectories, signal: str, angle: str, *, most: float = 10.0, revolutions: float = 8.0) -> OrderMap:
     """Return the orders of a signal during a run: its spectra over the angle, in windows of some revolutions (Hann).
 
@@ -149,6 +152,11 @@ def order_map(run: Trajectories, signal: str, angle: str, *, most: float = 10.0,
         UnknownName: there is no such variable.
         MissingValue: the run has not kept what happens between its results.
     """
+    if not (0 < most < np.inf and 0 < revolutions < np.inf):
+        raise ValueOutOfRange(
+            f"The highest order and the length of a window must be positive and finite, "
+            f"not {most:g} and {revolutions:g}."
+        )
     curves, unit = along(run, run.path(signal), run.path(angle))
     turned = curves.values[1] - curves.values[1, 0, 0]
     phi = turned * np.sign(turned[-1, -1]) / (2 * np.pi)

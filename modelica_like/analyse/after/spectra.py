@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from modelica_like.arguments import checked, fits, wrong_kind
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import ValueOutOfRange, extra_module
 from modelica_like.runs.polynomials import WEIGHTS, Fitted
@@ -39,6 +40,9 @@ class WoehlerLine:
     below: Literal["elementary", "haibach", "original"] = "elementary"
 
     def __post_init__(self) -> None:
+        for name in ("amplitude", "cycles", "slope"):
+            if not fits(getattr(self, name), float):
+                raise wrong_kind(name, getattr(self, name), float, of="WoehlerLine: ")
         if min(self.amplitude, self.cycles, self.slope) <= 0:
             raise ValueOutOfRange(f"Amplitude, cycles and slope of a Wöhler line must be above zero, not {self}.")
 
@@ -102,6 +106,7 @@ class LoadSpectrum:
         return f"Load spectrum of {self.name}: {np.sum(self.counts):g} cycles{largest}"
 
 
+@checked
 def load_spectrum(run: Trajectories, load: str) -> LoadSpectrum:
     """Count the cycles of a load by rainflow counting (ASTM E1049-85), with what is left over as half cycles.
 
@@ -164,6 +169,7 @@ class Duty:
         return "\n".join(lines)
 
 
+@checked
 def duty(run: Trajectories, torque: str, speed: str, gear: str = "", classes: int = 16) -> Duty:
     """Sort a run by gear and torque, as gears are designed by: so many revolutions under so much torque.
 

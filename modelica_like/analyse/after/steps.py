@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from modelica_like.arguments import checked
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.runs.results import along
 from modelica_like.runs.trajectories import Trajectories
@@ -43,6 +44,7 @@ class StepMetrics:
         return f"{self.name}: {self.begin:.5g} to {self.end:.5g}, rise {self.rise_time:.4g} s, {over}, {settled}"
 
 
+@checked
 def step_metrics(
     run: Trajectories, variable: str, *, start: float = 0.0, until: float = np.inf, end: float | None = None,
     band: float = 0.02,

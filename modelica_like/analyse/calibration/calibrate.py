@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.calibration.measurements import Measurement, Numbers, OperatingPoints, Trajectories
+from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import (
     CalibrationFailed,
@@ -106,6 +107,7 @@ class Calibration:
         return "\n".join(lines)
 
 
+@checked
 def calibrate(
     drive: Model, data: Sequence[Measurement] | Measurement, parameters: Mapping[str, tuple[Any, Any]], *,
     guess: Mapping[str, Any] | None = None, starts: int = 1, seed: int = 0,

@@ -10,6 +10,7 @@ import numpy as np
 
 from modelica_like.analyse.linear.linearize import At, linearize
 from modelica_like.analyse.linear.pictures import mode_name
+from modelica_like.arguments import checked
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.simulation import Model, build
 from modelica_like.solve.initialize import call
@@ -119,6 +120,7 @@ class Campbell:
         return "\n".join([head, *(f"  {crossing}" for crossing in self.crossings())])
 
 
+@checked
 def campbell(
     drive: Model, over: Mapping[str, Iterable[Any]], speed: str, *, at: At = "steady", orders: Sequence[float] = (1.0,),
 ) -> Campbell:  # fmt: skip

@@ -7,6 +7,7 @@ from typing import get_args
 
 from modelica_like.analyse.linear.held import free_motions
 from modelica_like.analyse.linear.model import LinearModel
+from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError
 from modelica_like.language.units import ONE, parse_unit, to_si
@@ -61,6 +62,7 @@ def _kind(name: str) -> StartKind:
     return next((kind for kind in get_args(StartKind) if kind == name), name)  # type: ignore[return-value]
 
 
+@checked
 def linearize(
     drive: Drive, at: At = None, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
 ) -> LinearModel:  # fmt: skip

@@ -11,6 +11,7 @@ import numpy as np
 
 from modelica_like.analyse.linear.linearize import At, linearize
 from modelica_like.analyse.linear.model import LinearModel
+from modelica_like.arguments import checked
 from modelica_like.compile import compile
 from modelica_like.errors import LanguageError, ValueOutOfRange
 from modelica_like.flatten import flatten
@@ -97,6 +98,7 @@ def _crossings(f: Any, values: Any, at: Callable[[float], float]) -> list[float]
     return crossings
 
 
+@checked
 def open_loop(drive: Component | str | Path, signal: str, at: At = None) -> Loop:
     """Open a loop at a signal; the operating point is that of the closed loop.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.analyse.operating.steady import OperatingPoint, steady
+from modelica_like.arguments import checked
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.runs.display import Display
 from modelica_like.runs.solution import Solution
@@ -90,6 +91,7 @@ class Curves(Shown):
         return f"Curves of {name}: {len(self)} operating points, {self.over} = {values[0]:.6g} … {values[-1]:.6g}"
 
 
+@checked
 def characteristic(
     drive: Model, over: Mapping[str, Iterable[Any]], *, by: str = "", near: OperatingPoint | Solution | None = None,
 ) -> Curves:  # fmt: skip

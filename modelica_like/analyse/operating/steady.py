@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.operating.sampling import change_with_samples, unsettled, with_samples
+from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import to_si
@@ -91,6 +92,7 @@ class OperatingPoint(Shown, Mapping[str, float]):
         return "\n".join(lines)
 
 
+@checked
 def steady(
     drive: Model, hold: Mapping[str, Any] | None = None, by: Sequence[str] | str = (), *,
     parameters: Mapping[str, Any] | None = None, near: OperatingPoint | Trajectories | None = None,

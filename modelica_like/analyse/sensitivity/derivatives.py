@@ -20,6 +20,7 @@ from modelica_like.analyse.sensitivity.replayed import read_off
 from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.analyse.sensitivity.result import Sensitivities as Sensitivities
 from modelica_like.analyse.sensitivity.values import value_at
+from modelica_like.arguments import checked
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, NoGradient, UnknownName, did_you_mean
@@ -36,6 +37,7 @@ _NAMED = 3
 """Largest number of parameters in an error message."""
 
 
+@checked
 def sensitivities(
     drive: Model | Solution, of: str | Sequence[str], to: str | Sequence[str] = (), *, until: float | str | None = None,
     parameters: Mapping[str, Any] | None = None, method: Method = "auto", start: StartKind | None = None,

@@ -11,6 +11,7 @@ import numpy as np
 
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
 from modelica_like.analyse.sensitivity.formulas import free_formulas
+from modelica_like.arguments import checked
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient
 from modelica_like.options import Options
@@ -215,6 +216,7 @@ class _Second(_Callback):
         return [ca.DM(derivatives), ca.DM(self._size[0] * self._size[1], self._size[0])]
 
 
+@checked
 def simulation_function(
     drive: Model, inputs: str | Sequence[str], outputs: str | Sequence[str], *, until: float | str | None = None,
     parameters: Mapping[str, Any] | None = None, start: StartKind | None = None, options: Options | None = None,

@@ -10,6 +10,7 @@ import numpy as np
 
 from modelica_like.analyse.sweeps.plan import Samples
 from modelica_like.analyse.sweeps.sweep import sweep
+from modelica_like.arguments import checked
 from modelica_like.errors import UnknownName, ValueOutOfRange, extra_module
 from modelica_like.simulation import Model
 
@@ -58,6 +59,7 @@ class Importance:
         return "\n".join(lines)
 
 
+@checked
 def importance(
     drive: Model, ranges: Mapping[str, tuple[Any, Any]], outputs: Sequence[str], *, method: Kind = "sobol",
     samples: int = 256, seed: int = 0, **settings: Any,
@@ -76,9 +78,13 @@ def importance(
 
     Raises:
         UnknownName: a name is not known.
-        ValueOutOfRange: runs failed or gave no number, so the measures are not defined.
+        ValueOutOfRange: there are no parameters, or runs failed or gave no number, so the measures are not defined.
         MissingExtra: SALib is not installed.
     """
+    if not ranges:
+        raise ValueOutOfRange(
+            "There is no parameter to rank.", advice='Give bounds by path: importance(…, {"shaft.c": (300, 500)}, …).'
+        )
     sample, analyse = _salib(method)
     problem = {"num_vars": len(ranges), "names": list(ranges), "bounds": [[0.0, 1.0]] * len(ranges)}
     if method == "sobol":

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from modelica_like.arguments import checked
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.style import COLOURS, picture, text_width, with_unit
 
@@ -19,6 +20,7 @@ _MOST_LINES = 2000
 _WIDEST = 30.0
 
 
+@checked
 def plot_sweep(found: xarray.Dataset, *outputs: str) -> Figure:
     """Draw a sweep: lines over one parameter, lines or a heat map over two, parallel coordinates over more or samples.
 

@@ -24,6 +24,7 @@ from modelica_like.analyse.sweeps.workers import (
     in_threads,
     on_cluster,
 )
+from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ExportError, ModelicaLikeError, ValueOutOfRange, extra_module
 from modelica_like.simulation import Model, Solver, build
@@ -44,6 +45,7 @@ Told = Callable[[int, int], None]
 """Called with the number of finished runs and of all runs."""
 
 
+@checked
 def sweep(
     drive: Model, over: Mapping[str, Iterable[Any]], outputs: Sequence[str], *,
     sampling: Sampling | None = None, until: float | str | None = None,

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.arguments import checked
 from modelica_like.errors import (
     FmuCrashed,
     FmuFailed,
@@ -49,6 +50,7 @@ _WATCH = 0.1
 _CHILD = Path(__file__).with_name("child.py")
 
 
+@checked
 def cosim(
     system: System | str | Path, until: float | str | None = None, *, step: float | str | None = None,
     master: Master | str | None = None, inputs: Inputs | str | None = None, tolerance: float | None = None,

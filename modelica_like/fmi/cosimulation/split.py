@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like import upper
-from modelica_like.errors import DuplicateName, NetlistError
+from modelica_like.arguments import checked
+from modelica_like.errors import DuplicateName, LanguageError, NetlistError
 from modelica_like.fmi.cosimulation.cut import Cut, CutNetlist, cut_netlist
 from modelica_like.fmi.cosimulation.files import write_system
 from modelica_like.fmi.cosimulation.parts import Maker, Takes, ends_of, orient
@@ -54,6 +55,7 @@ class Split:
         return "\n".join([*lines, *(f"  {path} {words[takes]}" for path, takes in self.ends.items()), *self.notes])
 
 
+@checked
 def split(
     drive: Component | str | Path, at: Sequence[str] | str, folder: str | Path, *, names: Sequence[str] = (),
     version: str = "2.0", step: float | str | None = None, master: str | None = None, check: bool = True,
@@ -78,6 +80,7 @@ def split(
 
     Raises:
         UnknownName, NetlistError: there is no such shaft, or the drive cannot be cut there.
+        LanguageError: the drive is compiled already.
         ModelicaLikeError: something is wrong with the drive, or a part cannot be exported.
         OSError: nothing can be written into the folder.
     """
@@ -143,6 +146,8 @@ def _settings(until: float | str | None, step: float | str | None, master: str |
 def _assembly(drive: Component | str | Path) -> Assembly:
     if isinstance(drive, str | Path):
         return load(drive)
+    if not isinstance(drive, Component):
+        raise LanguageError("A compiled drive cannot be cut.", advice="Give the component or the netlist.")
     return drive if isinstance(drive, Assembly) else as_assembly(drive)
 
 

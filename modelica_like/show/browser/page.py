@@ -15,6 +15,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName
 from modelica_like.flatten.model import FlatParameter
@@ -68,6 +69,7 @@ class Page:
 
 
 @without_garbage_search()
+@checked
 def export_html(
     drive: Model, path: str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
     report: Report = silent,

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from modelica_like.arguments import checked
 from modelica_like.errors import LanguageError, NetlistError, missing_extra
 from modelica_like.language.component import Component
 from modelica_like.runs.energy import EnergyBalance
@@ -44,6 +45,7 @@ def layout(component: Component, *, depth: int = 1, notes: Notes | None = None) 
     return sheet(diagram(component, depth, notes))
 
 
+@checked
 def schematic(
     component: Component | str | Path, *, depth: int = 1, background: bool = True, run: Trajectories | None = None,
     at: float | None = None, flow: bool = False, moving: bool = False, balance: EnergyBalance | None = None,
@@ -114,6 +116,7 @@ def check_format(path: Path, *, moving: bool = False) -> None:
     check_writable(path)
 
 
+@checked
 def save_schematic(
     component: Component | str | Path, path: str | Path, *, depth: int = 1, run: Trajectories | None = None,
     at: float | None = None, flow: bool = False, moving: bool = False, modes: Modes | None = None,

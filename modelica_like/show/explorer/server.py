@@ -21,6 +21,7 @@ from urllib.parse import parse_qs
 
 import numpy as np
 
+from modelica_like.arguments import checked
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.language import Assembly
 from modelica_like.netlist import load
@@ -41,6 +42,7 @@ _WRONG = (ArithmeticError, KeyError, RecursionError, TypeError, ValueError)
 """What a request that is no JSON, or has other content than expected, ends in."""
 
 
+@checked
 def explore(
     drive: Assembly | str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
     folder: str | Path = ".",

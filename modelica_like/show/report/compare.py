@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.markup import escape
 
+from modelica_like.arguments import checked
 from modelica_like.runs.curves import Curves, compare_solutions
 from modelica_like.runs.trajectories import Trajectories
 from modelica_like.show.report.sources import trajectories
@@ -27,6 +28,7 @@ class Comparison(Curves):
         return comparison_report(self)
 
 
+@checked
 def compare(
     a: Source, b: Source, *, signals: Sequence[str] = (), until: float | None = None, points: int = 500,
     tolerance: float | None = None, values: Mapping[str, Any] | None = None, option: str = "",

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from modelica_like.errors import UnknownName
+from modelica_like.arguments import checked
+from modelica_like.errors import UnknownName, ValueOutOfRange
 from modelica_like.language.units import parse_unit, to_si
 from modelica_like.runs.display import Display
 from modelica_like.runs.signals import Signal, named, read_signals
@@ -25,6 +26,7 @@ _MOST = 8
 """Signals that nobody has asked for."""
 
 
+@checked
 def overlay(
     runs: Mapping[str, str | Path | Trajectories], *patterns: str, title: str = "",
     display: Mapping[str, str] | None = None,
@@ -39,10 +41,13 @@ def overlay(
         display: units by path, pattern or quantity, in addition to those of the netlist.
 
     Raises:
+        ValueOutOfRange: there is no run.
         UnknownName: nothing matches a pattern, or the runs have nothing in common.
         UnitError: a measured column has another dimension than its variable, or a unit cannot be shown.
         ModelicaLikeError: a run fails.
     """
+    if not runs:
+        raise ValueOutOfRange("There is no run to draw.", advice='Give runs by name: overlay({"old": …, "new": …}).')
     sources = {label: trajectories(source) for label, source in runs.items()}
     first = next((run for run in sources.values() if not run.measured), next(iter(sources.values())))
     signals, left = (read_signals(first.model, patterns), []) if patterns else _common(first, list(sources.values()))

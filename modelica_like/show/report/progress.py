@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rich.console import Console
 
+from modelica_like.arguments import checked
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.language.units import parse_unit, to_si
 
@@ -29,6 +30,7 @@ class Bar:
         title: text before it.
     """
 
+    @checked
     def __init__(
         self, until: float | str | None = None, console: Console | None = None, title: str = "simulating"
     ) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.arguments import checked
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.fmi.export import tool
 from modelica_like.language import Component
@@ -42,6 +43,7 @@ _SMALL = 5e-4
 """Share of the supply below which an energy is not listed."""
 
 
+@checked
 def save_report(drive: Component | None, run: Trajectories, path: str | Path, *, show: Sequence[str] = ()) -> None:
     """Write the report of a run as a page.
 
