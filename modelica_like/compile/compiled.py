@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from threading import get_ident
@@ -55,7 +55,7 @@ class CompiledDae:
         p: parameter values.
         u: values of the inputs.
         components: paths of the components of the energy balance.
-        places: source places of the parts of netlists, by path.
+        places: source places of the parts of netlists and of their start values, by path.
         renamed: what to write instead of paths of earlier versions.
         terminals: open ends with an adaptor.
         motion_sources: paths of the components that prescribe a motion, whatever torque or force it takes.
@@ -166,6 +166,16 @@ class CompiledDae:
         if self._make_start is None:
             raise LanguageError("The start system of this model was not kept.")
         return self._make_start(rest)
+
+    def places_of(self, paths: Iterable[str]) -> list[Source]:
+        """Return the places of start values and parts, each once; otherwise that of the part that has them."""
+        found: dict[Source, None] = {}
+        for path in paths:
+            while path and path not in self.places:
+                path = path.rpartition(".")[0]
+            if path:
+                found[self.places[path]] = None
+        return list(found)
 
     @property
     def arguments(self) -> dict[str, Any]:

@@ -87,8 +87,14 @@ def _discrete_starts(flat: FlatModel) -> Any:
 
 
 def _places(flat: FlatModel) -> dict[str, Source]:
-    """Source places of the parts of netlists."""
+    """Source places of the parts of netlists, and of their start values."""
     places = {path: component.place_of() for path, component in flat.components.items()}
+    for path, component in flat.components.items():
+        # The outermost netlist comes first, and counts.
+        for key, source in inside(component).places.items() if isinstance(component, Assembly) else ():
+            kind, _, name = key.partition(".")
+            if kind in ("start", "guess"):
+                places.setdefault(f"{path}.{name}".lstrip("."), source)
     return {path: source for path, source in places.items() if source.file}
 
 

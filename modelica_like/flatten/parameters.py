@@ -33,6 +33,7 @@ class Parameters:
         self.flat: list[FlatParameter] = []
         self.derived: list[FlatParameter] = []
         self._formulas: list[Any] = []
+        self._owners: list[tuple[Component, str]] = []
         self._symbols: list[Any] = []
         self._q: list[Any] = []
         self._position: dict[tuple[int, str], int] = {}
@@ -87,6 +88,7 @@ class Parameters:
         field = component.fields[name]
         unit = coherent(written if value.unit == ANY else value.unit)
         self.derived.append(FlatParameter(path, unit, field.description, math.nan, *field.bounds, False))
+        self._owners.append((component, name))
         self._formulas.append(expression)
         return expression, unit
 
@@ -172,8 +174,11 @@ class Parameters:
         numbers = ca.Function("derived", [self.symbols()], [self.formulas()])(
             [parameter.value for parameter in self.flat]
         )
-        pairs = zip(self.derived, numbers.full().ravel(), strict=True)
-        self.derived = [replace(p, value=p.checked(float(number), f"{number:g}")) for p, number in pairs]
+        values = numbers.full().ravel().tolist()
+        for k, (component, name) in enumerate(self._owners):
+            with component.at_its_place(name):
+                value = self.derived[k].checked(values[k], f"{values[k]:g}")
+            self.derived[k] = replace(self.derived[k], value=value)
 
     def formulas(self) -> Any:
         """Return the expressions of the parameters that follow from others."""

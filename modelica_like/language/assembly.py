@@ -173,6 +173,8 @@ class Assembly(Component):
                 f"{path} is a connector, but a series joins parts.",
                 advice=f"Write {owner} in the series, or join {path} in a connection of its own.",
             )
+        if owner and name not in self.find(owner).parts:
+            end_at(self, path)
         return self.find(path)
 
     def _connector(self, path: str) -> Connector:

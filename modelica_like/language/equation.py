@@ -10,7 +10,7 @@ from typing import Any, Protocol, cast
 
 import casadi as ca
 
-from modelica_like.errors import LanguageError, Source
+from modelica_like.errors import LanguageError, Source, WrongConnection
 from modelica_like.language.declared import Connector
 from modelica_like.language.expr import Expr, Symbol
 from modelica_like.language.places import NOWHERE
@@ -85,8 +85,17 @@ def series(*parts: InLine) -> Equations:
 
     Args:
         parts: at least two components, in order.
+
+    Raises:
+        WrongConnection: a part follows itself.
     """
     for left, right in pairwise(parts):
+        if left is right:
+            raise WrongConnection(
+                f"{getattr(left, 'label', 'A part')} follows itself in a series.",
+                why="Its outlet would be joined to its own inlet.",
+                advice="Name it once. Several equal parts are an array: count = 2.",
+            )
         yield connect(left.outlet_connector(), right.inlet_connector())
 
 

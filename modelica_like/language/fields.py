@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, overload
 
 from modelica_like.errors import LanguageError, UnitError, ValueOutOfRange
 from modelica_like.language.expr import Expr, symbol_of
-from modelica_like.language.formula import Arithmetic, Formula, as_formula, parse_formula
+from modelica_like.language.formula import Arithmetic, Formula, as_formula, in_brackets, parse_formula
 from modelica_like.language.places import caller
 from modelica_like.language.units import ANY, Unit, coherent, parse_unit, read_quantity, to_si
 
@@ -137,7 +137,8 @@ class Field:
         except UnitError as error:
             if _CALCULATES.search(text):
                 return None
-            raise UnitError(f"{self.label} = '{text}': {error.what}", advice=error.advice) from None
+            advice = in_brackets(text) or error.advice
+            raise UnitError(f"{self.label} = '{text}': {error.what}", advice=advice) from None
 
     def _checked(self, number: float, given: Any) -> float:
         return in_range(number, given, self.label, str(coherent(self.unit)), self.bounds)

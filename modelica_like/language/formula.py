@@ -44,6 +44,7 @@ CONSTANTS = {"pi": math.pi}
 _QUANTITY = re.compile(
     r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[ \t]+)((?:[^\W\d_]|[%°])[^\s+*,()-]*(?:\([\w.]+\)[\w.]*)?)"
 )
+_NO_SYNTAX = (SyntaxError, ValueError, MemoryError, RecursionError)
 _PLACEHOLDER = "_quantity_{}_"
 _SAME, _ALIKE = ("neg", "abs"), ("+", "-", "min", "max")
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
@@ -226,8 +227,9 @@ def parse_formula(text: str) -> Formula:
             warnings.simplefilter("ignore")
             replaced, quantities = _without_quantities(plain_digits(text.strip()))
             tree = ast.parse(replaced, mode="eval")
-    except (SyntaxError, ValueError, MemoryError, RecursionError):
-        raise _not_a_formula(text) from None
+    except _NO_SYNTAX:
+        advice = in_brackets(text)
+        raise _not_a_formula(text, "" if advice else _unknown_unit(text), advice) from None
     layer, depth = [tree], 0
     while layer:
         layer = [child for node in layer for child in ast.iter_child_nodes(node)]
@@ -242,11 +244,7 @@ def _without_quantities(text: str) -> tuple[str, dict[str, str]]:
     quantities: dict[str, str] = {}
 
     def name(match: re.Match[str]) -> str:
-        try:
-            is_name = match.group(2) not in CONSTANTS and parse_unit(match.group(2)).factor
-        except UnitError:
-            is_name = False
-        if not is_name:
+        if not _is_unit(match.group(2)):
             return match.group()
         placeholder = _PLACEHOLDER.format(len(quantities))
         quantities[placeholder] = match.group()
@@ -255,12 +253,54 @@ def _without_quantities(text: str) -> tuple[str, dict[str, str]]:
     return _QUANTITY.sub(name, text), quantities
 
 
-def _not_a_formula(text: str, why: str = "") -> NetlistError:
+def _is_unit(text: str) -> bool:
+    try:
+        return text not in CONSTANTS and bool(parse_unit(text).factor)
+    except UnitError:
+        return False
+
+
+def in_brackets(text: str) -> str:
+    """Return the advice to write a formula with its quantities in brackets; empty if that does not help.
+
+    In `10 N.m/z`, the unit goes on to the end: only brackets tell that z is a parameter.
+    """
+
+    def put(match: re.Match[str]) -> str:
+        number, unit = match.groups()
+        if text[match.start() - 1 : match.start()] == "(" and text[match.end() : match.end() + 1] == ")":
+            return match.group()
+        ends = (end for end in range(len(unit), 0, -1) if unit[end : end + 1] in ("", "/"))
+        end = next((end for end in ends if _is_unit(unit[:end])), 0)
+        return f"({number}{unit[:end]}){unit[end:]}" if end else match.group()
+
+    if len(text) > _SHOWN:
+        return ""
+    changed = _QUANTITY.sub(put, text)
+    try:
+        ast.parse(_without_quantities(changed)[0], mode="eval")
+    except _NO_SYNTAX:
+        return ""
+    told = f'In a formula, a quantity that goes on with / or * is in brackets: "{changed}".'
+    return told if changed != text else ""
+
+
+def _unknown_unit(text: str) -> str:
+    """Return that the unit of a quantity in a formula is unknown, or an empty text."""
+    for match in _QUANTITY.finditer(text):
+        try:
+            parse_unit(match.group(2))
+        except UnitError as error:
+            if error.what.startswith("Unknown") and len(error.what) < _SHOWN:
+                return f"u{error.what[1:].rstrip('?.')}"
+    return ""
+
+
+def _not_a_formula(text: str, why: str = "", advice: str = "") -> NetlistError:
     shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
-    return NetlistError(
-        f"'{shown}' is neither a quantity nor a formula{'; ' + why if why else ''}.",
-        advice='A quantity is a number with a unit ("8.5 kg.cm2"), a formula is arithmetic of parameters ("2*J").',
-    )
+    usual = 'A quantity is a number with a unit ("8.5 kg.cm2"), a formula is arithmetic of parameters ("2*J").'
+    what = f"'{shown}' is neither a quantity nor a formula{'; ' + why if why else ''}."
+    return NetlistError(what, advice=advice or usual)
 
 
 def _convert(node: ast.expr, text: str, quantities: dict[str, str]) -> Formula:

@@ -95,7 +95,7 @@ def find_atom(name: str) -> Atom:
     """
     if name in ATOMS:
         return ATOMS[name]
-    if name in _MEANT:
+    if _meant(name):
         raise UnitError(f"Unknown unit '{name}'{_suggestion(name)}")
     return _ask_pint(name)
 
@@ -149,10 +149,19 @@ _MEANT = {
     "Nm": "N.m", "Nms": "N.m.s", "U": "rev", "r": "rev", "tr": "rev", "Upm": "rpm", "RPM": "rpm", "upm": "rpm",
 }  # fmt: skip
 """What is meant by names that pint does not know, or takes for threads (Nm) and enzymes (U)."""
+_WITH_PREFIX = ("Nm", "Nms")
+"""Those that pint takes for something else with a prefix, too."""
+
+
+def _meant(name: str) -> str:
+    """Return what is meant by such a name, also with a prefix (kNm), or an empty text."""
+    prefix = name[0] if name[0] in _PREFIXES and name[1:] in _WITH_PREFIX else ""
+    meant = _MEANT.get(name.removeprefix(prefix), "")
+    return f"{prefix}{meant}" if meant else ""
 
 
 def _suggestion(name: str) -> str:
-    parts = _MEANT.get(name) or _split(name)
+    parts = _meant(name) or _split(name)
     if name[:-1] in ATOMS and name.endswith("s"):
         parts = name[:-1]
     return f"; did you mean '{parts}'?" if parts else did_you_mean(name, ATOMS) or "."

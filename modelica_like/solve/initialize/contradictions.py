@@ -20,6 +20,7 @@ def same_motion(model: CompiledDae, first: tuple[int, float], second: tuple[int,
     values = [_valued(model, model.starts.entries[number], value) for number, value in (first, second)]
     return ContradictingStart(
         f"{values[0]} and {values[1]} contradict each other: they are the same motion.",
+        where=model.places_of([start_name(model, model.starts.entries[k]) for k, _ in (first, second)]),
         advice="Remove one of the two start values.",
     )
 
@@ -65,7 +66,8 @@ def not_met(model: CompiledDae, present: Vector, number: int, value: float) -> C
     name = sides if start.startswith(INITIAL_EQUATION) else start_name(model, entry)
     return ContradictingStart(
         f"{' and '.join([*partners, start])} {wrong}: {name} would be {present[entry.node]:g}.",
-        where=[o.source for o in model.equations.differentiated if o.source.file][:3],
+        where=model.places_of([start_name(model, other) for other in (*fixed[:2], entry)])
+        or [o.source for o in model.equations.differentiated if o.source.file][:3],
         advice="Remove one of the start values, or make one a guess.",
     )
 

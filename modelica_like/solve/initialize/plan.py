@@ -323,7 +323,7 @@ class _Choice:
             what = f"{count} equations: give {which}{shown} start values"
         return MissingStart(
             f"Initialization (not the model) lacks {what}.",
-            where=[model.places[part] for part in parts if part in model.places][:3],
+            where=model.places_of(parts)[:3],
             advice='Or start from rest (start = "rest") or in the steady state (start = "steady").',
         )
 

@@ -188,6 +188,7 @@ def rate_not_finite(model: CompiledDae, point: Point, state: int) -> SingularAtS
     """Return the error of a state, given by its position, without a finite derivative."""
     return SingularAtStart(
         f"The derivative of {model.states[state]} is not finite at t = {point.t:.9g} s.",
+        where=model.places_of([model.states[state].removeprefix("der(").rpartition(".")[0]]),
         advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
     )
 
