@@ -8,7 +8,7 @@
  * explain that change by this share, or it is smaller than any that is told. */
 #define EXPLAINED 1e-8
 #define LEAST_RATE 1e-12
-#define MOST_DENSE 200 /* unknowns with which a drive settles: with more, steps with dense matrices take minutes */
+#define REGULAR 1e-10 /* least entry on the diagonal of R, over the largest, that is no zero */
 /* Steps in s: the first one, one that only a settled drive bears, one that nothing bears, the longest after an event,
  * as coarse ones overshoot and switch for ever. */
 #define FIRST_STEP 1e-4
@@ -26,61 +26,85 @@
 #define MOST_TICKS 100  /* after which what samplers keep is taken to stay */
 #define STEP_FOUND 1e-9 /* change by Newton's method after which only the end of all counts: it is but a guess */
 
-/* Rates of moving states and residuals of implicit equations, and their slopes by these unknowns, row by row. Tells
- * whether they are finite. */
-static int steady_equations(Instance *c, double *slopes, double *values) {
+/* Rates of moving states and residuals of implicit equations, their slopes in the matrix of steps, and at the point of
+ * work the rates that these explain. Tells whether they are finite. */
+static int steady_equations(Instance *c, double *values) {
     const Model *m = c->model;
-    int n = m->n_steady, *place = c->steady_places, finite = 1;
+    int finite = 1;
     evaluate_now(c, &m->tapes.rates, c->rhs);
     tape_run(&m->tapes.jacobian, c->slots, c->jacobian);
     memset(c->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
-    memset(slopes, 0, (size_t)n * (size_t)n * sizeof(double));
     for (int k = 0; k < m->n_jacobian; k++) c->matrix[m->jacobian_to_step[k]] = c->jacobian[k];
-    for (int i = 0; i < m->n_unknowns; i++) place[i] = -1;
-    for (int i = 0; i < n; i++) {
-        place[m->steady[i]] = i;
-        values[i] = c->rhs[m->steady[i]];
-        finite &= isfinite(values[i]) != 0;
+    for (int i = 0; i < m->n_unknowns; i++) {
+        c->steady_places[i] = -1;
+        c->point[i] = LEAST_RATE;
     }
-    for (int j = 0; j < n; j++)
-        for (int k = m->step.colind[m->steady[j]]; k < m->step.colind[m->steady[j] + 1]; k++) {
-            if (place[m->step.row[k]] < 0) continue;
-            slopes[(size_t)place[m->step.row[k]] * n + j] = c->matrix[k];
-            finite &= isfinite(c->matrix[k]) != 0;
-        }
+    for (const int *j = m->steady; j < m->steady + m->n_steady; j++)
+        for (int k = m->step.colind[*j]; k < m->step.colind[*j + 1]; k++)
+            c->point[m->step.row[k]] += EXPLAINED * fabs(c->matrix[k]) * (1 + fabs(c->x[*j]));
+    for (int i = 0; i < m->n_steady; i++) {
+        c->steady_places[m->steady[i]] = i;
+        values[i] = c->rhs[m->steady[i]];
+        finite &= isfinite(values[i]) && isfinite(c->point[m->steady[i]]);
+    }
     return finite;
 }
 
-/* Whether rates of moving states and residuals vanish, up to rounding. */
-static int at_rest(Instance *c) {
+/* Solves (slopes - inverse for states) * x = values, in place. Returns 0, and leaves values, where that is singular. */
+static int solve_sparse(Instance *c, double inverse, double *values) {
     const Model *m = c->model;
-    int n = m->n_steady;
-    double *slopes = c->square, *values = c->vector;
-    steady_equations(c, slopes, values);
-    for (int k = 0; k < n; k++) {
-        double explained = LEAST_RATE;
-        for (int j = 0; j < n; j++)
-            explained += EXPLAINED * fabs(slopes[(size_t)k * n + j]) * (1 + fabs(c->x[m->steady[j]]));
-        /* Slopes that are not finite explain anything. */
-        if (!(fabs(values[k]) <= STEADY) || fabs(values[k]) > explained) return 0;
-    }
+    double least = INFINITY, largest = 0, *x = c->point, size;
+    for (int k = 0; k < m->n_x; k++) c->matrix[m->step_diagonal[k]] += c->steady_places[k] < 0 ? 1 : -inverse;
+    if (!qr_factor(&m->step, c->matrix, c)) return 0;
+    for (int j = 0; j < m->n_unknowns; j++, least = fmin(least, size), largest = fmax(largest, size))
+        size = fabs(c->qr_r[m->step.r_colind[j + 1] - 1]);
+    if (inverse == 0 && least <= REGULAR * largest) return 0;
+    memset(x, 0, (size_t)m->n_unknowns * sizeof(double));
+    for (int i = 0; i < m->n_steady; i++) x[m->steady[i]] = values[i];
+    qr_solve(&m->step, c, x);
+    for (int i = 0; i < m->n_steady; i++) values[i] = x[m->steady[i]];
     return 1;
 }
 
-/* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. */
-static Result solve_steady(Instance *c) {
+/* The same where slopes may be singular: what nothing depends on and what is conserved stay. */
+static void solve_dense(Instance *c, double *values) {
     const Model *m = c->model;
     int n = m->n_steady;
-    double *slopes = c->square, *values = c->vector, *step = c->point;
-    for (int round = 0; round < MAX_NEWTON && n > 0; round++) {
-        double change = 0;
-        if (!steady_equations(c, slopes, values)) break;
-        keeping_least_squares(n, n - m->n_z, slopes, slopes + (size_t)n * (size_t)n, values, step);
-        for (int j = 0; j < n; j++) {
-            c->x[m->steady[j]] -= step[j];
-            change = fmax(change, fabs(step[j]));
-        }
-        if (change <= 1e-13) break;
+    double *slopes = c->square;
+    memset(slopes, 0, (size_t)n * (size_t)n * sizeof(double));
+    for (int j = 0; j < n; j++)
+        for (int k = m->step.colind[m->steady[j]]; k < m->step.colind[m->steady[j] + 1]; k++)
+            if (c->steady_places[m->step.row[k]] >= 0)
+                slopes[(size_t)c->steady_places[m->step.row[k]] * n + j] = c->matrix[k];
+    keeping_least_squares(n, n - m->n_z, slopes, slopes + (size_t)n * (size_t)n, values, c->point);
+    memcpy(values, c->point, (size_t)n * sizeof(double));
+}
+
+/* Whether rates of moving states and residuals vanish, up to rounding; slopes that are not finite explain anything. */
+static int at_rest(Instance *c) {
+    const int *steady = c->model->steady;
+    steady_equations(c, c->vector);
+    for (int i = 0; i < c->model->n_steady; i++)
+        if (!(fabs(c->vector[i]) <= STEADY) || fabs(c->vector[i]) > c->point[steady[i]]) return 0;
+    return 1;
+}
+
+/* Moves the unknowns; returns the largest change over their size. */
+static double move_unknowns(Instance *c, const double *values) {
+    double change = 0;
+    for (int j = 0; j < c->model->n_steady; j++) {
+        double *x = &c->x[c->model->steady[j]];
+        *x -= values[j];
+        change = fmax(change, isfinite(*x) ? fabs(values[j]) / (1 + fabs(*x)) : INFINITY);
+    }
+    return change;
+}
+
+/* States with zero derivatives, the nearest to the guess. */
+static Result solve_steady(Instance *c) {
+    for (int round = 0; round < MAX_NEWTON && steady_equations(c, c->vector); round++) {
+        if (!solve_sparse(c, 0, c->vector)) solve_dense(c, c->vector);
+        if (move_unknowns(c, c->vector) <= 1e-13) break;
     }
     return at_rest(c) ? RESULT_OK : fail(c, NOT_STEADY, c->state.t);
 }
@@ -160,27 +184,15 @@ Result find_steady(Instance *c, int fixed, int defaults) {
     return fail(c, START_NOT_SETTLED, 0);
 }
 
-/* One step by Euler's implicit method; 0 where Newton's method does not find it. */
+/* One step by Euler's implicit method; 0 where Newton's method does not find it. A long step is nearly singular by
+ * design; what is not finite tells if it is. */
 static int step_settling(Instance *c, const double *begin, double step) {
-    const Model *m = c->model;
-    int n = m->n_steady, states = n - m->n_z;
-    double *slopes = c->square, *values = c->vector;
-    for (int round = 0; round < MOST_ITERATIONS; round++) {
-        double change = 0;
-        if (!steady_equations(c, slopes, values)) return 0;
-        for (int i = 0; i < states; i++) {
-            values[i] = c->x[m->steady[i]] - begin[m->steady[i]] - step * values[i];
-            for (int j = 0; j < n; j++) slopes[(size_t)i * n + j] = (i == j) - step * slopes[(size_t)i * n + j];
-        }
-        /* Rows count as columns here. A long step is nearly singular by design; what is not finite tells if it is. */
-        lu_factor(n, slopes, c->steady_order);
-        lu_solve_transposed(n, slopes, c->steady_order, values);
-        for (int j = 0; j < n; j++) {
-            double *x = &c->x[m->steady[j]];
-            *x -= values[j];
-            change = fmax(change, isfinite(*x) ? fabs(values[j]) / (1 + fabs(*x)) : INFINITY);
-        }
-        if (change < STEP_FOUND) return 1;
+    const int *steady = c->model->steady, states = c->model->n_steady - c->model->n_z;
+    double *values = c->vector;
+    for (int round = 0; round < MOST_ITERATIONS && steady_equations(c, values); round++) {
+        for (int i = 0; i < states; i++) values[i] -= (c->x[steady[i]] - begin[steady[i]]) / step;
+        if (!solve_sparse(c, 1 / step, values)) return 0;
+        if (move_unknowns(c, values) < STEP_FOUND) return 1;
     }
     return 0;
 }
@@ -210,7 +222,7 @@ static int fire_settling(Instance *c) {
 static Result settle_down(Instance *c) {
     const Model *m = c->model;
     double step = FIRST_STEP, growth = GROWTH;
-    if (m->n_unknowns > MOST_DENSE || !solve_now(c, 0)) return RESULT_ERROR;
+    if (!solve_now(c, 0)) return RESULT_ERROR;
     for (int k = 0; k < MOST_STEPS; k++) {
         const double *kept = keep_start(c, KEPT_SETTLING, 0);
         int found = step_settling(c, kept, step), fired;

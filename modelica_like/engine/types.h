@@ -110,10 +110,9 @@ typedef struct {
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; jolted: what new
  * values of states let go; idle:
  * time events that changed nothing of d that is felt by what moves when they came last */
-#define WORK_INDICES(A)                                                                                             \
-    A(order, n_z), A(last_order, last), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals),   \
-        A(member, members), A(pivots, members), A(same, slots), A(places_of_slots, slots), A(steady_order, steady), \
-        A(steady_places, n)
+#define WORK_INDICES(A)                                                                                           \
+    A(order, n_z), A(last_order, last), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), \
+        A(member, members), A(pivots, members), A(same, slots), A(places_of_slots, slots), A(steady_places, n)
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \

@@ -138,12 +138,7 @@ def test_a_brake_holds_or_slips(begin: float, push: float, speed: float) -> None
     assert w == pytest.approx(speed, abs=1e-12)
 
 
-def test_large_drives_are_left_alone() -> None:
-    """Of 200 unknowns they settle; with more, dense matrices would take long."""
-
-    def tanks(count: int) -> Component:
-        return Assembly("tanks", parts={f"t{k}": Tank(x=guess(100.0), w=0.0) for k in range(count)})
-
-    assert run_down(tanks(3))["t2.x"] == pytest.approx(4.0, rel=1e-6)
-    unknowns = len(run_down(tanks(1)))
-    assert refuses(tanks(200 // unknowns + 1))
+def test_large_drives_settle() -> None:
+    """Their slopes are sparse: hundreds of tanks find the level of a single one."""
+    tanks = {f"t{k}": Tank(x=guess(100.0), w=0.0) for k in range(300)}
+    assert run_down(Assembly("tanks", parts=tanks))["t299.x"] == pytest.approx(4.0, rel=1e-6)
