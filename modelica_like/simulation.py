@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import copy
-import gc
 import math
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -32,6 +31,7 @@ from modelica_like.errors import (
     did_you_mean,
 )
 from modelica_like.flatten import flatten
+from modelica_like.garbage import without_garbage_search
 from modelica_like.language import Component
 from modelica_like.language.tunable import with_tunable_tables
 from modelica_like.language.units import parse_unit, to_si
@@ -119,18 +119,6 @@ def _no_drive(given: Any) -> LanguageError:
         f"Something of type {type(given).__name__} is no drive: write a component, a built model, or a netlist's path.",
         advice='Parts become a drive as Assembly(parts={"motor": …, "load": …}, series={"shaft": ["motor", "load"]}).',
     )
-
-
-@contextmanager
-def without_garbage_search() -> Iterator[None]:
-    """Suspend Python's search for cycles: many objects are created here, and few of them are in cycles."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
 
 
 @without_garbage_search()

@@ -76,6 +76,8 @@ class BufferedFunction:
 
 _BLOCKS = 4096, 512, 64, 8
 """Points per call: many, about as many as a run has results, and the rest."""
+_MOST = 2**20
+"""Largest count of arguments and results in a block, unless it is of the smallest size: beyond, memory costs time."""
 _GROUP, _SMALL = 8, 2000
 """Points whose operations are unrolled, and largest number of operations of one point for this."""
 
@@ -93,6 +95,8 @@ class Along:
         self._function = function.map("group", "serial", group, [3, 4], []).expand() if group > 1 else function
         self._group = group
         self.rows = [function.numel_out(k) for k in range(function.n_out())]
+        entries = sum(function.nnz_in(k) for k in range(function.n_in())) + sum(self.rows)
+        self._blocks = [size for size in _BLOCKS if size * entries <= _MOST or size == _BLOCKS[-1]]
         self._made: dict[int, BufferedFunction] = {}
 
     def __call__(self, times: Vector, x: Vector, z: Vector, p: Vector, u: Vector, d: Vector) -> list[Vector]:
@@ -114,7 +118,7 @@ class Along:
             d: shape (nd, n).
         """
         total, first = results[0].shape[1], 0
-        for size in _BLOCKS:
+        for size in self._blocks:
             while total - first > (0.75 * size if size > _BLOCKS[-1] else 0):
                 last = min(first + size, total)
                 if size not in self._made:

@@ -48,7 +48,8 @@ class Narrow:
         self._rates: dict[int, Any] = {arguments["t"].element_hash(): ca.SX(1)}
         for state, rate in zip(_split(arguments["x"]), _split(rates), strict=True):
             self._rates[state.element_hash()] = rate
-        self._implicit = {symbol.element_hash() for symbol in _split(arguments["z"])}
+        self._implicit = {one.element_hash() for one in _split(arguments["z"])}
+        self._moves = self._rates.keys() | self._implicit
 
     def edges(self, operations: Iterable[tuple[int, list[Any]]]) -> Iterator[Any]:
         """Yield edges of operations of `NARROW`, each given by its code and operands."""
@@ -104,8 +105,7 @@ class Narrow:
                 yield slope, bend
 
     def _moving(self, expression: Any) -> list[Any]:
-        keys = self._rates.keys() | self._implicit
-        return [symbol for symbol in ca.symvar(expression) if symbol.element_hash() in keys]
+        return [one for one in ca.symvar(expression) if one.element_hash() in self._moves]
 
 
 def _slopes(expression: Any, symbol: Any) -> tuple[Any, Any]:

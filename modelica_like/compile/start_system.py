@@ -171,7 +171,7 @@ def _needed(reduced: ReducedDae, pending: set[int]) -> list[tuple[int, Any]]:
     """The explicit unknowns that some levels need, directly or indirectly."""
     position = {level: k for k, (level, _) in enumerate(reduced.explicit)}
     uses, needed = _uses(reduced), set[int]()
-    while pending := pending & position.keys():
+    while pending := (pending & position.keys()) - needed:
         needed |= pending
         pending = {other for level in pending for other in uses[position[level]]}
     return [pair for pair in reduced.explicit if pair[0] in needed]

@@ -108,9 +108,8 @@ class Dependencies(Following):
             rows[k] = {("discrete", k)} if not discrete.names else {d for d in starts[k] if d[0] in "tpu"}
         conditions = sparsity_rows(self.model.starts.conditions)
         for row, (mode, _, _) in zip(conditions, self.model.starts.modes, strict=True):
-            for name, k in self._through_implicit(row):
-                if name != "d":
-                    rows[mode] = rows[mode] | (self._initial_states[k] if name == "x" else {(name, k)})
+            known = [one for one in self._through_implicit(row) if one[0] != "d"]
+            rows[mode] = rows[mode].union(*(self._initial_states[one[1]] if one[0] == "x" else {one} for one in known))
         return rows
 
     def _start_value(self, position: int) -> set[Known]:

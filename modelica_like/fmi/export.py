@@ -29,11 +29,12 @@ from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources, source_files
 from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, icon_name, terminals_and_icons, with_open_ends
+from modelica_like.garbage import without_garbage_search
 from modelica_like.language import Assembly, Component
 from modelica_like.language.inside import inside
 from modelica_like.language.tunable import with_tunable_tables
 from modelica_like.options import Options
-from modelica_like.simulation import Model, loaded, positive_step, seconds, without_garbage_search
+from modelica_like.simulation import Model, loaded, positive_step, seconds
 from modelica_like.structure import reduce
 from modelica_like.writing import replacing
 

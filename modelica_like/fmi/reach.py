@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 
 class Reach:
@@ -51,6 +52,5 @@ class Reach:
     def elements(self, row: int) -> Iterator[tuple[str, int]]:
         """Yield name and element of every argument on which an element of the result depends."""
         bits = self.rows[row]
-        while bits:
-            yield self._elements[(bits & -bits).bit_length() - 1]
-            bits &= bits - 1
+        octets = np.frombuffer(bits.to_bytes((bits.bit_length() + 7) // 8, "little"), np.uint8)
+        yield from (self._elements[bit] for bit in np.flatnonzero(np.unpackbits(octets, bitorder="little")))

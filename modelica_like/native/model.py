@@ -17,6 +17,7 @@ from modelica_like.fmi.interface import FmuVariable, interface
 from modelica_like.fmi.model_file import model_file
 from modelica_like.fmi.start_tables import start_tables
 from modelica_like.fmi.tables import make_tables
+from modelica_like.garbage import without_garbage_search
 from modelica_like.native.codes import Code
 from modelica_like.native.failures import Failure, error_of
 from modelica_like.native.library import MESSAGE_LENGTH, OK, POINT, library
@@ -40,6 +41,7 @@ class NativeModel:
         LanguageError: a function has no counterpart in C.
     """
 
+    @without_garbage_search()
     def __init__(
         self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0, plan: StartPlan | None = None
     ) -> None:

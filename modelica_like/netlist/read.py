@@ -18,6 +18,7 @@ from modelica_like.errors import (
     WiringErrors,
     raise_together_or_one,
 )
+from modelica_like.garbage import without_garbage_search
 from modelica_like.language import Assembly, Component, Variable, guess
 from modelica_like.language.fields import Discrete
 from modelica_like.language.inside import declarations, inside
@@ -33,6 +34,7 @@ FMU_PART = "FMU"
 
 
 @checked
+@without_garbage_search()
 def load(path: str | Path, *, trust: bool = False) -> Assembly:
     """Read a netlist file and the netlists it uses.
 
@@ -59,6 +61,7 @@ def _modelica(path: str | Path) -> Assembly:
     return load_modelica(path)
 
 
+@without_garbage_search()
 def loads(text: str, file: str = "netlist.toml", *, trust: bool = False) -> Assembly:
     """Read a netlist from text; see `load`.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,8 @@ _MOST_CURVES = 4
 _SAME_TIME = 1e-9
 _SAME_START = 1e-6
 """Of the range: start values are solved to 1e-10, but tables have six digits."""
+_AT_ONCE = 2**22
+"""Numbers of a run that are read together."""
 _SAME_INSTANT = 1e-8
 """Time within which a mode that is left again counts as transient."""
 
@@ -137,7 +139,7 @@ class Curves(Shown):
     def difference(self, signal: str) -> tuple[Vector, Vector]:
         """Return the common times, and second minus first there."""
         grid = _Grid.of(self.first, self.second, self.events)
-        return grid.times, _difference(self.first, self.second, signal, grid)
+        return grid.times, _difference(self.second, self.first[signal], self.second[signal], grid)
 
     def plot(self, *patterns: str) -> Figure:
         """Draw signals of both in the units of the first's netlist, and below each the difference over its range.
@@ -201,7 +203,12 @@ def compare_solutions(
     events = tuple(_match_events(first, second))
     grid = _Grid.of(first, second, events)
     scales = ranges(first, names, least)
-    deviations = [_deviation(first, second, name, grid, scales[name]) for name in names]
+    both = zip(_each(first, names), _each(second, names), strict=True)
+    deviations = [
+        Deviation(name, first.unit_of(name), largest, largest / scales[name], time)
+        for (name, mine), (_, other) in both
+        for largest, time in [_largest(second, mine, other, grid)]
+    ]
     ordered = tuple(sorted(deviations, key=lambda deviation: -deviation.relative))
     return Curves(first, second, ordered, events, labels, grid.interpolated)
 
@@ -284,17 +291,24 @@ def _between(times: Vector, events: Sequence[EventDifference]) -> _Marks:
     return inside
 
 
-def _difference(first: Trajectories, second: Trajectories, name: str, grid: _Grid) -> Vector:
-    other = np.interp(grid.times, second.time, second[name]) if grid.interpolated else second[name][grid.partners]
-    return other - first[name][grid.rows]
+def _each(run: Trajectories, names: Sequence[str]) -> Iterator[tuple[str, Vector]]:
+    """Yield trajectories, many of which are read together."""
+    size = max(1, _AT_ONCE // len(run.time))
+    for k in range(0, len(names), size):
+        yield from run.together(*names[k : k + size]).items()
 
 
-def _deviation(first: Trajectories, second: Trajectories, name: str, grid: _Grid, scale: float) -> Deviation:
-    difference = np.abs(_difference(first, second, name, grid))
+def _difference(second: Trajectories, mine: Vector, other: Vector, grid: _Grid) -> Vector:
+    other = np.interp(grid.times, second.time, other) if grid.interpolated else other[grid.partners]
+    return other - mine[grid.rows]
+
+
+def _largest(second: Trajectories, mine: Vector, other: Vector, grid: _Grid) -> tuple[float, float]:
+    """Return the largest difference, and its time in s."""
+    difference = np.abs(_difference(second, mine, other, grid))
     difference = np.where(np.isnan(difference), np.inf, difference)
     k = int(np.argmax(difference))
-    largest = float(difference[k])
-    return Deviation(name, first.unit_of(name), largest, largest / scale, float(grid.times[k]))
+    return float(difference[k]), float(grid.times[k])
 
 
 _NOISE = 1e-6
@@ -311,9 +325,9 @@ def ranges(solution: Trajectories, names: Iterable[str], least: float = _NOISE) 
         names: signals.
         least: that share.
     """
-    spans = {name: float(np.ptp(solution[name])) for name in names}
+    spans: dict[str, float] = {}
     largest: dict[str, float] = {}
-    for name in spans:
-        unit = solution.unit_of(name)
-        largest[unit] = max(largest.get(unit, 0.0), float(np.abs(solution[name]).max()))
+    for name, values in _each(solution, [*names]):
+        spans[name], unit = float(np.ptp(values)), solution.unit_of(name)
+        largest[unit] = max(largest.get(unit, 0.0), float(np.abs(values).max()))
     return {name: max(span, least * largest[solution.unit_of(name)]) or 1.0 for name, span in spans.items()}

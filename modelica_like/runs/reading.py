@@ -67,6 +67,32 @@ def variables(model: CompiledDae, segments: Sequence[Segment], rows: Sequence[in
     return _Expressions.of(model, Cached.VARIABLES, model.equations.variables, tuple(rows)).read(model, segments)
 
 
+def rate_along(model: CompiledDae, segments: Sequence[Segment], row: int) -> Vector:
+    """Return the time derivative of one variable at all results, with the inputs held.
+
+    Args:
+        model: the compiled model.
+        segments: of a run.
+        row: position of the variable.
+
+    Returns:
+        Shape (n,), in the variable's unit per second.
+    """
+    whole = _Expressions.whole(model, Cached.VARIABLES, model.equations.variables)
+    motion, size = model.once(Cached.MOTION, lambda: model.motion), len(model.implicit)
+
+    def make() -> _Expressions:
+        return _Expressions(model, ca.vertcat(*(ca.vec(ca.densify(part)) for part in motion.parts(whole[row]))))
+
+    values = model.once((Cached.RATE, get_ident(), row), make).read(model, segments)
+    if not size:
+        return values[0]
+    direct, by_z, drift, jacobian = np.split(values, np.cumsum([1, size, size]))
+    slopes = jacobian.T.reshape(-1, size, size).transpose(0, 2, 1)
+    z_rates = -np.linalg.solve(slopes, drift.T[:, :, None])[:, :, 0]
+    return direct[0] + np.sum(by_z.T * z_rates, axis=1)
+
+
 def energy_term(model: CompiledDae, segments: Sequence[Segment], component: int, column: int) -> Vector:
     """Evaluate one energy term of one component at all results, shape (n,)."""
     row = component + column * len(model.components)
@@ -86,9 +112,13 @@ class _Expressions:
 
     @staticmethod
     def of(model: CompiledDae, which: Cached, function: ca.Function, rows: tuple[int, ...]) -> _Expressions:
-        key = Cached.ROWS, get_ident(), which, rows
-        whole = model.once((Cached.COLUMN, which), lambda: ca.vec(function(*model.arguments.values())))
-        return model.once(key, lambda: _Expressions(model, whole[list(rows)]))
+        whole = _Expressions.whole(model, which, function)
+        return model.once((Cached.ROWS, get_ident(), which, rows), lambda: _Expressions(model, whole[list(rows)]))
+
+    @staticmethod
+    def whole(model: CompiledDae, which: Cached, function: ca.Function) -> Any:
+        """Return all results of a function."""
+        return model.once((Cached.COLUMN, which), lambda: ca.vec(function(*model.arguments.values())))
 
     def read(self, model: CompiledDae, segments: Sequence[Segment]) -> Vector:
         t, x, z, p, u, d = self._needed

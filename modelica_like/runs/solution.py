@@ -7,21 +7,22 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.options import Options
 from modelica_like.runs.energy import EnergyBalance, energy_balance
-from modelica_like.runs.reading import TOGETHER, blocks, energy_term, variables
+from modelica_like.runs.reading import TOGETHER, energy_term, rate_along, variables
 from modelica_like.runs.trajectories import ENERGY_TERMS, Statistics, Trajectories, Values
 from modelica_like.solve.dense import Dense
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.initialize import Impact, Point, StartKind
 from modelica_like.solve.recorder import Ended, Event, Segment
+
+_PAGE = 2**17
+"""Numbers that are read at once where those of all variables are too many: to make a function takes as long."""
 
 
 @dataclass(eq=False)
@@ -53,6 +54,7 @@ class Solution(Trajectories):
     _balances: dict[tuple[float | None, float | None], EnergyBalance] = field(
         default_factory=dict, init=False, repr=False
     )
+    _pages: dict[int, Vector] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def time(self) -> Vector:
@@ -90,7 +92,7 @@ class Solution(Trajectories):
         model = self.model
         if path in model.position:
             row = model.position[path]
-            return self._all[row] if self._small else variables(model, self.segments, [row])[0]
+            return self._all[row] if self._small else self._page(row)
         if path in model.discrete_position:
             row = model.discrete_position[path]
             return np.repeat([s.d[row] for s in self.segments], [len(s.times) for s in self.segments])
@@ -99,7 +101,10 @@ class Solution(Trajectories):
         if path in model.derived_position:
             return np.full(len(self.time), float(model.equations.derived(model.p)[model.derived_position[path]]))
         if name := differentiated(path):
-            return np.concatenate([rate_along(model, name, *block) for block in blocks(self.segments)])
+            if name not in model.position:
+                near = did_you_mean(name, list(model.position)) or "."
+                raise UnknownName(f"{model.name} has no continuous variable '{name}'{near}")
+            return rate_along(model, self.segments, model.position[name])
         owner, _, term = path.rpartition(".")
         if term in ENERGY_TERMS and owner in model.components:
             return energy_term(model, self.segments, model.components.index(owner), ENERGY_TERMS.index(term))
@@ -119,6 +124,19 @@ class Solution(Trajectories):
     @cached_property
     def _all(self) -> Vector:
         return variables(self.model, self.segments, None)
+
+    def _page(self, row: int) -> Vector:
+        """Return one variable of a large run: it is read with its neighbours, which are often asked for next."""
+        count, size = len(self.model.flat_variables), max(1, _PAGE // len(self.time))
+        number, place = divmod(row, size)
+        rows = range(number * size, min((number + 1) * size, count))
+        if len(self.time) > _PAGE:
+            return variables(self.model, self.segments, rows)[place]
+        if number not in self._pages:
+            for oldest in list(self._pages)[: len(self._pages) - TOGETHER // _PAGE + 1]:
+                del self._pages[oldest]
+            self._pages[number] = variables(self.model, self.segments, rows)
+        return self._pages[number][place]
 
     def together(self, *keys: str | Any) -> dict[str, Vector]:
         """Return several trajectories by path, each of shape (len(time),); faster than one by one.
@@ -214,39 +232,3 @@ class Solution(Trajectories):
 def differentiated(path: str) -> str:
     """Return the variable in `der(variable)`, or an empty text for other paths."""
     return path[4:-1].strip() if path.startswith("der(") and path.endswith(")") else ""
-
-
-def rate_along(model: CompiledDae, name: str, times: Any, x: Vector, z: Vector, d: Vector) -> Vector:
-    """Return the time derivative of one variable, with the inputs held.
-
-    Args:
-        model: the compiled model.
-        name: path of the variable.
-        times: shape (n,), in s.
-        x: states, shape (nx, n).
-        z: implicit unknowns, shape (nz, n).
-        d: modes and discrete values, shape (nd, n).
-
-    Returns:
-        Shape (n,), in the variable's unit per second.
-
-    Raises:
-        UnknownName: there is no such variable, or it changes only at events.
-    """
-    if name not in model.position:
-        near = did_you_mean(name, list(model.position)) or "."
-        raise UnknownName(f"{model.name} has no continuous variable '{name}'{near}")
-    row, arguments = model.position[name], list(model.arguments.values())
-
-    def make() -> ca.Function:
-        parts = model.motion.parts(model.equations.variables(*arguments)[row])
-        return ca.Function("rate", arguments, [ca.densify(part) for part in parts])
-
-    parts = model.once((Cached.RATE, name), make)(np.reshape(times, (1, -1)), x, z, model.p, model.u, d)
-    direct, by_z, drift, jacobian = (np.asarray(part.full()) for part in parts)
-    if not model.implicit:
-        return direct.ravel()
-    count, size = len(times), len(model.implicit)
-    slopes = jacobian.reshape(size, count, size).transpose(1, 0, 2)
-    z_rates = -np.linalg.solve(slopes, drift.T[:, :, None])[:, :, 0]
-    return direct.ravel() + np.sum(by_z.reshape(count, size) * z_rates, axis=1)

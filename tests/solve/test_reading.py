@@ -88,3 +88,17 @@ def test_twins_of_a_model_read_by_the_same_symbols() -> None:
     run = simulate(first, 1.0, points=2)
     for one, name, expected in ((first, "right.phi", [0.0, 1.5, 3.0]), (second, "right.w", [3.0, 3.0, 3.0])):
         assert variables(one, run.segments, [model.position[name]])[0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("page", [1, 21, 64, 10_000])
+def test_variables_of_a_large_run_are_read_with_their_neighbours(page: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One by one, again and in any order: what all together give; no more pages are kept than memory for all."""
+    parts: dict[str, Component] = {"left": Inertia(J=1.0, phi=0.0, w=3.0), "right": Inertia(J=2.0)}
+    run = simulate(Assembly(parts=parts, series={"line": ["left", "right"]}), 1.0, points=20)
+    every = variables(run.model, run.segments, None)
+    monkeypatch.setattr(solution, "TOGETHER", 100)
+    monkeypatch.setattr(solution, "_PAGE", page)
+    large = replace(run, _cache={})
+    for name, row in [*run.model.position.items()] * 2 + [*reversed(run.model.position.items())]:
+        np.testing.assert_array_equal(large[name], every[row])
+        assert len(large._cache.get("pages", ())) <= max(1, 100 // page)

@@ -91,8 +91,11 @@ def linearize(
     states = tuple(name for name in model.states if name in model.position)
     y_names = (tuple(top) or states) if outputs is None else tuple(outputs)
     columns, nodes = columns_of(model, u_names), nodes_of(model, y_names)
-    rates, of_outputs = slopes(model, point, "ode"), slopes(model, point, "variables", nodes)
-    a, b, c, d = rates.x, rates.theta[:, columns], of_outputs.x, of_outputs.theta[:, columns]
+    different = list(dict.fromkeys(columns))
+    rates = slopes(model, point, "ode", columns=different)
+    of_outputs = slopes(model, point, "variables", nodes, columns=different)
+    places = [different.index(column) for column in columns]
+    a, b, c, d = rates.x, rates.theta[:, places], of_outputs.x, of_outputs.theta[:, places]
     motions = free_motions(model, point)
     keep, shape = motions.keep, motions.shape
     if len(keep) < len(a):

@@ -26,6 +26,7 @@ from modelica_like.fmi.model_file import model_file
 from modelica_like.fmi.package import target_file
 from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.tables import make_tables
+from modelica_like.garbage import without_garbage_search
 from modelica_like.language.formula import Formula
 from modelica_like.language.units import ANY, ONE, Unit, coherent, parse_unit
 from modelica_like.native.library import MESSAGE_LENGTH, Run
@@ -34,7 +35,7 @@ from modelica_like.runs.display import Display
 from modelica_like.runs.signals import Signal, si_value
 from modelica_like.show.plot import for_page
 from modelica_like.show.plot import quantity as quantity_of
-from modelica_like.simulation import Model, seconds, simulate, without_garbage_search
+from modelica_like.simulation import Model, seconds, simulate
 from modelica_like.writing import write_bytes
 
 _SPREAD = 5.0

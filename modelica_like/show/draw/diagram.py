@@ -168,17 +168,18 @@ def _opens(part: Component, depth: int) -> bool:
 
 def _joined(component: Component) -> Iterator[list[Connector | Symbol]]:
     """Yield each set of joined ports once."""
-    sets: list[dict[tuple[int, str], Connector | Symbol]] = []
-    for statement, _ in located(component.equations()):
+    sets: dict[int, dict[tuple[int, str], Connector | Symbol]] = {}
+    number_of: dict[tuple[int, str], int] = {}
+    for number, (statement, _) in enumerate(located(component.equations())):
         if isinstance(statement, Connection):
             new = {
                 (id(end.owner), end.name) if isinstance(end, Symbol) else (id(end), ""): end for end in statement.ends
             }
-            for old in [net for net in sets if net.keys() & new.keys()]:
-                new = old | new
-                sets.remove(old)
-            sets.append(new)
-    yield from (list(net.values()) for net in sets)
+            for old in sorted({number_of[end] for end in new if end in number_of}):
+                new = sets.pop(old) | new
+            number_of |= dict.fromkeys(new, number)
+            sets[number] = new
+    yield from (list(net.values()) for net in sets.values())
 
 
 def _port(end: Connector | Symbol, scope: Component, nodes: dict[str, Node], outer: dict[str, Node]) -> Port:

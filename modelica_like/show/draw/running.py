@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from typing import cast
 
@@ -14,7 +16,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector
 from modelica_like.language.inside import inside
 from modelica_like.language.units import parse_unit
-from modelica_like.runs.energy import EnergyBalance
+from modelica_like.runs.energy import EnergyBalance, EnergyRow
 from modelica_like.runs.trajectories import Trajectories
 from modelica_like.show.draw.diagram import Node, Notes, Port
 from modelica_like.show.draw.labels import VALUE, Box, Text, meet, text_width
@@ -30,6 +32,8 @@ _SAID = 1e-3
 _CARRIES = 1e-9
 """Part of its largest reaction above which a part is not open."""
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"))
+_COLUMN = 100.0
+"""Width of a column of the sheet in which texts are compared, in 1/96 inch."""
 _LEAST = 0.005
 """Share of the supply below which an energy is not told."""
 
@@ -56,9 +60,9 @@ class Running:
     supply: float = 0.0
     moving: bool = False
 
-    @property
+    @cached_property
     def largest(self) -> float:
-        """The largest power in W."""
+        """The largest power in W, once all are known."""
         return max((abs(power) for pieces in self.powers.values() for _, _, power in pieces), default=0.0)
 
     def width(self, line: Line, power: float) -> float:
@@ -91,17 +95,22 @@ def spelled(value: float, unit: str = "W") -> str:
 
 def energy_notes(balance: EnergyBalance) -> Notes:
     """Return what is written below each part: energies in J and as shares of the supply."""
+    rows_of: dict[str, list[EnergyRow]] = defaultdict(list)
+    for row in balance:
+        names = row.component.split(".")
+        for depth in range(len(names)):
+            rows_of[".".join(names[: depth + 1])].append(row)
+    supply = balance.supply
 
     def told(part: Component) -> list[str]:
-        path = path_of(part)
-        rows = [row for row in balance if row.component == path or row.component.startswith(f"{path}.")]
+        rows = rows_of.get(path_of(part), [])
         sums = {"in": 0.0, "out": 0.0, "stored": sum(row.stored for row in rows), "lost": sum(row.lost for row in rows)}
         source = sum(row.source for row in rows)
         sums["in" if source > 0.0 else "out"] = abs(source)
         return [
-            f"{what} {spelled(value, 'J')}, {value / balance.supply:.1%}"
+            f"{what} {spelled(value, 'J')}, {value / supply:.1%}"
             for what, value in sums.items()
-            if abs(value) > _LEAST * balance.supply
+            if abs(value) > _LEAST * supply
         ]
 
     return told
@@ -144,20 +153,47 @@ def running(
     return result
 
 
+class _Taken:
+    """Places on a sheet that are taken, by its columns: a text is compared with what is near."""
+
+    def __init__(self) -> None:
+        self._columns: dict[int, list[tuple[Line | None, Box]]] = defaultdict(list)
+
+    def add(self, box: Box, by: Line | None = None) -> None:
+        """Take a place."""
+        for column in self._across(box):
+            self._columns[column].append((by, box))
+
+    def meets(self, box: Box, line: Line) -> bool:
+        """Whether a box overlaps anything but what this line has taken."""
+        near = (item for column in self._across(box) for item in self._columns.get(column, ()))
+        return any(by is not line and meet(box, other) for by, other in near)
+
+    @staticmethod
+    def _across(box: Box) -> range:
+        return range(int(box[0] // _COLUMN), int(box[2] // _COLUMN) + 1)
+
+
 def _write(drawn: Sheet, result: Running) -> None:
     """Choose texts at lines that meet no other text, no ground and no other line."""
-    taken = [_moved(box, (at[0] + item.at[0], at[1] + item.at[1])) for at, item in drawn.everything()
-             if isinstance(item, Placed) for box in [*(text.box for text in texts(item)), *_marks(item)]]  # fmt: skip
-    lines = [(at, item) for at, item in drawn.everything() if isinstance(item, Line)]
-    pieces = [(item if a[1] == b[1] else None, _moved((*min(a, b), *max(a, b)), at))
-              for at, item in lines for path in item.paths for a, b in pairwise(path)]  # fmt: skip
+    taken = _Taken()
+    lines = list[tuple[Point, Line]]()
+    for at, item in drawn.everything():
+        if isinstance(item, Placed):
+            by = at[0] + item.at[0], at[1] + item.at[1]
+            for box in [*(text.box for text in texts(item)), *_marks(item)]:
+                taken.add(_moved(box, by))
+        elif isinstance(item, Line):
+            lines.append((at, item))
+            for a, b in (pair for path in item.paths for pair in pairwise(path)):
+                taken.add(_moved((*min(a, b), *max(a, b)), at), item if a[1] == b[1] else None)
     for at, line in lines:
-        others = [*taken, *(box for other, box in pieces if other is not line)]
         for said in result.texts(line):
             boxes = [_moved(text.box, at) for text in said]
-            if not any(meet(box, other) for box in boxes for other in others):
+            if not any(taken.meets(box, line) for box in boxes):
                 result.said[line] = said
-                taken += boxes
+                for box in boxes:
+                    taken.add(box)
                 break
 
 

@@ -77,14 +77,18 @@ def _fall(part: Component, run: Solution) -> tuple[float, float] | None:
 
 def _chains(drawn: Diagram) -> list[list[Node]]:
     """Return parts that shafts and slides join."""
-    chains: list[list[Node]] = []
+    chains: dict[int, dict[Node, None]] = {}
+    chain_of: dict[Node, dict[Node, None]] = {}
     for net in drawn.nets:
-        new = [port.node for port in net.ports if _moves(port)]
-        for old in [chain for chain in chains if any(node in chain for node in new)]:
-            new = [*old, *(node for node in new if node not in old)]
-            chains.remove(old)
-        chains += [new] if new else []
-    return chains
+        new = dict.fromkeys(port.node for port in net.ports if _moves(port))
+        chain, *others = [*{id(one): one for node in new if (one := chain_of.get(node))}.values()] or [{}]
+        for part in (*others, new):
+            chain |= part
+            chain_of |= dict.fromkeys(part, chain)
+        for one in (*others, chain):
+            chains.pop(id(one), None)
+        chains |= {id(chain): chain} if chain else {}
+    return [list(chain) for chain in chains.values()]
 
 
 def _givers(group: list[Node], run: Solution, rows: tuple[EnergyRow, ...], least: float) -> list[Node]:

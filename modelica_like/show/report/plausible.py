@@ -15,7 +15,7 @@ from modelica_like.language.inside import inside
 from modelica_like.language.units import parse_unit
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Trajectories
-from modelica_like.show.draw.diagram import Diagram, diagram
+from modelica_like.show.draw.diagram import Diagram, Node, diagram
 from modelica_like.show.report.driven import driven_notes
 from modelica_like.structure.holds import HeldMotion
 
@@ -74,8 +74,11 @@ def notes(drive: Component, run: Trajectories, *, energy: bool = True) -> list[s
 
 
 def _neighbours(drawn: Diagram) -> Iterator[str]:
-    joined = {node: {port.node for net in drawn.nets if any(p.node is node for p in net.ports) for port in net.ports
-                     if not port.signal} for node in drawn.nodes}  # fmt: skip
+    joined: dict[Node, set[Node]] = {node: set() for node in drawn.nodes}
+    for net in drawn.nets:
+        others = {port.node for port in net.ports if not port.signal}
+        for node in {port.node for port in net.ports} & joined.keys():
+            joined[node] |= others
     for unit, (what, slip) in _COMPARED.items():
         sized = {node: amount for node in joined if (part := node.component) and (amount := _size(part, unit))}
         pairs = set[frozenset[str]]()

@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from modelica_like.compile import compile
 from modelica_like.flatten import FlatModel, flatten
+from modelica_like.garbage import without_garbage_search
 from modelica_like.language import Component, Expr
 from modelica_like.show.report.tables import Listed, table
 from modelica_like.structure import ReducedDae, reduce
@@ -17,6 +18,7 @@ from modelica_like.structure import ReducedDae, reduce
 _SHOWN = 12
 
 
+@without_garbage_search()
 def structure_report(component: Component) -> RenderableType:
     """Flatten and reduce a model and report the result."""
     flat = flatten(component)

@@ -19,6 +19,7 @@ from modelica_like.solve.initialize.point import Point
 from modelica_like.solve.initialize.singular import is_regular
 
 _Names = tuple[str, ...]
+_Columns = Sequence[int] | None
 _ALL: _Names = ("x", "t", "theta")
 
 
@@ -83,14 +84,22 @@ class _Partials:
         self._fast = BufferedFunction(ca.Function("slopes", symbols, outputs))
         patterns = [self._fast.function.sparsity_out(k) for k in range(len(outputs))]
         self._patterns = [(pattern.shape, np.array(pattern.find(), int)) for pattern in patterns]
+        self._names = "value", "z", *by
 
-    def __call__(self, model: CompiledDae, point: Point, *constants: Vector) -> list[Vector]:
+    def __call__(self, model: CompiledDae, point: Point, *constants: Vector, columns: _Columns = None) -> list[Vector]:
         results = self._fast(point.t, point.x, point.z, model.p, model.u, point.d, *constants)
-        return [_filled(entries, *pattern) for entries, pattern in zip(results, self._patterns, strict=True)]
+        parts = zip(self._names, results, self._patterns, strict=True)
+        return [_filled(entries, *pattern, columns if name == "theta" else None) for name, entries, pattern in parts]
 
 
-def _filled(entries: Vector, shape: tuple[int, int], places: Any) -> Vector:
-    """Fill a matrix column by column."""
+def _filled(entries: Vector, shape: tuple[int, int], places: Any, columns: _Columns) -> Vector:
+    """Fill a matrix column by column, of which only some columns may be wanted."""
+    if columns is not None:
+        new = np.full(shape[1], -1)
+        new[list(columns)] = range(len(columns))
+        column = new[places // shape[0]]
+        places, entries = (column * shape[0] + places % shape[0])[column >= 0], entries[column >= 0]
+        shape = shape[0], len(columns)
     filled = np.zeros(shape[0] * shape[1])
     filled[places] = entries
     return filled.reshape(shape, order="F")
@@ -98,7 +107,7 @@ def _filled(entries: Vector, shape: tuple[int, int], places: Any) -> Vector:
 
 def slopes(
     model: CompiledDae, point: Point, name: str | Key, rows: Sequence[int] | None = None,
-    function: Callable[[], ca.Function] | None = None, *constants: Vector,
+    function: Callable[[], ca.Function] | None = None, *constants: Vector, columns: Sequence[int] | None = None,
 ) -> Slopes:  # fmt: skip
     """Differentiate a function of the model.
 
@@ -109,6 +118,7 @@ def slopes(
         rows: which results of the function; by default all.
         function: makes a function of the model's arguments, and of `constants`.
         constants: numbers that are not differentiated.
+        columns: different positions in theta, by which alone to differentiate; by default all, which are many.
     """
 
     def make() -> tuple[list[Any], Any]:
@@ -119,7 +129,7 @@ def slopes(
         return symbols, value if rows is None else value[list(rows), :]
 
     key = name, None if rows is None else tuple(rows)
-    value, x, t, theta = _total(model, point, key, make, _ALL, *constants)
+    value, x, t, theta = _total(model, point, key, make, _ALL, *constants, columns=columns)
     return Slopes(model, point, value[:, 0], x, t[:, 0], theta)
 
 
@@ -147,15 +157,15 @@ def variable_slopes(model: CompiledDae, point: Point, nodes: Sequence[int]) -> V
     return x
 
 
-def implicit_slopes(model: CompiledDae, point: Point, by: _Names = _ALL) -> list[Vector]:
-    """Derivatives of z by x, t and theta; shapes (nz, nx), (nz, 1), (nz, ntheta).
+def implicit_slopes(model: CompiledDae, point: Point, by: _Names = _ALL, columns: _Columns = None) -> list[Vector]:
+    """Derivatives of z by x, t and theta, or its `columns`; shapes (nz, nx), (nz, 1), (nz, ntheta).
 
     Raises:
         SingularAtStart: a slope is not finite.
     """
     symbols = [*model.arguments.values()]
     make = lambda: _Partials(symbols, model.equations.alg(*symbols), by)  # noqa: E731
-    _, z, *parts = model.once((Cached.IMPLICIT_SLOPES, by, get_ident()), make)(model, point)
+    _, z, *parts = model.once((Cached.IMPLICIT_SLOPES, by, get_ident()), make)(model, point, columns=columns)
     _check_finite(model, point, [z, *parts], model.implicit)
     right = -np.hstack(parts)
     # Reactions whose split is undetermined make the equations for z singular; what depends on them is left out.
@@ -165,13 +175,14 @@ def implicit_slopes(model: CompiledDae, point: Point, by: _Names = _ALL) -> list
 
 def _total(
     model: CompiledDae, point: Point, key: Hashable, make: Callable[[], tuple[list[Any], Any]], by: _Names,
-    *constants: Vector,
+    *constants: Vector, columns: _Columns = None,
 ) -> list[Vector]:  # fmt: skip
     """Return value and derivatives of what `make` gives (symbols and expression), z following."""
     partials = model.once((Cached.SLOPES, key, by, get_ident()), lambda: _Partials(*make(), by))
-    value, z, *parts = partials(model, point, *constants)
+    value, z, *parts = partials(model, point, *constants, columns=columns)
     if np.any(z):
-        parts = [part + z @ follows for part, follows in zip(parts, implicit_slopes(model, point, by), strict=True)]
+        following = implicit_slopes(model, point, by, columns)
+        parts = [part + z @ follows for part, follows in zip(parts, following, strict=True)]
     return [value, *parts]
 
 

@@ -21,6 +21,8 @@ from modelica_like.show.report.page.tables import details, table
 _PATIENCE = 3.0
 """Seconds of a run whose derivatives a page waits for; they take two to four times as long."""
 _RANKED, _MOST_ENDS, _MOST_MODES = 12, 3, 20
+_MOST_STATES = 600
+"""States of a drive whose modes a page waits for: all of them take a time that grows with their cube, here 2 s."""
 _MATTERS = 5e-4
 """Percent per percent below which a parameter does not matter."""
 _ZERO = 0.01
@@ -94,6 +96,11 @@ def small_motions(drive: Component, run: Solution) -> str:
     Raises:
         ModelicaLikeError: there is no linear model.
     """
+    if len(run.model.states) > _MOST_STATES:
+        return (
+            f"<p>Not computed: all modes of {len(run.model.states)} states take long. <code>modelica-like modes</code> "
+            "computes them.</p>"
+        )
     modes = linearize(run).modes()
     rows = [
         (str(k), f"{mode.frequency:.4g}", f"{mode.damping:.3g}", shares(mode.stored), shares(mode.lost))
