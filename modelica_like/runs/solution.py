@@ -133,7 +133,7 @@ class Solution(Trajectories):
         if len(self.time) > _PAGE:
             return variables(self.model, self.segments, rows)[place]
         if number not in self._pages:
-            for oldest in list(self._pages)[: len(self._pages) - TOGETHER // _PAGE + 1]:
+            for oldest in list(self._pages)[: max(0, len(self._pages) - TOGETHER // _PAGE + 1)]:
                 del self._pages[oldest]
             self._pages[number] = variables(self.model, self.segments, rows)
         return self._pages[number][place]
