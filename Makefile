@@ -8,7 +8,7 @@
 # make shells   fish, for the tests of completion, likewise
 # make emulators   qemu and wine, for the tests of the run-time of other platforms, likewise
 # make fmus   the reference FMUs, from their C sources, to build/fmus
-# make benchmark   times as ratios to hand-written baselines of the same run
+# make benchmark   times as ratios to hand-written baselines of the same run; fails where one grows with more than the parts
 
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
@@ -81,6 +81,7 @@ benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/gradient.py
 	$(BIN)/python benchmarks/linearize.py 100 1000
 	$(BIN)/python benchmarks/sweep.py 900
+	$(BIN)/python benchmarks/growth.py
 
 site: .venv/installed-dev
 	$(BIN)/python docs/site/build.py

@@ -107,7 +107,8 @@ def _run(path: Path, job: dict[str, Any], timeout: float) -> RecordedSolution:
         table = np.load(folder / "result.npy", max_header_size=_HEADER)  # names of all columns
         meta = json.loads((folder / "meta.json").read_text())
     variables = (RecordedVariable(**{**variable, "names": dict(variable["names"])}) for variable in meta["variables"])
-    columns = [variable for variable in variables if variable.path in table.dtype.names]
+    names = set(table.dtype.names)
+    columns = [variable for variable in variables if variable.path in names]
     parts = [tuple(column for column in columns if (column.kind == "discrete") is modes) for modes in (False, True)]
     constants = {name: float(job["parameters"].get(name, value)) for name, value in meta["constants"].items()}
     model = RecordedModel(meta["name"], parts[0], parts[1], constants)

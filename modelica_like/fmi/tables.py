@@ -70,10 +70,8 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
     """
     start = start or start_tables(model)
     functions, jacobian, start_pattern = _functions(model, start)
-    states = len(model.states)
-    diagonal = ca.Sparsity(jacobian.size1(), jacobian.size2())
-    for k in range(states):
-        diagonal.add_nz(k, k)
+    states = range(len(model.states))
+    diagonal = ca.Sparsity.triplet(*jacobian.shape, states, states)
     step = jacobian + diagonal
     sizes = {name: model.equations.ode.size1_in(name) for name in ARGUMENTS[:-1]} | {
         "y": start.plan.system.function.size1_out(0)

@@ -26,7 +26,7 @@ from modelica_like.language import (
     var,
 )
 from modelica_like.show.report.files import write_solution
-from modelica_like.show.report.page import report, save_report
+from modelica_like.show.report.page import assessed, report, save_report
 from modelica_like.show.report.page.page import curves
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -113,6 +113,14 @@ def test_shares_of_energy_add_up(page: Path) -> None:
 
 def test_eigenfrequencies_are_listed(page: Path) -> None:
     assert len(rows(page, "Small motions at the end")) == 3
+
+
+def test_a_page_does_not_wait_for_the_modes_of_large_drives(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(assessed, "_MOST_STATES", 1)
+    run = simulate(Inertia(J=1.0, phi=0.0, w=1.0), 0.1, points=2)
+    assert assessed.small_motions(Inertia(), run) == (
+        "<p>Not computed: all modes of 2 states take long. <code>modelica-like modes</code> computes them.</p>"
+    )
 
 
 def test_shapes_stand_below_the_schematic(page: Path) -> None:
