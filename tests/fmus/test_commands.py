@@ -25,7 +25,7 @@ def test_validate_of_a_broken_file_fails(tmp_path: Path) -> None:
 def test_validate_of_no_file(tmp_path: Path) -> None:
     result = called(["validate", str(tmp_path / "drive.fmu")])
     assert result.exit_code == 2
-    assert "No such file or directory." in result.stderr
+    assert "drive.fmu' does not exist." in result.stderr
 
 
 def test_compare_prints_deviations_and_draws(reference_fmus: Built, tmp_path: Path) -> None:

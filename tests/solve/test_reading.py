@@ -98,7 +98,7 @@ def test_variables_of_a_large_run_are_read_with_their_neighbours(page: int, monk
     every = variables(run.model, run.segments, None)
     monkeypatch.setattr(solution, "TOGETHER", 100)
     monkeypatch.setattr(solution, "_PAGE", page)
-    large = replace(run, _cache={})
+    large = replace(run)
     for name, row in [*run.model.position.items()] * 2 + [*reversed(run.model.position.items())]:
         np.testing.assert_array_equal(large[name], every[row])
-        assert len(large._cache.get("pages", ())) <= max(1, 100 // page)
+        assert len(large._pages) <= max(1, 100 // page)
