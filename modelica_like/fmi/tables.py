@@ -70,8 +70,8 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
     """
     start = start or start_tables(model)
     functions, jacobian, start_pattern = _functions(model, start)
-    states = range(len(model.states))
-    diagonal = ca.Sparsity.triplet(*jacobian.shape, states, states)
+    states = len(model.states)
+    diagonal = ca.Sparsity.triplet(*jacobian.shape, range(states), range(states))
     step = jacobian + diagonal
     sizes = {name: model.equations.ode.size1_in(name) for name in ARGUMENTS[:-1]} | {
         "y": start.plan.system.function.size1_out(0)
