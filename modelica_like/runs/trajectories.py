@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -149,7 +150,7 @@ class Trajectories(Shown, ABC):
             return f"{'der(' * key.order}{name}{')' * key.order}"
         return str(key)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Paths of all variables, modes and discrete values that somebody has declared."""
         every = (*self.model.flat_variables, *self.model.flat_discretes)

@@ -127,6 +127,6 @@ def _follows(model: CompiledDae, plan: StartPlan, point: Point, states: list[int
         by_rows = ca.solve(matrix, unit).T
         slopes = np.hstack([by_rows[:, plan.own :].full(), ca.mtimes(by_rows, direct).full()])
         for row in np.abs(slopes):
-            names = [name for name, size in zip(given, row, strict=True) if name and size > _NOTHING]
+            names = [given[k] for k in np.flatnonzero(row > _NOTHING) if given[k]]
             more = " …" if len(names) > _SHOWN else ""
             yield f"follows from {', '.join(names[:_SHOWN])}{more}" if names else "follows"
