@@ -119,6 +119,11 @@ def of_chain(parts: int, folder: Path) -> Iterator[Call]:
     yield "energy balance", lambda: shown(str(simulate(model, UNTIL).energy()))
     yield "report of a run", lambda: shown(run_report(run))
     yield "notes", lambda: notes(drive, run)
+    yield from of_run(drive, model, run, folder)
+
+
+def of_run(drive: Any, model: Any, run: Any, folder: Path) -> Iterator[Call]:
+    """Yield the calls on a drive, its model and its run."""
     yield "page of a run", lambda: save_report(drive, run, folder / "run.html")
     yield "page to simulate", lambda: export_html(drive, folder / "drive.html")
     yield "export without check", lambda: export_fmu(drive, folder / "plain.fmu", check=False)
@@ -138,7 +143,6 @@ def of_chain(parts: int, folder: Path) -> Iterator[Call]:
     yield "compare", lambda: compare(run, run)
     yield "linearize", lambda: linearize(model, inputs=["motor.tau_constant"], outputs=["m1.w"])
     yield "steady", lambda: steady(model)
-    yield MODES, lambda: linearize(build(loads(netlist(parts // 10)))).modes()
     yield "sensitivities by one", lambda: sensitivities(run, "s1.tau", ["m1.J"])
     yield "sensitivities by all", lambda: sensitivities(run, "s1.tau")
     yield "sweep", lambda: sweep(model, {"m1.J": [0.1, 0.2, 0.3]}, ["max(s1.tau)"], until=UNTIL, processes=1)
@@ -153,6 +157,7 @@ def of_tree(parts: int, folder: Path) -> Iterator[Call]:
     yield "tree: energy balance", lambda: simulate(now["model"], SHORT).energy()
     yield "tree: export without check", lambda: export_fmu(now["model"], folder / "tree.fmu", check=False)
     yield "tree: linearize", lambda: linearize(now["model"])
+    yield MODES, lambda: linearize(build(loads(netlist(parts // 10)))).modes()
 
 
 def measured(parts: int, words: list[str]) -> Iterator[tuple[str, float]]:
