@@ -51,11 +51,8 @@ _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
 
 
 def _product(left: Unit, right: Unit, *, plain: bool) -> Unit:
-    if not plain or ANY not in (left, right):
-        return left * right
-    known = right if left == ANY else left
-    # A number in it can still have the unit of its place, as long as nothing says which one it has.
-    return ANY if known == ONE else known
+    # A plain number in it has whatever unit the place of the formula asks for: `mass*g` is a force.
+    return ANY if plain and ANY in (left, right) else left * right
 
 
 def _operator(sign: str, *, turned: bool = False) -> Callable[[Any, Any], Formula]:
@@ -134,8 +131,8 @@ class Formula(Arithmetic):
 
         Args:
             lookup: returns the unit of a path.
-            plain: whether `ANY` is that of a plain number, with which a product keeps its unit; otherwise it is an
-                unknown one.
+            plain: whether `ANY` is that of a plain number, which has the unit that its place asks for; otherwise it is
+                an unknown one.
 
         Raises:
             UnitError: units do not fit together.

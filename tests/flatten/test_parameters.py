@@ -169,6 +169,7 @@ FORMULAS = [
     ("kg", 101.0, {"n": 100, "M": "(n + 1)*1 kg"}),
     ("kg", 200.0, {"n": 100, "m": "2*n", "M": "m*1 kg"}),
     ("kg", 200.0, {"n": 100, "M": "2*n"}),  # a plain number takes the unit of its place
+    ("N", 30.0, {"mass": 3, "g": "10 m/s2", "M": "mass*g"}),  # in products, too
     ("N", 16.0, {"E": "4 N", "M": "E*E/(1 N)"}),
     ("kg2", 9.0, {"m": "3 kg", "M": "m**(4/2)"}),
     ("N", 2.0, {"F": "2 N", "M": "max(F, 0)"}),
@@ -189,11 +190,7 @@ def test_the_unit_of_a_formula_is_that_of_what_is_written(unit, value, parameter
         ("N.m", "m", {"E": "4 N.m", "M": "E/(1 N)"}),
         ("rad/s", "rad", {"E": "4 rad/s", "M": "E*1 s"}),
         ("rad/s", "rad", {"E": "4 rad/s", "F": "E*1 s", "M": "F"}),
-        ("rad/s", "kg", {"n": 100, "M": "n*2 kg"}),
-        ("rad/s", "kg", {"n": 100, "M": "n*1 kg"}),
         ("rad/s", "kg", {"n": 100, "M": "(n + 1)*1 kg"}),
-        ("rad/s", "1/kg", {"n": 100, "M": "n/(2 kg)"}),
-        ("rad/s", "kg", {"n": 100, "m": "2*n", "M": "m*1 kg"}),
         ("kg", "no unit", {"n": 100, "M": "n + 1"}),
     ],
 )
