@@ -71,20 +71,22 @@ class Keeping:
         slopes = self._slopes(candidates)
         lengths = np.maximum(np.linalg.norm(slopes, axis=1), _ROUNDING)
         kept: list[int] = []
-        while True:
-            change = np.linalg.pinv(rows)[:, 0]
-            moves = np.abs(slopes @ change) / lengths
-            moved = [k for k in np.flatnonzero(moves > _ROUNDING * np.linalg.norm(change)).tolist() if k not in tried]
-            if not moved:
-                return tuple(kept)
+        moves = _moves(rows, slopes, lengths)
+        while moved := [k for k in np.flatnonzero(moves).tolist() if k not in tried]:
             # No position moves at once. The body that goes along most is the next neighbour: in a chain two are enough.
-            moved = [k for k in moved if k < len(positions)] or moved
-            row = moved[int(np.argmax(moves[moved] > (1.0 - _ROUNDING) * moves[moved].max()))]
+            first = [k for k in moved if k < len(positions)] or moved
+            row = first[int(np.argmax(moves[first] > (1.0 - _ROUNDING) * moves[first].max()))]
             tried.add(row)
             left = slopes[row] - (slopes[row] @ np.linalg.pinv(rows)) @ rows
-            if np.linalg.norm(left) > _ROUNDING * np.linalg.norm(slopes[row]):
-                rows = np.vstack([rows, slopes[row]])
+            if np.linalg.norm(left) <= _ROUNDING * lengths[row]:
+                continue  # it follows
+            more = np.vstack([rows, slopes[row]])
+            others = _moves(more, slopes, lengths)
+            # In a planetary set one of two must follow: nothing is won if it is the other one.
+            if np.count_nonzero(others) < np.count_nonzero(moves):
+                rows, moves = more, others
                 kept.append(self.same(candidates[row])[0])
+        return tuple(kept)
 
     def _is_position(self, variable: int) -> bool:
         """Tell whether the second derivative of a variable is one of the unknowns."""
@@ -155,3 +157,10 @@ class Keeping:
         starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in flat.discretes]
         d = np.array([*starts, *[0.0] * (flat.d.numel() - len(starts))])
         return [time, x, z, given * p + 1e-3 * (p - 1.0), u, d]
+
+
+def _moves(rows: Vector, slopes: Vector, lengths: Vector) -> Vector:
+    """Return how much variables go along with the first row, over their slopes, while the other rows stay."""
+    change = np.linalg.pinv(rows)[:, 0]
+    moves = np.abs(slopes @ change) / lengths
+    return np.where(moves > _ROUNDING * np.linalg.norm(change), moves, 0.0)

@@ -13,12 +13,34 @@ void move_states(Instance *c, const int *nodes, const double *values, int count)
     for (int k = 0; k < c->model->n_x; k++) c->x[k] += step[k];
 }
 
+/* What is to keep its value need not where it follows from new values: of a planetary set two are enough. Returns how
+ * many variables are left. */
+static int drop_dependent(Instance *c, int count) {
+    int n = c->model->n_x, n_rows = 0, left = 0;
+    for (int k = 0; k < count; k++) {
+        double *row = c->square + (size_t)n_rows * (size_t)n, size;
+        slope_of_node(c, c->targets[k], k > 0, row);
+        size = dot(n, row, row);
+        for (const double *other = c->square; other < row; other += n) {
+            double part = dot(n, row, other) / dot(n, other, other);
+            for (int j = 0; j < n; j++) row[j] -= part * other[j];
+        }
+        int follows = !(dot(n, row, row) > REACHED * REACHED * size);
+        n_rows += !follows;
+        if (follows && c->keeps[k]) continue;
+        c->targets[left] = c->targets[k];
+        c->target_values[left++] = c->target_values[k];
+    }
+    return left;
+}
+
 /* Gives variables their new values. An error if something else determines one of them: others, or what is given. */
 Result move_targets(Instance *c, int count) {
     const Model *m = c->model;
     double *missing = c->target_missing;
     if (count < 0) return fail(c, TWO_NEW_VALUES, c->state.t, -1 - count);
     if (count == 0) return RESULT_OK;
+    count = drop_dependent(c, count);
     variables_now(c);
     for (int k = 0; k < count; k++) missing[k] = c->target_values[k] - c->variables[c->targets[k]];
     move_states(c, c->targets, c->target_values, count);
@@ -44,6 +66,7 @@ static int take_value(Instance *c, const Reset *one, double value, double *d, in
         for (int k = 0; k < *count && one->factor == 0; k++)
             if (c->targets[k] == target) return 0;
         c->targets[*count] = target;
+        c->keeps[*count] = one->factor == 0;
         c->target_values[(*count)++] = one->factor == 0 ? value : value / one->factor;
         return 1;
     }

@@ -116,8 +116,8 @@ typedef struct {
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
-        A(tuned, m->n_p), A(entered, holds), A(jolted, holds), A(renewed, m->n_x), A(positive, guards),             \
-        A(idle, m->n_transitions), A(ticking, m->n_transitions), A(felt, n_d)
+        A(tuned, m->n_p), A(entered, holds), A(jolted, holds), A(renewed, m->n_x), A(keeps, resets),                \
+        A(positive, guards), A(idle, m->n_transitions), A(ticking, m->n_transitions), A(felt, n_d)
 
 typedef struct Gradient Gradient; /* see gradient.c */
 

@@ -85,3 +85,9 @@ CASES = {
 def test_values_that_contradict_are_refused(case, solver, check_message):
     kind, drive, message = CASES[case]
     check_message(kind, lambda: simulate(drive, 0.4, solver=solver), message)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_values_that_agree_are_taken(solver):
+    run = simulate(Geared(w_A=6.0), 0.4, solver=solver)
+    assert [run[name][-1] for name in ("A.w", "B.w")] == pytest.approx([6.0, 3.0], rel=1e-12)

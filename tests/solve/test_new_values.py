@@ -13,7 +13,7 @@ from components import (
     ConstantTorque,
     Damper,
     Freewheel,
-    IdealGear,
+    IdealPlanetary,
     Inertia,
     InitializeFlange,
     Mass,
@@ -344,22 +344,46 @@ def test_an_fmu_slides_too(tmp_path: Path) -> None:
         assert run["m.s"][-1] == pytest.approx(1.34, abs=1e-5)
 
 
-class Geared(Component):
-    A = Inertia(J=1.0, phi=0.0, w=1.0)
-    s = IdealGear(ratio=2.0)
-    B = Inertia(J=1.0)
+class Planets(Component):
+    """Three bodies of a planetary set, of which two move freely."""
+
+    gear = IdealPlanetary(ratio=2.0)
+    S = Inertia(J=1.0, phi=0.0, w=1.0)
+    C = Inertia(J=1.0, phi=0.0, w=2.0)
+    R = Inertia(J=1.0)
     tr: Parameter = param("s", default=0.2)
-    w_A: Parameter = param("rad/s", default=3.0)
-    w_B: Parameter = param("rad/s", default=3.0)
+    a: Parameter = param("rad/s", default=5.0)
+    b: Parameter = param("rad/s", default=-1.0)
 
     def equations(self) -> Equations:
-        yield from series(self.A, self.s, self.B)
+        yield connect(self.gear.sun, self.S.flange_a)
+        yield connect(self.gear.carrier, self.C.flange_a)
+        yield connect(self.gear.ring, self.R.flange_a)
+
+
+class SunAndCarrier(Planets):
+    def events(self) -> Events:
+        yield when(self.time > self.tr, {self.S.w: self.a, self.C.w: self.b})
+
+
+class SunAndRing(Planets):
+    """Two conditions that come true together: none of them knows that the other one moves the ring."""
 
     def events(self) -> Events:
-        yield when(self.time > self.tr, {self.A.w: self.w_A, self.B.w: self.w_B})
+        yield when(self.time > self.tr, {self.S.w: self.a})
+        yield when(self.time > self.tr, {self.R.w: self.b})
 
 
 @SOLVERS
-def test_values_that_agree_are_taken(solver: str) -> None:
-    run = simulate(Geared(w_A=6.0), 0.4, solver=solver)
-    assert [run[name][-1] for name in ("A.w", "B.w")] == pytest.approx([6.0, 3.0], rel=1e-12)
+def test_the_third_body_of_a_planetary_set_follows(solver: str) -> None:
+    """By Willis' equation: w_S = 3 w_C - 2 w_R."""
+    for drive, third, value in ((SunAndCarrier(), "R.w", -4.0), (SunAndRing(), "C.w", 1.0)):
+        run = simulate(drive, 0.3, solver=solver)
+        assert (run["S.w"][-1], run[third][-1]) == pytest.approx((5.0, value), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("drive", "third", "slopes"), [(SunAndCarrier(), "R.w", [-1 / 2, 3 / 2]), (SunAndRing(), "C.w", [1 / 3, 2 / 3])]
+)
+def test_derivatives_of_the_third_body(drive: Component, third: str, slopes: list[float]) -> None:
+    assert sensitivities(drive, third, ["a", "b"], until=0.3).derivatives[0] == pytest.approx(slopes, rel=1e-9)

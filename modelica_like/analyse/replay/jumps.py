@@ -337,8 +337,13 @@ class Work:
         for reset, value, slope in sorted(resets, key=lambda one: one[0].factor == 0):
             scale = reset.factor or 1.0
             new.setdefault(model.events.reset_nodes[reset.target], (value / scale, slope / scale))
-        nodes = [*new]
         solve_implicit(model, self.point)
+        named = {model.events.reset_nodes[reset.target] for reset, *_ in resets if reset.factor}
+        rows = slopes(model, self.point, "variables", [*new]).x
+        for k in range(len(new) - 1, -1, -1):  # what is to keep its value need not where it follows
+            if [*new][k] not in named and np.linalg.matrix_rank(rows[: k + 1]) == np.linalg.matrix_rank(rows[:k]):
+                del new[[*new][k]]
+        nodes = [*new]
         present, slope = self._total("variables", nodes)
         back = np.linalg.pinv(slopes(model, self.point, "variables", nodes).x)
         missing = np.array([value for value, _ in new.values()]) - present
