@@ -185,25 +185,8 @@ def _contents(
     tables: Tables, variables: Sequence[FmuVariable], tolerance: float, fixed_step: float, text: _Text
 ) -> dict[str, Any]:
     model, start, sizes = tables.model, tables.start, tables.slots.sizes
-    flags = (int(start.steady is not None), int(tables.rates_depend_on_time), int(tables.implicit_linear))
     contents: dict[str, Any] = {
-        "settings": [
-            (
-                sizes["d"],
-                sizes["y"],
-                *flags,
-                model.discrete_position.get(TERMINAL, -1),
-                model.held.ideal.rows.first if model.held.ideal else 0,
-                model.edges.count,
-                model.edges.slopes,
-                model.edges.kinks,
-                int(model.settings.get("on_chattering") == "rest"),
-                model.discrete_position.get(HOMOTOPY, -1),
-                ABSOLUTE_TO_RELATIVE,
-                tolerance,
-                fixed_step,
-            )
-        ],
+        "settings": [_settings(tables, tolerance, fixed_step)],
         "constants": tables.slots.constants,
         "parameters": model.p,
         "parameter_min": [-math.inf if parameter.min is None else parameter.min for parameter in model.flat_parameters],
@@ -232,6 +215,27 @@ def _contents(
     for tape in tables.tapes.values():
         contents |= _tape(tape)
     return contents
+
+
+def _settings(tables: Tables, tolerance: float, fixed_step: float) -> tuple[float, ...]:
+    model, sizes = tables.model, tables.slots.sizes
+    return (
+        sizes["d"],
+        sizes["y"],
+        int(tables.start.steady is not None),
+        int(tables.rates_depend_on_time),
+        int(tables.implicit_linear),
+        model.discrete_position.get(TERMINAL, -1),
+        model.held.ideal.rows.first if model.held.ideal else 0,
+        model.edges.count,
+        model.edges.slopes,
+        model.edges.kinks,
+        int(model.settings.get("on_chattering") == "rest"),
+        model.discrete_position.get(HOMOTOPY, -1),
+        ABSOLUTE_TO_RELATIVE,
+        tolerance,
+        fixed_step,
+    )
 
 
 def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:

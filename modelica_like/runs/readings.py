@@ -6,21 +6,18 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import accumulate
 from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.language.formula import Formula
+from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import ONE, Unit, parse_unit, to_si
+from modelica_like.runs.calls import call_of, formula_beside
 from modelica_like.runs.signals import formula_of, si_value, unit_of
 from modelica_like.solve.recorder import Event
 
-_CALL = re.compile(r"\s*(max|min|peak|integral|mean|rms|at|first|duration|series|time)\s*\((.*)\)\s*$")
-_INSIDE = re.compile(r"\b(max|min|peak|integral|mean|rms|at|first|duration|series|time)\s*\(")
 _CONDITION = re.compile(r"(.+?)(<=?|>=?)(.+)")
 _CHANGE = re.compile(
     r"\s*(?P<mode>[^:\s]+)\s*(?::\s*(?P<before>\w+)\s*)?(?:→|->)\s*(?P<after>\w+)\s*(?:,\s*(?P<number>-?\d+))?\s*$"
@@ -207,12 +204,10 @@ def read_output(model: CompiledDae, name: str) -> Output:
     Raises:
         UnknownName: the model has no such output.
     """
-    called = _CALL.match(name)
-    if called is None or not _is_closed(called.group(2)):
+    called = call_of(name)
+    if called is None:
         return _plain(model, name.strip())
-    kind, inside = called.group(1), called.group(2).strip()
-    if kind in ("max", "min") and _is_formula(name):
-        return _plain(model, name.strip())
+    kind, inside = called
     if kind == "time":
         return _mode_change(model, name, inside)
     if kind == "duration":
@@ -226,20 +221,6 @@ def read_output(model: CompiledDae, name: str) -> Output:
     if kind == "integral":
         unit = _JOULE if str(unit) == "W" else unit * _SECOND
     return Output(name, unit, kind, path.strip(), to_si(moment.strip(), _SECOND, name) if kind == "at" else 0.0)
-
-
-def _is_closed(text: str) -> bool:
-    """Whether no bracket is closed that was not opened: `a)*max(b` is no argument."""
-    depths = accumulate((char == "(") - (char == ")") for char in text)
-    return all(depth >= 0 for depth in depths)
-
-
-def _is_formula(name: str) -> bool:
-    """Whether this is `max` or `min` of two values at one time."""
-    try:
-        return formula_of(name) is not None
-    except NetlistError:
-        return False
 
 
 def met(kind: str, value: Any) -> Any:
@@ -266,31 +247,13 @@ def _plain(model: CompiledDae, name: str) -> Output:
     whole = _of_whole_run(model, name)
     if whole is not None:
         return whole
-    formula = None if _is_variable(model, name) else _formula(name)
+    formula = None if _is_variable(model, name) else formula_beside(name)
     names = [] if formula is None else list(dict.fromkeys(formula.names()))
     if formula is None or not any(_of_whole_run(model, path) for path in names):
         return Output(name, expression_of(model, name)[1], "end", name)
     operands = tuple(_plain(model, path) for path in names)
     unit = unit_of(formula, {operand.name: str(operand.unit) for operand in operands}, model.name)
     return Output(name, parse_unit(unit), "formula", name, operands=operands)
-
-
-def _formula(name: str) -> Formula | None:
-    """Return a formula, None for a plain name.
-
-    Raises:
-        NetlistError, UnknownName: it is none, or calculates with readings.
-    """
-    try:
-        return formula_of(name)
-    except NetlistError as error:
-        if _INSIDE.search(name) is None:
-            raise
-        raise UnknownName(
-            f"'{name}' calculates with readings of a run, which formulas cannot.",
-            advice="Ask for each reading and calculate with the numbers; a formula may stand inside: "
-            "max(a.tau + b.tau).",
-        ) from error
 
 
 def _is_variable(model: CompiledDae, name: str) -> bool:

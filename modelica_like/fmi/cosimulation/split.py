@@ -93,8 +93,7 @@ def split(
     settings = _settings(inside(assembly).simulate.get("until"), step, master)
     maker = Maker(assembly, cut)
     tell("choosing the causality")
-    chosen = orient(maker)
-    values = _start_values(assembly)
+    chosen, values = orient(maker), _start_values(assembly)
     target.mkdir(parents=True, exist_ok=True)
     units, notes = list[Unit](), list[str]()
     for k, title in enumerate(titles):
