@@ -29,6 +29,7 @@ from components import (
 )
 from modelica_like import Options, build, export_fmu, run_fmu, sensitivities, simulate
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, connect, free, param, series, when
+from modelica_like.runs.solution import Solution
 
 SOLVERS = pytest.mark.parametrize("solver", ["idas", "native"])
 PRECISE = {"rtol": 1e-9, "atol": 1e-12}
@@ -150,12 +151,10 @@ class Cranked(Component):
         yield when(self.time > self.tr, {self.ram.v: self.v1})
 
 
-def sides(run: object, name: str, time: float = 0.2) -> tuple[float, float]:
+def sides(run: Solution, name: str, time: float = 0.2) -> tuple[float, float]:
     """Values before and behind an event."""
-    values = run[name][np.flatnonzero(np.diff(run.time) == 0)]  # type: ignore[index, attr-defined]
-    k = int(np.flatnonzero((np.diff(run.time) == 0) & (np.abs(run.time[:-1] - time) < 1e-9))[-1])  # type: ignore[attr-defined]
-    assert values.size
-    return float(run[name][k]), float(run[name][k + 1])  # type: ignore[index]
+    (k, *_) = np.flatnonzero((np.diff(run.time) == 0) & (np.abs(run.time[:-1] - time) < 1e-9))[::-1]
+    return float(run[name][k]), float(run[name][k + 1])
 
 
 @SOLVERS
