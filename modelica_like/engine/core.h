@@ -165,6 +165,7 @@ void take_looks(Instance *c, Looks *looks);
 #define MOST_LOOKS 11 /* at guards, that there is room for */
 double cubic_guess(double g0, double r0, double g1, double r1);
 int search_events(Instance *c);
+double soonest_zero(Instance *c);
 const double *rounding_of_guards(Instance *c, const Piece *piece, double t);
 /* edges.c */
 double seen_length(Instance *c, double least, double *most);

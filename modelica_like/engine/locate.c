@@ -283,6 +283,18 @@ static Found look_into(Instance *c, const Look *before, const Look *after, int d
     return deeper ? look_into(c, &middle, after, depth - 1) : check_between(c, &middle, after);
 }
 
+/* How long it takes until a guard is zero, by its value and rate at the present point. */
+double soonest_zero(Instance *c) {
+    double soon = INFINITY, *point = c->vector + c->model->n_z;
+    Look now = room_for_look(c, DEPTH + 2);
+    memcpy(point, c->x, (size_t)c->model->n_unknowns * sizeof(double));
+    if (c->model->n_guards == 0 || !look_at(c, c->state.t, point, 0, &now)) return soon;
+    for (int g = 0; g < c->model->n_guards; g++)
+        if (guard_active(c, g) && now.values[g] < 0 && now.rates[g] > 0)
+            soon = fmin(soon, -now.values[g] / now.rates[g]);
+    return soon;
+}
+
 /* Looks for events in an accepted step; shortens it to the first. Returns 0 if the step must be shorter. */
 int search_events(Instance *c) {
     Look before = room_for_look(c, 0), after = room_for_look(c, 1);

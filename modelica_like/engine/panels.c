@@ -86,7 +86,7 @@ void take_looks(Instance *c, Looks *looks) {
     size_t n = (size_t)m->n_unknowns, n_x = (size_t)m->n_x, n_z = n - n_x, row = n * sizeof(double);
     double *rows = memcpy(c->stages, c->x, row), *knot = memcpy(looks->knots, rows, row), begin = 0;
     double resolution = TIME_RESOLUTION * fmax(1, fabs(c->state.t));
-    c->panel = (Panel){c->state.t, c->panel.longest, 0, 0, looks->ends, looks->knots};
+    c->panel = (Panel){c->state.t, c->panel.longest, c->panel.soon, 0, 0, looks->ends, looks->knots};
     for (looks->precise = 0; (looks->precise + 1) * LOOKS <= looks->results; looks->precise++) {
         size_t first = (size_t)looks->precise * LOOKS;
         for (size_t k = 0; k < LOOKS; k++) {
@@ -152,6 +152,7 @@ static double judge_panel(Instance *c) {
 static int new_panel(Instance *c, double far) {
     Panel *panel = &c->panel;
     panel->longest = INFINITY;
+    panel->soon = soonest_zero(c);
     for (int n = 0; n < MOST_PANELS; n++) {
         double longest = panel->longest;
         if (!c->integrator(far, panel)) return 0;

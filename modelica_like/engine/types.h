@@ -45,8 +45,8 @@ typedef struct {
 } Terms; /* of a motion that modes hold */
 
 typedef struct { /* of another integrator: where its pieces end, and five knots of each, shared with the next one */
-    double begin, longest;  /* longest: what pieces may have, as waves ask for */
-    int64_t pieces, number; /* number: of the present one */
+    double begin, longest, soon; /* longest: what pieces may have, as waves ask for; soon: until a guard may be zero */
+    int64_t pieces, number;      /* number: of the present one */
     const double *ends, *knots;
 } Panel;
 

@@ -58,7 +58,7 @@ class Panel(c.Structure):
     """`Panel` in types.h."""
 
     _fields_ = [
-        *((name, _NUMBER) for name in ("begin", "longest")),
+        *((name, _NUMBER) for name in ("begin", "longest", "soon")),
         *((name, _COUNT) for name in ("pieces", "number")),
         *((name, _POINTER) for name in ("ends", "knots")),
     ]

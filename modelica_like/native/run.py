@@ -70,7 +70,7 @@ class _ByIdas:
         try:
             if self._progress is not None:
                 self._progress(now.t)
-            self.panels.go_on(now, limit, place.contents.longest)
+            self.panels.go_on(now, limit, place.contents.longest, place.contents.soon)
         except BaseException as error:  # noqa: BLE001 - also an interrupt: ctypes would lose it
             self.error = error
             return 0

@@ -43,13 +43,20 @@ _MOST = 0.2
 _LONGER, _ROOM = 4.0, 1.5
 """Growth of panels without events, unless a rough piece has cut them: what comes behind one is lost; length of a panel
 over that of the last segment with its modes."""
+_BEHIND, _DOUBTED = 1.2, 2.0
+"""Length of a panel over the time until a guard is zero if its rate stays: behind it, equations of old modes may take
+ten times as many steps; and its growth where there was no event: what swings may turn before zero."""
+_WIDEST = 10
+"""Length of a graded panel over that of the widest piece its segment asks for, which the last one has."""
 _SHORTEST = 100
 """Of a panel, in time resolutions."""
 _FIRST_STEPS = {True: 1e-5, False: 1e-6}
 """Of a panel, in its length: of one that is a whole run, and of those that begin at events, about as long as their
 segments."""
-_FIRST = 256, 16
-"""Pieces and panels of a run, as far as one knows at its begin."""
+_FIRST = {True: 64, False: 256}
+"""Pieces of a run, as far as one knows at its begin: of one with guards, and of one that is a single panel."""
+_PANELS = 16
+"""Panels of a run with guards, likewise."""
 _MAX_FAILURES, _FEW_FAILURES = 40, 6
 _SAME = 1e-3
 """Distance of two places at which IDAS gave up, relative to the panel, below which they are one."""
@@ -76,10 +83,11 @@ class Looks:
 
 @dataclass
 class _Segment:
-    """Begin of a segment in s, how short its first pieces should have been, and how long it lasted, both in s."""
+    """Begin of a segment, how short its first pieces should have been and how long others, and its length, all in s."""
 
     begin: float
     finest: float
+    widest: float = 0.0
     lasted: float = np.inf
 
 
@@ -113,13 +121,13 @@ class Panels:
         most = max(_LARGEST // (LOOKS * (len(model.states) + len(model.implicit))), 1)
         self._grids = [grid for grid in _EVEN if grid.pieces <= most]
         self.most = self._grids[-1].pieces
-        self._length, self._span = ((end - begin) / count for count in _FIRST)
-        if not self._guarded:
-            self._span = np.inf
+        self._length = (end - begin) / _FIRST[self._guarded]
+        self._span = (end - begin) / _PANELS if self._guarded else np.inf
         self._switched = sorted({t.mode for t in model.events.transitions if self.felt[t.mode]})
         self._known: dict[bytes, _Segment] = {}
         self._modes, self._segment = b"", _Segment(begin, self._length)
-        self._graded = self._cut = self._begins = False
+        self._graded = self._cut = self._begins = self._foreseen = False
+        self._behind = _BEHIND
         self._begin, self._ends = begin, np.zeros(0)
         self._failures, self._failed_before, self._gave_up_at = 0, begin, -np.inf
 
@@ -128,8 +136,14 @@ class Panels:
         """Marks of the entries of d that equations of motion read: events that change no other end no panel."""
         return self.model.once(Cached.FELT, lambda: _felt(self.model))
 
-    def go_on(self, now: Point, limit: float, longest: float = np.inf) -> None:
+    def go_on(self, now: Point, limit: float, longest: float, soon: float) -> None:
         """Integrate from a consistent point up to a time at most, in pieces that are not longer than asked for.
+
+        Args:
+            now: the point.
+            limit: the time in s.
+            longest: length of pieces in s.
+            soon: how long it takes until there may be an event, in s.
 
         Raises:
             StepFailed: IDAS gave up.
@@ -138,7 +152,7 @@ class Panels:
         if longest < np.inf:
             self._length, self._graded = min(self._length, longest), False
         while True:
-            span, grid = self._plan(limit - now.t, _SHORTEST * time_resolution(now.t), begins=begins)
+            span, grid = self._plan(limit - now.t, _SHORTEST * time_resolution(now.t), soon, begins=begins)
             if pieces := self._integrate(now, span, grid):
                 self._begin, self._ends = now.t, self.looks.ends[:pieces]
                 if span == limit - now.t and not self._cut:
@@ -146,12 +160,13 @@ class Panels:
                 return
             begins = True
 
-    def _plan(self, left: float, least: float, *, begins: bool) -> tuple[float, Grid]:
+    def _plan(self, left: float, least: float, soon: float, *, begins: bool) -> tuple[float, Grid]:
         """Return length in s and grid of a panel; of time there is so much left, and a panel has so much at least."""
         self._span = max(self._span, least)
+        self._foreseen = not begins and self._behind * soon < self._span
         if begins and self._graded and _GRADED.pieces <= self._grids[-1].pieces:
             return (left if 1.1 * self._span >= left else self._span), _GRADED
-        span = self._span if begins else max(self._span, _WORTH * self._length)
+        span = self._span if begins else max(min(self._span, self._behind * soon), _WORTH * self._length)
         span = min(left if 1.1 * span >= left else span, self._grids[-1].pieces * self._length)
         return span, next(grid for grid in self._grids if grid.pieces * self._length >= span)
 
@@ -198,26 +213,29 @@ class Panels:
             wishes = self.looks.wishes[: min(int(np.searchsorted(ends, now.t)) + 1, len(ends))]
             recent = np.sort(wishes[len(wishes) // 2 :])
             self._length = float(recent[int(_MOST * (len(recent) - 1))])
+            segment.widest = max(segment.widest, float(wishes.max()))
             if self._begin == segment.begin:
                 telling = wishes[self.looks.errors[: len(wishes)] > _TELLING]
                 segment.finest = float(telling.min(initial=ends[len(wishes[:-1])] - self._begin))
             passed = float(ends[-1] - self._begin)
             self._span = passed if self._cut else _LONGER * max(self._span, passed)
+            self._behind *= _DOUBTED if self._foreseen and not self._cut else 1.0
         self._begins = not len(ends) or now.t < ends[-1] - time_resolution(now.t) or modes != self._modes
         if self._begins:
             if now.t > segment.begin:
                 segment.lasted = now.t - segment.begin
                 self._known[self._modes] = segment
                 self._begin_like(self._known.get(modes, segment))
+            self._behind = _BEHIND
             self._segment = _Segment(now.t, self._length)
         self._modes = modes
         return self._begins
 
     def _begin_like(self, last: _Segment) -> None:
-        self._length = last.finest
-        self._graded = last.lasted > _SMOOTH * last.finest
+        self._length, most = last.finest, _WIDEST * last.widest
+        self._graded = min(last.lasted, most) > _SMOOTH * last.finest
         if self._guarded:
-            self._span = _ROOM * last.lasted
+            self._span = min(_ROOM * last.lasted, most) if self._graded else _ROOM * last.lasted
 
     def _gave_up(self, t: float, span: float) -> None:
         """Count failures on the way to one place: shorter panels start closer to it, an event may be before it.
