@@ -264,7 +264,12 @@ class Powers:
             self._left -= count
             if self._left < 0 or not np.isfinite(start.x).all():
                 return None
-            x, z = self._dense.at(times[1:])
+            # Its end is known: a time that is rounded up would be read behind the event there.
+            x, z = (
+                np.column_stack((inner, ends[:, end]))
+                for inner, ends in zip(self._dense.at(times[1:-1]), (every.x, every.z), strict=True)
+            )
+        times[-1] = every.times[end]
         states, implicit = (np.column_stack(pair) for pair in ((start.x, x), (start.z, z)))
         return Segment(times, states, implicit, start.d)
 

@@ -120,15 +120,25 @@ def test_four_or_more_finer_results_for_each_interval(intervals: int, count: int
     assert found.d.tolist() == [90.0]
 
 
-def test_finer_results_are_those_of_the_run_where_it_has_kept_them() -> None:
-    every = piece([3.0, 4.0, 6.0, 10.0])
-    dense = SimpleNamespace(at=lambda times: (np.stack([times, 2.0 * times]), -times[None]))
-    found = bare(_dense=dense)._finer(every, 1, 3, 2)
+@pytest.mark.parametrize("end", [10.0, *np.random.default_rng(4).uniform(6.0, 10.0, 40)])
+def test_finer_results_are_those_of_the_run_where_it_has_kept_them(end: float) -> None:
+    """Both ends are the results: an event may stand there, behind which rounded times are."""
+    every = piece([3.0, 4.0, 5.9, end])
+
+    def at(times: Any) -> tuple[Any, Any]:
+        assert times[-1] < end
+        return np.stack([times, 2.0 * times]), -times[None]
+
+    found = bare(_dense=SimpleNamespace(at=at))._finer(every, 1, 3, 2)
     assert found is not None
-    times = np.linspace(4.0, 10.0, 17)
-    np.testing.assert_allclose(found.x[:, 1:], [times[1:], 2.0 * times[1:]], rtol=1e-15)
-    assert (found.x[:, 0].tolist(), found.z[0, :2].tolist()) == ([11.0, 15.0], [51.0, -times[1]])
-    assert bare(_dense=dense, _left=15)._finer(every, 1, 3, 2) is None
+    times = np.linspace(4.0, end, 17)
+    assert (found.times[0], found.times[-1]) == (4.0, end)
+    np.testing.assert_allclose(found.x[:, 1:-1], np.stack([times, 2.0 * times])[:, 1:-1], rtol=1e-15)
+    np.testing.assert_allclose(found.z[0, 1:-1], -times[1:-1], rtol=1e-15)
+    for here, there in ((0, 1), (-1, 3)):
+        assert found.x[:, here].tolist() == every.x[:, there].tolist()
+        assert found.z[:, here].tolist() == every.z[:, there].tolist()
+    assert bare(_dense=SimpleNamespace(at=at), _left=15)._finer(every, 1, 3, 2) is None
 
 
 @pytest.mark.parametrize(("bad", "calls"), [([], 2), ([5], 8), ([5, 6], 10), (list(range(12)), 20)])
