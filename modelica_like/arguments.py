@@ -108,6 +108,8 @@ def _word(kind: Any) -> tuple[str, str]:
 
 def fits(value: Any, kind: Any) -> bool:
     """Return whether a value is of a kind: a type, or one of the annotations of public functions."""
+    if type(value) is kind:
+        return True
     if len(choices := _choices(kind)) > 1:
         return any(fits(value, choice) for choice in choices)
     if isinstance(kind, str):

@@ -97,7 +97,7 @@ class CompiledDae:
         """Functions of the groups by their names, such as `start_values`."""
         return functions_of(self.equations, self.events, self.held, self.starts)
 
-    @property
+    @cached_property
     def discrete_size(self) -> int:
         """Length of d: modes and discrete values, then what follows them, see `structure.discretes`."""
         return self.equations.ode.size1_in("d")

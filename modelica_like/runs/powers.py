@@ -18,7 +18,7 @@ from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.options import SMALLEST_ATOL, Options
-from modelica_like.runs.quadrature import Places, rules
+from modelica_like.runs.quadrature import Places, composite, rules
 from modelica_like.solve.dense import Dense
 from modelica_like.solve.idas import Grid, Integrator
 from modelica_like.solve.initialize import Point
@@ -155,11 +155,14 @@ def drifts_of_results(model: CompiledDae, segments: Sequence[Segment]) -> tuple[
     total, moved = np.zeros(len(model.components)), _NOTHING
     for some in results(model, segments, stored=True):
         steps, (stored, rates) = some.times[1:] - some.times[:-1], some.terms
-        kept, (_, places, weights) = _laid(some, steps)
+        kept, weights = _apart(some, steps), np.zeros(len(some.times))
+        weights[kept] = composite(
+            some.times[kept], *(kept.searchsorted(ends[kept]) for ends in (some.first, some.last))
+        )
         moved = max(moved, *_moving(stored, rates, steps))
         numbers = np.arange(len(some.times))
         total += stored[:, numbers == some.last].sum(axis=1) - stored[:, numbers == some.first].sum(axis=1)
-        total -= _summed(rates, kept[places], weights[:, 0])
+        total -= rates @ weights
     return total, moved
 
 

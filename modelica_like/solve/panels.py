@@ -46,6 +46,9 @@ over that of the last segment with its modes."""
 _BEHIND, _DOUBTED = 1.2, 2.0
 """Length of a panel over the time until a guard is zero if its rate stays: behind it, equations of old modes may take
 ten times as many steps; and its growth where there was no event: what swings may turn before zero."""
+_BEFORE, _FAR = 0.8, 50
+"""The same length where that time is as long as so many pieces: another start of IDAS costs less than steps behind the
+event, and the rate is known better nearer to it."""
 _WIDEST = 10
 """Length of a graded panel over that of the widest piece its segment asks for, which the last one has."""
 _SHORTEST = 100
@@ -55,7 +58,7 @@ _FIRST_STEPS = {True: 1e-5, False: 1e-6}
 segments."""
 _FIRST = {True: 64, False: 256}
 """Pieces of a run, as far as one knows at its begin: of one with guards, and of one that is a single panel."""
-_PANELS = 16
+_PANELS = 4
 """Panels of a run with guards, likewise."""
 _MAX_FAILURES, _FEW_FAILURES = 40, 6
 _SAME = 1e-3
@@ -127,7 +130,7 @@ class Panels:
         self._known: dict[bytes, _Segment] = {}
         self._modes, self._segment = b"", _Segment(begin, self._length)
         self._graded = self._cut = self._begins = self._foreseen = False
-        self._behind = _BEHIND
+        self._behind, self._zero = _BEHIND, np.inf
         self._begin, self._ends = begin, np.zeros(0)
         self._failures, self._failed_before, self._gave_up_at = 0, begin, -np.inf
 
@@ -149,6 +152,7 @@ class Panels:
             StepFailed: IDAS gave up.
         """
         begins = self._learn(now)
+        self._zero = now.t + soon
         if longest < np.inf:
             self._length, self._graded = min(self._length, longest), False
         while True:
@@ -166,7 +170,8 @@ class Panels:
         self._foreseen = not begins and self._behind * soon < self._span
         if begins and self._graded and _GRADED.pieces <= self._grids[-1].pieces:
             return (left if 1.1 * self._span >= left else self._span), _GRADED
-        span = self._span if begins else max(min(self._span, self._behind * soon), _WORTH * self._length)
+        ahead = _BEFORE * soon if soon > _FAR * self._length else self._behind * soon
+        span = self._span if begins else max(min(self._span, ahead), _WORTH * self._length)
         span = min(left if 1.1 * span >= left else span, self._grids[-1].pieces * self._length)
         return span, next(grid for grid in self._grids if grid.pieces * self._length >= span)
 
@@ -219,7 +224,7 @@ class Panels:
                 segment.finest = float(telling.min(initial=ends[len(wishes[:-1])] - self._begin))
             passed = float(ends[-1] - self._begin)
             self._span = passed if self._cut else _LONGER * max(self._span, passed)
-            self._behind *= _DOUBTED if self._foreseen and not self._cut else 1.0
+            self._behind *= _DOUBTED if self._foreseen and not self._cut and ends[-1] > self._zero else 1.0
         self._begins = not len(ends) or now.t < ends[-1] - time_resolution(now.t) or modes != self._modes
         if self._begins:
             if now.t > segment.begin:

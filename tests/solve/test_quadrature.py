@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from modelica_like.runs.powers import Results, _apart, _mixed, _ratio, _stretches, results
-from modelica_like.runs.quadrature import rules
+from modelica_like.runs.quadrature import composite, rules
 from modelica_like.solve.recorder import Segment
 
 RANDOM = np.random.default_rng(3)
@@ -48,6 +48,20 @@ def test_each_rule_integrates_polynomials_of_its_order(kind: str, sizes: list[in
                 assert row @ at**degree == pytest.approx(step / (degree + 1), rel=1e-9)
             if used < 8 and (kind != "longer" or used % 2):
                 assert row @ at**used != pytest.approx(step / (used + 1), rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["even", "uneven", "longer"])
+@pytest.mark.parametrize("sizes", [[1], [2], [3, 5], [8], [1, 9, 4], [12, 40]])
+def test_the_composite_rule_integrates_polynomials_over_all_pieces(kind: str, sizes: list[int]) -> None:
+    """Of the order of the widest rule of each piece."""
+    begins, pieces = np.cumsum([0, *sizes]), [spaced(kind, size) for size in sizes]
+    first, last = np.repeat(begins[:-1], sizes), np.repeat(begins[1:] - 1, sizes)
+    weights = composite(np.concatenate(pieces), first, last)
+    for begin, piece in zip(begins, pieces, strict=False):
+        those, span = weights[begin : begin + len(piece)], piece[-1]
+        for degree in range(min(len(piece), 8) if span else 0):
+            assert those @ piece**degree == pytest.approx(span ** (degree + 1) / (degree + 1), rel=1e-9)
+    assert not weights[begins[:-1][np.array(sizes) == 1]].any()
 
 
 def test_intervals_without_length_have_no_rule() -> None:
