@@ -216,7 +216,7 @@ DIODE = Icon(40, 22, lines="M-20 0 h12 M8 0 h12", solid="M-8 -9 L8 0 L-8 9 Z", h
 THYRISTOR = Icon(40, 26, lines="M-20 0 h12 M8 0 h12 M8 0 L14 -12", solid="M-8 -9 L8 0 L-8 9 Z", heavy="M8 -10 v20",
                  ports={"fire": "N"})  # fmt: skip
 CONTACTOR = Icon(
-    52, 44, paper=_rect(14, 8, 0, -11), lines="M-26 12 h14 L8 2 M12 12 h14 M-2 6 v-8",
+    52, 44, paper=_rect(14, 8, 0, -11), lines="M-26 12 h14 L8 2 M12 12 h14 M-2 6 v-8 M-26 -11 h12 M14 -11 h12",
     solid=f"{_circle(-12, 12, 2.5)} {_circle(12, 12, 2.5)}",
     ports={"p": ("W", 12), "n": ("E", 12), "cp": ("W", -11), "cn": ("E", -11)},
 )  # fmt: skip
