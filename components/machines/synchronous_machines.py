@@ -196,6 +196,8 @@ class MappedDrive(OnSupply, Tabulated, Lossy, Machine):
     tau: Variable = var("N.m", "torque on the rotor", default=0.0)
     tau_max: Variable = var("N.m", "largest torque")
     efficiency: Variable = var("1", "efficiency", guess=1.0)
+    speed_range = Mode("kept", "left", description="whether the speed was always within the rows of eta")
+    torque_range = Mode("kept", "left", description="whether the torque was always within the columns of eta")
 
     def equations(self) -> Equations:
         yield from super().equations()
@@ -206,7 +208,10 @@ class MappedDrive(OnSupply, Tabulated, Lossy, Machine):
 
     def events(self) -> Events:
         yield from super().events()
-        yield from self.leaving("limit", absolute(self.w) / self.w_scale, self.limit)
+        speed, torque = absolute(self.w) / self.w_scale, absolute(self.tau) / self.tau_scale
+        yield from self.leaving("limit", speed, self.limit)
+        yield from self.leaving("speeds", speed, [(value,) for value in self.speeds], watch=self.speed_range)
+        yield from self.leaving("torques", torque, [(value,) for value in self.torques], watch=self.torque_range)
 
     def power(self) -> Expr:
         mechanical = self.tau * self.w

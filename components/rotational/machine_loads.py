@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import inf, pi
 
 from components import icons
 from components.clutches.friction import ShaftFriction
@@ -11,6 +11,7 @@ from components.tabulated import Tabulated
 from components.thermal import Lossy
 from modelica_like.language import (
     Equations,
+    Events,
     Expr,
     Input,
     Output,
@@ -168,6 +169,10 @@ class FormingForce(Tabulated, Lossy, LinearOneFlange):
         force = self.f_scale * self.look_up(self.s / self.s_scale, self.table)
         yield self.f == force * tanh(maximum(self.v, 0) / self.v_smooth)
         yield self.flange.f == self.f
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.leaving("table", self.s / self.s_scale, self.table, self.f > 0, least=-inf)
 
     def dissipation(self) -> Expr:
         return self.f * self.v

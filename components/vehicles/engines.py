@@ -53,6 +53,7 @@ class MappedEngine(Tabulated, Rotor, partial=True):
     throttle: Variable = var("1", "pedal that counts, 0 to 1")
     tau_combustion: Variable = var("N.m", "torque of the combustion")
     tau_drag: Variable = var("N.m", "drag against forward rotation")
+    pedal_range = Mode("kept", "left", description="whether the pedal was always within the columns of the map")
 
     def full_torque(self) -> Expr:
         """Return the torque of combustion while there is fuel."""
@@ -69,8 +70,9 @@ class MappedEngine(Tabulated, Rotor, partial=True):
     def events(self) -> Events:
         yield from super().events()
         speed = self.w / self.w_scale
-        yield from self.leaving("drag", speed, self.drag)
+        yield from self.leaving("drag", absolute(speed), self.drag)
         yield from self.leaving("speeds", speed, [(s,) for s in self.speeds])
+        yield from self.leaving("pedals", self.throttle, [(p,) for p in self.pedals], watch=self.pedal_range)
 
     def stored_energy(self) -> Expr:
         return 0.5 * self.J * self.w_rotor**2

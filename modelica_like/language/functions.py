@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Callable, Sequence
+from math import inf
 from typing import Any, cast
 
 import casadi as ca
@@ -228,8 +229,9 @@ BEYOND = ("hold", "linear", "error")
 
 
 def interpolate(
-    x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: bool = False, extrapolate: str = "linear"
-) -> Expr:
+    x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: bool = False, extrapolate: str = "linear",
+    limits: tuple[float, float] = (-inf, inf),
+) -> Expr:  # fmt: skip
     """Interpolate in a table.
 
     Args:
@@ -240,6 +242,7 @@ def interpolate(
             overshoot).
         extrapolate: beyond the ends `hold`: the last value; `linear`: the last slope; `error`: also the last value,
             while an event of the component ends the run.
+        limits: smallest and largest value, which no slope goes on beyond.
 
     Raises:
         LanguageError: lengths differ, `xs` does not increase, or `extrapolate` is unknown.
@@ -263,6 +266,9 @@ def interpolate(
     if slopes is not None and extrapolate == "linear":
         result = ca.if_else(silent(x < xs[0], CONTINUOUS), ys[0] + slopes[0] * (x - xs[0]), result)
         result = ca.if_else(silent(x > xs[-1], CONTINUOUS), ys[-1] + slopes[-1] * (x - xs[-1]), result)
+    if extrapolate == "linear":
+        result = ca.fmax(result, limits[0]) if limits[0] > -inf else result
+        result = ca.fmin(result, limits[1]) if limits[1] < inf else result
     return result
 
 

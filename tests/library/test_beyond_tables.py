@@ -16,6 +16,7 @@ from components import (
     ConstantTorque,
     ConstantVoltage,
     Fixed,
+    FormingForce,
     Ground,
     Inertia,
     LossyGear,
@@ -284,3 +285,60 @@ def test_the_compiled_run_time_ends_there_too() -> None:
     drive = shaft(push=ConstantTorque(tau_constant=2.0), rotor=Inertia(J=1.0, phi=0.0, w=0.0), bearing=bearing)
     with pytest.raises(ModelicaLikeError, match=r"At 5 s bearing leaves the rows of tau_pos\."):
         simulate(drive, 8.0, solver="native")
+
+
+MAP = {"torque": ((0, 50), (0, 100), (0, 150)), "speeds": (0, 100, 200), "pedals": (0, 0.5), "J": 1e9, "phi": 0.0}
+EFFICIENCY = {"limit": ((0, 100), (200, 100)), "speeds": (0, 100), "torques": (0, 20), "eta": ((0.5, 0.7), (0.6, 0.9))}
+
+
+def driven(w: float, torque: float, **more: object) -> Assembly:
+    drive = MappedDrive(Jr=0.0, tau_ref=torque, tau=torque, **EFFICIENCY, **more)
+    parts = {"supply": ConstantVoltage(V=100.0), "ground": Ground(), "part": drive, "held": ConstantSpeed(w_fixed=w)}
+    wires = {"plus": ["supply.p", "part.p_dc"], "minus": ["supply.n", "part.n_dc", "ground.p"]}
+    return Assembly("d", parts=parts, connect=wires | {"shaft": ["part.flange", "held.flange"]})
+
+
+def fired(w: float, pedal: float, **more: object) -> Assembly:
+    return shaft(part=CombustionEngine(w=w, pedal=pedal, **MAP, **more), body=Inertia(J=1.0))
+
+
+EDGES: dict[str, tuple[Callable[..., Assembly], float, float]] = {
+    "speeds": (driven, 150.0, 10.0), "torques": (driven, -50.0, -50.0), "pedals": (fired, 150.0, 1.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize("name", EDGES)
+def test_a_map_is_left_at_each_of_its_edges(name: str, solver: str) -> None:
+    made, w, other = EDGES[name]
+    told = notices(simulate(made(w, other), 0.1, solver=solver))
+    assert told == [f"At 0 s part leaves the rows of {name}: its last value holds."]
+    with pytest.raises(LimitPassed, match=f"At 0 s part leaves the rows of {name}"):
+        simulate(made(w, other, extrapolate="error"), 0.1, solver=solver)
+    assert notices(simulate(made(50.0, 0.4), 0.1, solver=solver)) == []
+
+
+@pytest.mark.parametrize("torque", [50.0, -50.0])
+def test_the_last_slope_makes_no_efficiency_above_one(torque: float) -> None:
+    """At 150 rad/s and 50 N.m the slopes of the map lead to 1.525."""
+    run = simulate(driven(150.0, torque, extrapolate="linear"), 0.1)
+    assert run.final["part.efficiency"] == 1.0
+    assert run.final["part.i_dc"] == pytest.approx(150.0 * torque / 100.0, rel=1e-9)
+
+
+def test_the_last_slope_makes_no_power_from_friction() -> None:
+    """0.3 falls to zero at 150 rad/s: above it the brake does nothing, and below 10·(0.3 - 0.002 w) N.m."""
+    brake = Brake(fn_max=10.0, mu_pos=((0, 0.3), (100, 0.1)), extrapolate="linear")
+    run = simulate(shaft(rotor=Inertia(J=1.0, phi=0.0, w=200.0), brake=brake), 1.0)
+    assert run.final["rotor.w"] == 200.0
+    table = ((0, 0.9, 0.9, 0, 0), (100, 0.5, 0.5, 0, 0))
+    gear = LossyGear(ratio=2.0, loss_table=table, extrapolate="linear")
+    run = simulate(shaft(motor=ConstantSpeed(w_fixed=300.0), gear=gear, load=ConstantTorque(tau_constant=-20.0)), 1.0)
+    assert run.final["gear.flange_a.tau"] == pytest.approx(10.0 / 1e-3, rel=1e-9)  # the smallest efficiency of a cell
+
+
+def test_a_workpiece_beyond_its_table_is_told_while_it_resists() -> None:
+    for last, told in ((0.0, []), (5.0, ["At 0.1 s part leaves the rows of table: its last value holds."])):
+        force = FormingForce(table=((0, 0), (0.05, 5), (0.1, last)))
+        run = simulate(shaft(slide=Mass(m=1e9, s=0.0, v=1.0), part=force), 0.2)
+        assert notices(run) == told
