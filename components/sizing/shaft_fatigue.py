@@ -56,7 +56,8 @@ def shaft_fatigue(
     """Work out the safety against fatigue fracture of a rotating shaft (DIN 743; Roloff/Matek, chapter 11).
 
     K = (beta/K2 + 1/K_F - 1)/K_V, W = K1·sigma_W/K; a mean stress lowers it by psi·sigma_mv, psi = W/(2·K1·R_m - W),
-    and amplitude and mean together stay below the yield strength. S_D = 1/sqrt((sigma_a/W_b)² + (tau_a/W_t)²).
+    and amplitude and mean together stay below the yield strength. S_D = 1/sqrt((sigma_a/W_b)² + (tau_a/W_t)²), and 0
+    where the mean stress alone is too much.
 
     Args:
         bending: resultant bending moment in N.m; the rotation makes it alternate.
@@ -87,10 +88,12 @@ def shaft_fatigue(
     )
     tensile, limit = technological_size * material.tensile_strength, technological_size * material.yield_strength
     bends, twists = (
-        minimum(endured - endured / (2 * tensile - endured) * equivalent, limit / share - equivalent)
+        maximum(minimum(endured - endured / (2 * tensile - endured) * equivalent, limit / share - equivalent), 0.0)
         for endured, equivalent, share in ((bends, sqrt(3) * mean, 1.0), (twists, mean, sqrt(3)))
     )
-    safety = 1 / sqrt((normal / bends) ** 2 + (swing / twists) ** 2)
+    smallest = _SMOOTH * limit
+    used = sqrt((normal / maximum(bends, smallest)) ** 2 + (swing / maximum(twists, smallest)) ** 2)
+    safety = where(minimum(bends, twists) > 0, 1 / maximum(used, _SMOOTH), 0.0)
     return ShaftFatigue(
         bending, normal, mean, swing, *notches, size, rough, bends, twists, safety, required_safety
     )  # fmt: skip

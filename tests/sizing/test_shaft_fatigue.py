@@ -3,6 +3,7 @@
 from dataclasses import replace
 from math import hypot, log10, pi, sqrt
 
+import numpy as np
 import pytest
 
 from components.sizing import ShaftMaterial, shaft_fatigue
@@ -90,3 +91,18 @@ def test_worked_example_of_another_program() -> None:
     assert made.bending_strength == pytest.approx(154.79183517414634e6, rel=1e-12)
     assert made.torsion_strength == pytest.approx(141.66041042128347e6, rel=1e-12)
     assert made.safety == pytest.approx(2.589018228890791, rel=1e-12)
+
+
+@pytest.mark.parametrize(("bending", "factor"), [(1.0, 1.01), (1.0, 100.0), (0.0, 1.01)])
+def test_a_mean_stress_beyond_yielding_leaves_no_safety(bending: float, factor: float) -> None:
+    """tau_m = R_e/sqrt(3) leaves nothing; more of it must not look like strength again."""
+    torque = factor * 275e6 / sqrt(3) * pi * 0.02**3 / 16
+    made = shaft_fatigue(bending, torque, 0.02, S275)
+    assert (made.safety, made.bending_strength, made.torsion_strength) == (0.0, 0.0, 0.0)
+    assert "below the limit" in {line.name: line.verdict for line in made.lines()}["safety"]
+
+
+def test_the_safety_falls_with_the_torque() -> None:
+    safeties = shaft_fatigue(1.05, np.geomspace(0.1, 1e3, 200), 6e-3, S275).safety
+    assert np.all(np.diff(safeties) <= 0)
+    assert safeties[-1] == 0.0
