@@ -162,10 +162,10 @@ def belt_forces(
 class TimingBeltLoad(Result):
     """Load of a timing belt against its limits."""
 
-    power: Power = line("transmitted power, application factor included", at_most="power_limit")
+    power: Power = line("transmitted power, application factor included", at_most="power_limit", either_way=True)
     power_limit: Power = line("power that the belt can transmit")
     tooth_force: Force = line("force of one tooth in mesh")
-    flank_pressure: Stress = line("pressure on the flanks of the teeth", at_most="pressure_limit")
+    flank_pressure: Stress = line("pressure on the flanks of the teeth", at_most="pressure_limit", either_way=True)
     pressure_limit: Stress = line("permissible pressure on the flanks")
 
 

@@ -116,8 +116,10 @@ def machine_table_clutch(
 class ClutchSelection(Result):
     """Clutch chosen from a catalogue."""
 
-    required_torque: Torque = line("required torque by the rule 9550·P/n", at_most="rated_torque")
-    exact_torque: Torque = line("required torque K·P/w without the rounded 9550", at_most="rated_torque")
+    required_torque: Torque = line("required torque by the rule 9550·P/n", at_most="rated_torque", either_way=True)
+    exact_torque: Torque = line(
+        "required torque K·P/w without the rounded 9550", at_most="rated_torque", either_way=True
+    )
     rated_torque: Torque = line("rated torque of the clutch")
 
 

@@ -160,7 +160,7 @@ def motor_summary(lines: MotorLines) -> MotorSummary:
 class DriveForClutch(Result):
     """Motor that can load a clutch up to its rated torque through a reduction."""
 
-    clutch_speed: Speed = line("speed of the clutch", at_most="clutch_speed_limit")
+    clutch_speed: Speed = line("speed of the clutch", at_most="clutch_speed_limit", either_way=True)
     clutch_speed_limit: Speed = line("speed limit of the clutch")
     power: Power = line("power at the rated torque of the clutch")
     motor_torque: Torque = line("torque of the motor at the rated torque of the clutch")

@@ -16,7 +16,7 @@ class BearingLife(Result):
     required_safety: Ratio = line("required static safety")
     life_revolutions: Revolutions = line("rating life L10")
     life: Life = line("rating life L10h")
-    speed: Speed = line("speed", at_most="speed_limit")
+    speed: Speed = line("speed", at_most="speed_limit", either_way=True)
     speed_limit: Speed = line("speed limit of the bearing")
 
 
@@ -45,5 +45,5 @@ def bearing_life(
     revolutions = 1e6 * (dynamic_rating / load) ** exponent
     return BearingLife(
         equivalent_load=load, static_safety=static_rating / load, required_safety=required_safety,
-        life_revolutions=revolutions, life=2 * math.pi * revolutions / speed, speed=speed, speed_limit=speed_limit,
+        life_revolutions=revolutions, life=2 * math.pi * revolutions / abs(speed), speed=speed, speed_limit=speed_limit,
     )  # fmt: skip

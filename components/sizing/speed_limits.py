@@ -12,28 +12,28 @@ from modelica_like.language.results import Result, line
 class SpeedLimit(Result):
     """Speed of a shaft against its limit."""
 
-    speed: Speed = line("speed", at_most="limit")
+    speed: Speed = line("speed", at_most="limit", either_way=True)
     limit: Speed = line("limit of the manufacturer")
     margin: Ratio = line("limit over speed")
 
 
 def speed_limit(speed: Speed, limit: Speed, ratio: Ratio = 1.0) -> SpeedLimit:
-    """Compare a speed behind a gear with its limit: w/i ≤ w_max (document 002, section 5.2).
+    """Compare a speed behind a gear with its limit: |w/i| ≤ w_max (document 002, section 5.2).
 
     Args:
         speed: of the driving shaft in rad/s.
         limit: of the driven element in rad/s.
-        ratio: speed of the driving shaft over speed of the driven element.
+        ratio: speed of the driving shaft over speed of the driven element; negative if it reverses.
     """
-    return SpeedLimit(speed / ratio, limit, limit * ratio / speed)
+    return SpeedLimit(speed / ratio, limit, limit * abs(ratio / speed))
 
 
 class BeltSpeedLimit(Result):
     """Speed and velocity of a belt against their limits."""
 
-    speed: Speed = line("speed of the small pulley", at_most="limit")
+    speed: Speed = line("speed of the small pulley", at_most="limit", either_way=True)
     limit: Speed = line("speed limit of the belt")
-    velocity: Velocity = line("velocity of the belt", at_most="velocity_limit")
+    velocity: Velocity = line("velocity of the belt", at_most="velocity_limit", either_way=True)
     velocity_limit: Velocity = line("velocity limit of the belt")
 
 

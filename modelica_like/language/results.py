@@ -18,7 +18,9 @@ Limits = Mapping[str, tuple[Number | None, Number | None]]
 """Smallest and largest value by name of the line, or None."""
 
 
-def line(description: str, *, at_most: str = "", at_least: str = "", required: bool = False) -> Any:
+def line(
+    description: str, *, at_most: str = "", at_least: str = "", required: bool = False, either_way: bool = False
+) -> Any:
     """Declare a line of a result; its unit is that of the annotation.
 
     Args:
@@ -26,8 +28,9 @@ def line(description: str, *, at_most: str = "", at_least: str = "", required: b
         at_most: name of another line that this one must not exceed.
         at_least: name of another line that this one must reach.
         required: whether this line, a truth value, must be true.
+        either_way: whether limits are those of its amount, as of a speed in either direction.
     """
-    limits = {"at_most": at_most, "at_least": at_least, "required": required}
+    limits = {"at_most": at_most, "at_least": at_least, "required": required, "either_way": either_way}
     return dataclasses.field(metadata={"description": description, **limits})
 
 
@@ -83,10 +86,11 @@ class Result:
     def _line(self, field: dataclasses.Field[Any], limit: tuple[Number | None, Number | None]) -> Line:
         value, quantity, about = getattr(self, field.name), quantity_of(type(self), field.name), field.metadata
         verdicts = [_required(value)] if about["required"] else []
+        judged = abs(value) if about["either_way"] else value
         for sort, other in zip(("at_least", "at_most"), limit, strict=True):
             bounds = [getattr(self, about[sort])] if about[sort] else []
             for bound in [*bounds, *([] if other is None else [other])]:
-                verdicts.append(_verdict(value, bound, quantity, above=sort == "at_most"))
+                verdicts.append(_verdict(judged, bound, quantity, above=sort == "at_most"))
         missed = [text for text in verdicts if text not in ("", "ok")]
         verdict = "; ".join(missed) or next(filter(None, verdicts), "")
         return Line(field.name, shown(value, quantity), quantity.shown, about["description"], verdict, bool(missed))
@@ -161,7 +165,7 @@ def _verdict(value: Number, bound: Number, quantity: Quantity, *, above: bool) -
         return ""
     values, bounds = np.broadcast_arrays(np.ravel(np.asarray(value, float)), np.ravel(np.asarray(bound, float)))
     excess = values - bounds if above else bounds - values
-    worst = int(np.argmax(np.where(np.isfinite(excess), excess, np.inf)))
+    worst = int(np.argmax(np.where(np.isnan(excess), np.inf, excess)))
     if excess[worst] <= _ROUNDING * abs(bounds[worst]):
         return "ok"
     more, limit = float(excess[worst]), float(bounds[worst])

@@ -10,13 +10,18 @@ from components.sizing import (
     ClutchSelection,
     Load,
     bearing_life,
+    belt_speed_limit,
     clutch_selection,
     comparison,
+    drive_for_clutch,
     flywheel_for_time,
     shaft_diameter,
     shaft_statics,
+    speed_limit,
+    timing_belt_load,
 )
 from modelica_like.language import quantities
+from modelica_like.language.results import Line, Result
 from modelica_like.language.units import parse_unit
 
 COUNTS = ("", "teeth", "1e6 rev")
@@ -94,3 +99,42 @@ def test_comparison() -> None:
     text = comparison(light=clutch_selection(40.0, 100.0, 0.6), heavy=clutch_selection(80.0, 100.0, 0.6))
     assert text.splitlines()[0].split() == ["light", "heavy"]
     assert text.splitlines()[2].split()[:4] == ["exact_torque", "0.4", "0.8", "N.m"]
+
+
+def judged(result: Result, name: str, **limits: tuple[float | None, float | None]) -> Line:
+    return next(line for line in result.lines(limits) if line.name == name)
+
+
+def test_a_value_or_a_limit_without_end_hides_no_other() -> None:
+    speeds = speed_limit(np.array([200.0, 100.0, 180.0]), np.array([150.0, np.inf, 170.0]))
+    assert judged(speeds, "speed").verdict == "above the limit 1432.39 rpm by 477.5 rpm (33.3 %)"
+    with np.errstate(divide="ignore"):
+        lives = bearing_life(np.array([1e4, 0.0]), 100.0, 2600.0, 1060.0)
+    assert judged(lives, "static_safety").verdict.startswith("below the limit 1 by 0.894")
+    assert judged(lives, "life", life=(3600.0, None)).exceeded
+    assert not judged(speed_limit(100.0, np.inf), "speed").exceeded
+    assert judged(speed_limit(np.nan, 100.0), "speed").exceeded
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_limits_hold_in_both_directions(way: float) -> None:
+    """A shaft that turns backwards, also behind a reversing gear, is as fast; a belt that brakes has its load too."""
+    assert judged(speed_limit(200.0, 150.0, way), "speed").exceeded
+    assert judged(speed_limit(way * 200.0, 150.0), "speed").exceeded
+    assert judged(speed_limit(200.0, 250.0, way), "speed").verdict == "ok"
+    assert speed_limit(200.0, 250.0, way).margin == pytest.approx(1.25)
+    assert judged(drive_for_clutch(1.0, 200.0, way, 150.0), "clutch_speed").exceeded
+    belt = belt_speed_limit(way * 200.0, 0.1, 150.0, 5.0)
+    assert judged(belt, "speed").exceeded
+    assert judged(belt, "velocity").exceeded
+    assert judged(clutch_selection(way * 1000.0, 100.0, 9.0), "exact_torque").exceeded
+    load = timing_belt_load(way * 100.0, 10.0, 5.0, 0.01, 1e-3, power_limit=900.0, pressure_limit=1e6)
+    assert judged(load, "power").exceeded
+    assert judged(load, "flank_pressure").exceeded
+
+
+def test_a_bearing_that_turns_backwards_lives_as_long() -> None:
+    """L10 = 1e6·(2600/150)³ turns."""
+    made = bearing_life(150.0, -100.0, 2600.0, 1060.0, speed_limit=50.0)
+    assert made.life == pytest.approx(2 * np.pi * 1e6 * (2600 / 150) ** 3 / 100.0)
+    assert judged(made, "speed").exceeded
