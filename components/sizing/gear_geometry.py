@@ -9,6 +9,7 @@ import numpy as np
 
 from components.sizing.maths import (
     Number,
+    absolute,
     acos,
     cos,
     hypot,
@@ -42,7 +43,7 @@ class GearPair:
         face_width: common width in m.
         pinion_shift: profile shift of the pinion in modules.
         wheel_shift: of the wheel; of internal teeth with the signs of DIN 3960 (pinion + wheel = 0: no shift in sum).
-        helix: helix angle at the pitch circle in rad.
+        helix: helix angle at the pitch circle in rad; its sign, left or right, does not matter.
         pressure_angle: of the rack in rad.
         addendum: of the rack of the gear in modules.
         dedendum: in modules.
@@ -135,8 +136,8 @@ class GearPair:
 
     @property
     def overlap_ratio(self) -> Ratio:
-        """Overlap ratio b·sin(beta)/(pi·m)."""
-        return self.face_width * sin(self.helix) / (math.pi * self.module)
+        """Overlap ratio b·sin(|beta|)/(pi·m)."""
+        return self.face_width * sin(absolute(self.helix)) / (math.pi * self.module)
 
 
 def involute(angle: Angle) -> Number:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.sizing.gear_geometry import GearPair, internal_form, tooth_form
-from components.sizing.maths import Number, cos, is_symbolic, maximum, minimum, require, sqrt, tan, where
+from components.sizing.maths import Number, absolute, cos, is_symbolic, maximum, minimum, require, sqrt, tan, where
 from modelica_like.language.quantities import Angle, Force, Ratio, Stress, Torque
 from modelica_like.language.results import Result, line
 
@@ -118,7 +118,7 @@ def root_sharing(pair: GearPair) -> Ratio:
     """Return contact ratio factor times helix factor of the root, Y_eps·Y_beta (DIN 3990-3)."""
     overlap = minimum(pair.overlap_ratio, 1.0)
     shared = 0.25 + 0.75 / pair.contact_ratio * cos(pair.base_helix) ** 2
-    return shared * (1 - overlap * minimum(pair.helix, math.pi / 6) / (2 * math.pi / 3))
+    return shared * (1 - overlap * minimum(absolute(pair.helix), math.pi / 6) / (2 * math.pi / 3))
 
 
 def single_contact(pair: GearPair, ratio: Ratio, overlap: Ratio) -> Number:

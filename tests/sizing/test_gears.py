@@ -287,3 +287,10 @@ def test_a_tip_inside_its_base_circle() -> None:
     assert pair.tip_over_base(20, -1.5) == pytest.approx(sqrt((19 / (20 * cos(ALPHA))) ** 2 - 1))
     with pytest.raises(ValueError, match="A tip circle lies inside its base circle"):
         pair.tip_over_base(20, -1.7)
+
+
+def test_left_and_right_helix_are_as_strong() -> None:
+    left, right = (GearPair(20, 60, 3e-3, 0.03, helix=radians(angle)) for angle in (-17, 17))
+    assert left.overlap_ratio == right.overlap_ratio > 0
+    assert gear_strength(left, 100.0, STEEL) == gear_strength(right, 100.0, STEEL)
+    assert gear_teeth(left) == gear_teeth(right)
