@@ -88,7 +88,12 @@ def belt_geometry(small_teeth: Teeth, large_teeth: Teeth, pitch: Length, belt_le
         large_teeth: teeth of the large pulley.
         pitch: distance of the teeth in m.
         belt_length: pitch length of the belt in m.
+
+    Raises:
+        ValueError: the small pulley is the larger one, or the belt is too short.
     """
+    require("Pulleys and belt need teeth and a pitch.", small_teeth > 0, pitch > 0)
+    require("small_teeth are more than large_teeth: swap them.", small_teeth <= large_teeth)
     small, large = pitch_diameter(small_teeth, pitch), pitch_diameter(large_teeth, pitch)
     distance = centre_distance(belt_length, small, large)
     angle = wrap_angle(small, large, distance)
@@ -145,7 +150,12 @@ def belt_forces(
         velocity: of the belt in m/s.
         section: cross-section of the belt, width by thickness, in m2.
         density: of the belt in kg/m3.
+
+    Raises:
+        ValueError: nothing presses the belt on its pulleys, or it weighs less than nothing.
     """
+    require("A belt needs a friction and a wrap angle above zero.", friction > 0, angle > 0)
+    require("Section and density of a belt are not below zero.", section >= 0, density >= 0)
     ratio = exp(friction * angle)
     slack = pull / (ratio - 1)
     tight = pull + slack
@@ -183,6 +193,11 @@ def timing_belt_load(
         tooth_height: in m; 1.27 mm of profile XL (ISO 5296).
         power_limit: of the catalogue in W.
         pressure_limit: in Pa.
+
+    Raises:
+        ValueError: no tooth carries.
     """
+    require("A timing belt needs teeth in mesh, a width and a height of its teeth.",
+            teeth_in_mesh > 0, width > 0, tooth_height > 0)  # fmt: skip
     force = pull / teeth_in_mesh
     return TimingBeltLoad(pull * velocity, power_limit, force, force / (width * tooth_height), pressure_limit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from components.sizing.maths import Number
+from components.sizing.maths import Number, require
 from modelica_like.language.quantities import Force, Length, Mass, Ratio, Sag, Stress
 from modelica_like.language.results import Result, line
 
@@ -53,7 +53,13 @@ def deflection(mass: Mass, span: Length, side: Length, modulus: Stress = STEEL) 
         span: in m.
         side: of the square in m.
         modulus: Young's modulus in Pa.
+
+    Raises:
+        ValueError: something is not above zero.
     """
+    require(
+        "Mass, span, side and modulus of a shaft that sags are positive.", mass > 0, span > 0, side > 0, modulus > 0
+    )
     weight = mass * GRAVITY
     sag = midspan_sag(weight, span, square_second_moment(side), modulus)
     return Deflection(weight, span, sag, sag / span)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 
+from components.sizing.maths import require
 from modelica_like.language.quantities import Density, Length, Mass, SmallInertia, Speed, Time, Torque
 from modelica_like.language.results import Result, line
+
+_INCOMPLETE = "Dimensions, density, torque, speed and time of a flywheel are positive."
 
 
 def cylinder_mass(density: Density, radius: Length, width: Length) -> Mass:
@@ -53,7 +56,11 @@ def flywheel_for_time(
         density: in kg/m3.
         radius: in m.
         width_limit: available width in m.
+
+    Raises:
+        ValueError: something is not above zero.
     """
+    require(_INCOMPLETE, time > 0, torque > 0, speed > 0, density > 0, radius > 0)
     inertia = torque * time / speed
     width = 2 * inertia / (math.pi * density * radius**4)
     return Flywheel(inertia, radius, width, width_limit, cylinder_mass(density, radius, width), time)
@@ -71,7 +78,11 @@ def flywheel(
         torque: of the clutch in N.m.
         speed: at the end in rad/s.
         width_limit: available width in m.
+
+    Raises:
+        ValueError: something is not above zero.
     """
+    require(_INCOMPLETE, width > 0, radius > 0, density > 0, torque > 0, speed > 0)
     mass = cylinder_mass(density, radius, width)
     inertia = cylinder_inertia(mass, radius)
     return Flywheel(inertia, radius, width, width_limit, mass, switching_time(inertia, speed, torque))

@@ -121,8 +121,9 @@ def gear_life(
         allowed_damage: 1, or less for spectra that are not certain.
 
     Raises:
-        ValueError: a step of the spectrum has no load or no cycles.
+        ValueError: there is no step, or a step of the spectrum or the wheel has no load or no cycles.
     """
+    require("A load spectrum has at least one step, and the wheel has cycles.", len(spectrum) > 0, wheel_cycles > 0)
     require("Every step of a load spectrum needs a load and cycles above zero.",
             *(value > 0 for stage in spectrum for value in (stage.load, stage.cycles)))  # fmt: skip
     stages = tuple(_damage(strength, stage, wheel_cycles, flank, root) for stage in spectrum)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from components.sizing.maths import log10, maximum, minimum, sqrt, where
+from components.sizing.maths import log10, maximum, minimum, require, sqrt, where
 from components.sizing.shaft_strength import bending_stress, torsional_stress
 from modelica_like.language.quantities import Length, Ratio, SmallTorque, Stress, Torque
 from modelica_like.language.results import Result, line
@@ -73,7 +73,12 @@ def shaft_fatigue(
         technological_size: K1, of the heat treatment of thick shafts.
         hardening: K_V, of a hardened surface.
         required_safety: smallest safety; 1.2 in DIN 743, if the loads are certain.
+
+    Raises:
+        ValueError: the shaft has no diameter, or `alternating` is no share.
     """
+    require("The diameter of a shaft is positive.", diameter > 0)
+    require("The share `alternating` of the torque is from 0 to 1.", alternating >= 0, alternating <= 1)
     normal, shear = bending_stress(abs(bending), diameter), torsional_stress(abs(torque), diameter)
     swing, mean = alternating * shear, (1 - alternating) * shear
     supports = support_numbers(diameter, large_diameter, fillet, material.yield_strength)

@@ -125,7 +125,11 @@ def shaft_stress(
         axial_force: in N, without stress concentration.
         required_safety: smallest safety.
         at: position in m, for the table.
+
+    Raises:
+        ValueError: diameter or strength is not above zero.
     """
+    require("Diameter and strength of a shaft are positive.", diameter > 0, yield_strength > 0)
     normal, shear = bending_stress(bending, diameter), torsional_stress(abs(torque), diameter)
     tension = 4 * abs(axial_force) / (math.pi * diameter**2)
     equivalent = von_mises(tension + bending_factor * normal, torsion_factor * shear)
@@ -180,8 +184,11 @@ def stepped_shaft(
         required_safety: smallest safety.
 
     Raises:
-        ValueError: the shaft is not statically determinate, or something acts beyond its end.
+        ValueError: the shaft is not statically determinate, its sections are not in order, or something acts beyond
+            its end.
     """
+    if not sections or any(after.end <= before.end for before, after in itertools.pairwise(sections)):
+        raise ValueError("A stepped shaft needs sections, each of which ends behind the one before.")
     statics = shaft_statics(loads, bearings, hinges)
     last = max(cut.at for cut in statics.diagram)
     require(f"Something acts at {np.max(last):g} m, beyond the last section.", last <= sections[-1].end)
