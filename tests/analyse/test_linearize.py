@@ -12,14 +12,15 @@ from components import (
     Constant,
     ConstantSpeed,
     ConstantTorque,
+    EddyCurrentTorque,
     Fixed,
     IdealPlanetary,
     Inertia,
     Spring,
     SpringDamper,
 )
-from modelica_like import build, simulate
-from modelica_like.analyse.linear.campbell import campbell
+from modelica_like import Assembly, build, simulate
+from modelica_like.analyse.linear.campbell import Campbell, campbell
 from modelica_like.analyse.linear.linearize import linearize
 from modelica_like.language import Component, Equations, connect, series
 from modelica_like.solve.initialize import variable_slopes
@@ -253,3 +254,45 @@ def test_campbell_diagram_finds_critical_speeds():
     assert [(one.get_xdata()[0], one.get_ydata()[0]) for one in points] == [
         pytest.approx((speed * 30 / np.pi, 15 / (2 * np.pi))) for speed in (7.5, 15.0)
     ]
+
+
+def test_campbell_diagram_follows_a_mode_that_begins_later():
+    """An eddy current brake damps by its slope, 2·tau_n/w_n·(1 - x²)/(1 + x²)² with x = w/w_n: overdamped at first."""
+    peak, at, c, J = 400.0, 20.0, 2000.0, 0.1
+    parts = {
+        "motor": ConstantSpeed(w_fixed="w0"), "shaft": SpringDamper(c=c, d=0.0), "disc": Inertia(J=J),
+        "brake": EddyCurrentTorque(tau_nominal=peak, w_nominal=at),
+    }  # fmt: skip
+    drive = Assembly("d", parameters={"w0": "1 rad/s"}, parts=parts, series={"s": list(parts)})
+    speeds = np.array([1.0, 2.0, 10.0, 16.0, 20.0, 120.0, 150.0, 300.0])
+    x = speeds / at
+    damping = 2 * peak / at * (1 - x**2) / (1 + x**2) ** 2 / (2 * J)
+    square = c / J - damping**2
+    expected = np.where(square > 0, np.sqrt(np.maximum(square, 0)) / (2 * np.pi), np.nan)
+    assert 0 < np.isnan(expected).sum() < len(speeds)
+    diagram = campbell(drive, {"w0": speeds}, "disc.w")
+    np.testing.assert_allclose(diagram.frequencies, [expected], rtol=1e-9)
+    assert diagram.modes == ("disc, shaft",)
+    (crossing,) = diagram.crossings()
+    assert 120.0 < crossing.speed < 150.0
+    assert diagram.plot().axes[0].lines
+
+
+def test_campbell_diagram_of_a_shaft_that_turns_backwards():
+    speeds = [-20.0, -9.0, 4.0, 20.0]
+    diagram = campbell(Rotor(), {"turn.w_fixed": speeds}, "rotor.w", at="given", orders=(1, 2))
+    found = sorted(one.speed for one in diagram.crossings())
+    assert found == pytest.approx([-15.0, -7.5, 7.5, 15.0], rel=1e-12)
+    assert all(one.frequency == pytest.approx(15 / (2 * np.pi)) for one in diagram.crossings())
+    line = diagram.plot().axes[0].lines[1]
+    np.testing.assert_allclose(line.get_ydata(), np.abs(line.get_xdata()) / 60)
+
+
+def test_a_crossing_at_a_point_counts_once():
+    """A curve that meets a line of an order at a point, goes through it or turns back there."""
+    for before, after in ((-1, 1), (-1, -1), (1, 1), (1, -1)):
+        line = np.array([1.0, 2.0, 3.0])
+        curve = 1j * np.array([1.0 + before * 0.5, 2.0, 3.0 + after * 0.5])
+        crossings = Campbell("d", "w", line, curve[None]).crossings()
+        assert [one.speed for one in crossings] == [2.0]
+    assert [one.speed for one in Campbell("d", "w", line, 1j * np.array([[1.0, 1.0, 1.0]])).crossings()] == [1.0]

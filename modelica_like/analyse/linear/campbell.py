@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.analyse.linear.linearize import At, linearize
+from modelica_like.analyse.linear.model import LinearModel
 from modelica_like.analyse.linear.pictures import mode_name
 from modelica_like.arguments import checked
 from modelica_like.errors import ValueOutOfRange
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _RPM = 30 / np.pi
+_NONE = complex(np.nan, np.nan)
 
 
 @dataclass(frozen=True)
@@ -53,9 +55,9 @@ class Campbell:
         name: name of the model.
         speed: path of the speed.
         speeds: in rad/s, shape (points,).
-        eigenvalues: of each mode at each speed in rad/s, complex, shape (modes, points).
+        eigenvalues: of each mode at each speed in rad/s, complex, shape (modes, points); nan where it is overdamped.
         orders: excitations per revolution.
-        modes: for each mode, the components that store most of its energy at the lowest speed.
+        modes: for each mode, the components that store most of its energy at the lowest speed at which it oscillates.
     """
 
     name: str
@@ -79,14 +81,14 @@ class Campbell:
         """Return the critical speeds, interpolated between the points."""
         crossings: list[Crossing] = []
         for order in self.orders:
-            line = order * self.speeds / (2 * np.pi)
             for mode, curve in enumerate(self.frequencies):
-                gap = line - curve
-                for k in np.flatnonzero(gap[:-1] * gap[1:] <= 0):
-                    share = gap[k] / (gap[k] - gap[k + 1]) if gap[k] != gap[k + 1] else 0.0
-                    speed = float(self.speeds[k] + share * (self.speeds[k + 1] - self.speeds[k]))
-                    name = self.modes[mode] if self.modes else ""
-                    crossings.append(Crossing(order, mode, speed, order * speed / (2 * np.pi), name))
+                name = self.modes[mode] if self.modes else ""
+                # A shaft that turns backwards excites as well.
+                for line in (order * self.speeds / (2 * np.pi), -order * self.speeds / (2 * np.pi)):
+                    crossings += [
+                        Crossing(order, mode, speed, order * abs(speed) / (2 * np.pi), name)
+                        for speed in _roots(self.speeds, line - curve)
+                    ]
         return tuple(crossings)
 
     def plot(self) -> Figure:
@@ -99,11 +101,13 @@ class Campbell:
         with picture(f"Campbell diagram of {self.name}", 1, 4.2, width=width, below=below) as (figure, (axes,)):
             for mode, curve in enumerate(self.frequencies):
                 axes.plot(rpm, curve, color=COLOURS[mode % len(COLOURS)], label=labels[mode])
+            far = max(rpm[0], rpm[-1], key=abs)
+            bends = np.union1d(rpm, [0.0]) if rpm[0] < 0 < rpm[-1] else rpm
             for order in self.orders:
-                axes.plot(rpm, order * rpm / 60, color="#888888", linewidth=0.9, linestyle="--")
-                place = 0.97 * min(rpm[-1], 60 * top / order)
+                axes.plot(bends, order * np.abs(bends) / 60, color="#888888", linewidth=0.9, linestyle="--")
+                place = 0.97 * np.sign(far) * min(abs(far), 60 * top / order)
                 at = {"xytext": (-4, 2), "textcoords": "offset points", "fontsize": 8, "ha": "right"}
-                axes.annotate(f"{order:g}\u00d7", (place, order * place / 60), **at)
+                axes.annotate(f"{order:g}\u00d7", (place, order * abs(place) / 60), **at)
             for crossing in met:
                 axes.plot(crossing.speed * _RPM, crossing.frequency, "o", color="#000000", markersize=4)
                 axes.vlines(
@@ -149,25 +153,47 @@ def campbell(
     speeds = np.array([call(m.model, m.model.equations.variables, m.point)[row] for m in linear])
     order = np.argsort(speeds, kind="stable")
     ahead = [(values := linear[k].eigenvalues())[values.imag > 0] for k in order]
-    # Each mode continues as the nearest one.
-    curves = [ahead[0][np.argsort(ahead[0].imag, kind="stable")]]
-    for values in ahead[1:]:
-        curves.append(_nearest(curves[-1], values))
-    name_of = {mode.eigenvalue: mode_name(mode) for mode in linear[order[0]].modes() if mode.oscillates}
-    names = tuple(name_of[min(name_of, key=lambda value, mode=mode: abs(value - mode))] for mode in curves[0])
-    return Campbell(model.name, speed, speeds[order], np.array(curves).T, tuple(map(float, orders)), names)
+    curves = _followed(ahead)
+    names = tuple(_name(curve, [linear[k] for k in order]) for curve in curves)
+    return Campbell(model.name, speed, speeds[order], curves, tuple(map(float, orders)), names)
 
 
-def _nearest(before: Any, after: Any) -> Any:
-    """Assign eigenvalues one to one, the closest pairs first; a mode that becomes overdamped has none (nan)."""
-    result = np.full(len(before), np.nan + 0j)
-    if not len(after):
-        return result
+def _name(curve: Any, linear: Sequence[LinearModel]) -> str:
+    """Return the name of a mode, where it begins to oscillate."""
+    begin = int(np.flatnonzero(np.isfinite(curve))[0])
+    swings = [mode for mode in linear[begin].modes() if mode.oscillates]
+    return mode_name(min(swings, key=lambda mode: abs(mode.eigenvalue - curve[begin])))
+
+
+def _roots(speeds: Any, gap: Any) -> list[float]:
+    """Return the speeds at which a gap closes, between points by straight lines; nan where there is none."""
+    before, after = gap[:-1], gap[1:]
+    closes = (before < 0) & (after >= 0) | (before > 0) & (after <= 0)
+    begins = [float(speeds[0])] if gap[0] == 0 else []
+    shares = ((k, gap[k] / (gap[k] - gap[k + 1])) for k in np.flatnonzero(closes))
+    return [*begins, *(float(speeds[k] + share * (speeds[k + 1] - speeds[k])) for k, share in shares)]
+
+
+def _followed(ahead: Sequence[Any]) -> Any:
+    """Follow modes from point to point, shape (modes, points): each continues as the nearest one, the rest begin."""
+    curves = np.full((0, 0), _NONE)
+    for k, values in enumerate(ahead):
+        chosen = _nearest(curves[:, -1] if k else np.zeros(0), values)
+        begin = [j for j in np.argsort(values.imag, kind="stable") if j not in chosen]
+        # A mode that becomes overdamped has none (nan).
+        column = np.array([values[j] if j >= 0 else _NONE for j in [*chosen, *begin]], complex)
+        curves = np.hstack([np.vstack([curves, np.full((len(begin), k), _NONE)]), column[:, None]])
+    return curves
+
+
+def _nearest(before: Any, after: Any) -> list[int]:
+    """Assign eigenvalues one to one, the closest pairs first: for each one before the index of that after, or -1."""
+    chosen = [-1] * len(before)
     distance = np.abs(np.nan_to_num(before, nan=np.inf)[:, None] - after[None, :])
     for _ in range(min(distance.shape)):
         row, column = np.unravel_index(np.argmin(distance), distance.shape)
         if not np.isfinite(distance[row, column]):
             break
-        result[row] = after[column]
+        chosen[int(row)] = int(column)
         distance[row, :] = distance[:, column] = np.inf
-    return result
+    return chosen
