@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import pi
 
 from components import icons
+from components.feasible import Feasible
 from components.interfaces import TwoFlanges
 from components.thermal import Lossy
 from modelica_like.language import (
@@ -30,7 +31,7 @@ from modelica_like.language import (
 )
 
 
-class VariableGear(Lossy, TwoFlanges):
+class VariableGear(Feasible, Lossy, TwoFlanges):
     """Continuously variable transmission (CVT): its ratio follows a signal with a lag; it loses a share of the torque.
 
     Without loss ratio·tau_a + tau_b = 0; of what enters on the driving side efficiency arrives. It does not slip: for
@@ -38,6 +39,7 @@ class VariableGear(Lossy, TwoFlanges):
     """
 
     icon = icons.VARIABLE_GEAR
+    misfit = "has its smallest ratio ratio_min above its largest ratio ratio_max"
     u: Input = signal_in("1", "wanted ratio, speed of flange_a over speed of flange_b")
     T: Parameter = param("s", "time constant of the adjustment", min=1e-6)
     efficiency: Parameter = param("1", "power out over power in", default=1.0, min=1e-3, max=1)
@@ -54,6 +56,9 @@ class VariableGear(Lossy, TwoFlanges):
     w_a: Variable = var("rad/s", "speed of flange_a relative to the housing")
     w_b: Variable = var("rad/s", "speed of flange_b relative to the housing")
     tau_loss: Variable = var("N.m", "lost torque at flange_a")
+
+    def fits(self) -> Expr:
+        return self.ratio_min <= self.ratio_max
 
     def equations(self) -> Equations:
         yield from super().equations()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from components import icons
 from components.electrical.analog import Pin
+from components.feasible import Feasible
 from components.machines.rotors import Rotor
 from components.thermal import Conducting
 from modelica_like.language import (
     Equations,
+    Events,
     Expr,
     Parameter,
     Variable,
@@ -25,7 +27,7 @@ _RPM = 0.10471975511965977
 _LINEAR_BELOW = 1e-3
 
 
-class DCMachine(Conducting, Rotor, partial=True):
+class DCMachine(Feasible, Conducting, Rotor, partial=True):
     """Linear DC machine: induced voltage k·flux·w, torque k·flux·i, with the flux relative to its nominal value.
 
     Armature: v = R·ia + v_brush + v_core, v_core = La·der(i) + k·flux·w, where ia - i flows through the conductance of
@@ -37,6 +39,7 @@ class DCMachine(Conducting, Rotor, partial=True):
     """
 
     icon = icons.MOTOR
+    misfit = "has no induced voltage at its nominal point: I_nominal drops V_nominal at its resistances"
     renamed = {"alpha": "alpha20 = alpha/(1 - alpha*(T_ref - 293.15 K)): alpha was the coefficient at T_ref"}
     ap = Pin("positive armature terminal")
     an = Pin("negative armature terminal")
@@ -118,6 +121,13 @@ class DCMachine(Conducting, Rotor, partial=True):
     def constant(self) -> Expr:
         """Induced voltage over speed at nominal flux."""
         return self.k if self.given("k") else self.nominal_induced_voltage / self.w_nominal
+
+    def fits(self) -> Expr:
+        return self.nominal_induced_voltage > 0
+
+    def events(self) -> Events:
+        if not self.given("k"):
+            yield from super().events()
 
     def _power_law(self, exponent: Expr) -> Expr:
         x = absolute(self.w) / self.w_nominal

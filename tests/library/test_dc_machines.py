@@ -34,6 +34,7 @@ from components import (
     VoltageSensor,
 )
 from modelica_like import Assembly, Component, simulate
+from modelica_like.errors import LimitPassed
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
@@ -313,3 +314,21 @@ def test_machine_on_a_moving_stand() -> None:
     run = simulate(drive, "0.5 s", rtol=1e-9)
     np.testing.assert_allclose(run["machine.support.tau"], run["machine.tau_electrical"], atol=1e-8)
     assert run.energy().power_closure <= 1e-8
+
+
+@pytest.mark.parametrize(("voltage", "fits"), [(4.9, False), (5.0, False), (5.1, True)])
+def test_a_nominal_point_needs_an_induced_voltage(voltage: float, fits: bool) -> None:
+    """100 A drop 5 V at 0.05 Ohm: with less there is no constant, and the machine would turn backwards."""
+    drive = bench(PermanentMagnetDCMachine(V_nominal=voltage), ConstantSpeed(w_fixed=10.0), 5.0)
+    if fits:
+        induced = (voltage - 5.0) * 10.0 / (1425 * pi / 30)
+        assert simulate(drive, 0.1, start="steady").final["machine.v_induced"] == pytest.approx(induced)
+        return
+    with pytest.raises(LimitPassed, match="machine has no induced voltage at its nominal point"):
+        simulate(drive, 0.1, start="steady")
+    # A constant that is given needs no nominal point.
+    simulate(
+        bench(PermanentMagnetDCMachine(V_nominal=voltage, k=-0.5), ConstantSpeed(w_fixed=10.0), 5.0),
+        0.1,
+        start="steady",
+    )

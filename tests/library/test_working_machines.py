@@ -166,6 +166,13 @@ def test_parameters_that_do_not_fit_end_the_run_with_a_sentence(part: Component,
         simulate(chain_of(motor=ConstantSpeed(w_fixed=10.0, phi=0.0), bearing=bearing), 1.0)
 
 
+def test_ratios_of_a_variable_gear_that_leave_none() -> None:
+    gear = VariableGear(u=2.0, T=0.1, ratio_min=3.0, ratio_max=1.0)
+    load = ConstantTorque(tau_constant=-1.0, phi=0.0)
+    with pytest.raises(LimitPassed, match="has its smallest ratio ratio_min above its largest ratio ratio_max"):
+        simulate(chain_of(motor=ConstantSpeed(w_fixed=10.0, phi=0.0), gear=gear, load=load), 1.0)
+
+
 def test_stages_of_a_coupling_begin_at_zero() -> None:
     with pytest.raises(LanguageError, match="the first stage begins at"):
         ElasticCoupling(stages=((0.1, 100.0),))
