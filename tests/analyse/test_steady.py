@@ -7,6 +7,7 @@ import pytest
 
 from components import (
     AngleSensor,
+    AsynchronousMachine,
     BearingFriction,
     Clutch,
     Constant,
@@ -421,3 +422,33 @@ def test_what_is_only_read_and_never_settles_has_no_value():
     found = steady(metered(wires, 1.0, **parts))
     assert (found["rotor.w"], found["shown.y"]) == pytest.approx((10.0 / LOAD, 10.0 / LOAD), rel=1e-12)
     assert all(np.isnan(found[name]) for name in ("meter.y", "count.number", "count.y"))
+
+
+def test_which_of_two_steady_states_is_stable():
+    """Kloss: s = s_k·(q ± sqrt(q² - 1)), q = tau_k/tau; small motions go with -J·dw' = dtau/ds·dw/w_s."""
+    tau_k, s_k, load, J, w_s = 100.0, 0.2, 50.0, 0.1, 50 * np.pi
+    for sign, near in ((-1, 150.0), (1, 50.0)):
+        machine = AsynchronousMachine(p=2, Jr=J, tau_k=tau_k, s_k=s_k, w=near)
+        parts = {"machine": machine, "load": ConstantTorque(tau_constant=-load)}
+        point = steady(Assembly("d", parts=parts, series={"s": list(parts)}))
+        q = tau_k / load
+        s = s_k * (q + sign * np.sqrt(q**2 - 1))
+        assert point["machine.w"] == pytest.approx(w_s * (1 - s), rel=1e-9)
+        slope = 2 * tau_k * s_k * (s_k**2 - s**2) / (s**2 + s_k**2) ** 2
+        rate = -slope / w_s / J
+        assert (rate > 0) == (sign > 0)
+        assert point.growth == pytest.approx(max(rate, 0.0), rel=1e-9)
+        told = [f"It is not stable: what departs from it grows to e times in {1 / rate:.3g} s."] if rate > 0 else []
+        assert list(point.notices) == told
+        assert all(line in str(point) for line in told)
+
+
+@pytest.mark.parametrize("damping", [0.0, 1.0])
+def test_free_rotation_and_undamped_vibration_do_not_grow(damping):
+    """Two zeros of a free rotation are known to the root of the rounding only."""
+    parts = {}
+    for k in range(12):
+        parts[f"J{k}"] = Inertia(J=0.1 * (k + 1))
+        parts[f"s{k}"] = SpringDamper(c=1e4 * (k + 1), d=damping)
+    parts["last"] = Inertia(J=1.0)
+    assert steady(Assembly("d", parts=parts, series={"s": list(parts)})).growth == 0.0

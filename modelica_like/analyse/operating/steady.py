@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.analyse.linear.held import free_motions
 from modelica_like.analyse.operating.sampling import change_with_samples, unsettled, with_samples
 from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae, Vector
@@ -17,6 +18,7 @@ from modelica_like.native.start import steady_between_ticks, steady_near
 from modelica_like.runs.trajectories import Trajectories
 from modelica_like.simulation import Model, build
 from modelica_like.solve.initialize import Point, call, holding
+from modelica_like.solve.initialize.memory import sampled
 from modelica_like.solve.initialize.slopes import Sizes, columns_of, nodes_of, slopes
 from modelica_like.upper import Shown
 
@@ -24,6 +26,10 @@ _MAX_NEWTON = 40
 _HALVINGS = 20
 _CLOSE, _CLOSE_ENOUGH = 1e-12, 1e-9
 _ENERGY_LOSS, _ENERGY_SOURCE = 1, 2
+_NO_GROWTH = 1e-6
+"""Share of the fastest motion: two zeros of a free rotation are known to the root of the rounding, 1e-8."""
+_MOST_STATES = 500
+"""Eigenvalues of more states take longer than a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +87,27 @@ class OperatingPoint(Shown, Mapping[str, float]):
         held = (self.model.held.motions[k].component for k in holding(self.model, self.point))
         return tuple(dict.fromkeys(held))
 
+    @property
+    def growth(self) -> float:
+        """Rate in 1/s at which what departs from it grows: 0 if nothing does, nan where samples or delays decide that.
+
+        Less than 1e-6 of the fastest small motion counts as 0.
+        """
+        if self.model.events.delay_parts or sampled(self.model, ()):
+            return float("nan")
+        rates, motions = slopes(self.model, self.point, "ode", columns=[]).x, free_motions(self.model, self.point)
+        values = np.linalg.eigvals(rates[motions.keep] @ motions.shape)
+        fastest = float(np.max(values.real, initial=0.0))
+        return fastest if fastest > _NO_GROWTH * np.max(np.abs(values), initial=0.0) else 0.0
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What a reader of its numbers should know; of drives with up to 500 states whether it is stable."""
+        growth = self.growth if len(self.model.states) <= _MOST_STATES else 0.0
+        return (
+            (f"It is not stable: what departs from it grows to e times in {1 / growth:.3g} s.",) if growth > 0 else ()
+        )
+
     def __str__(self) -> str:
         lines = [f"Operating point of {self.model.name}"]
         lines += [f"  {path} supplies {s:.6g} W" for path, (s, _) in self.powers.items() if s > 0]
@@ -89,6 +116,7 @@ class OperatingPoint(Shown, Mapping[str, float]):
         if np.isfinite(self.efficiency):
             lines.append(f"  efficiency {100 * self.efficiency:.4g} %")
         lines += [f"  {path} sticks" for path in self.stuck]
+        lines += [f"  {notice}" for notice in self.notices]
         return "\n".join(lines)
 
 

@@ -43,6 +43,7 @@ def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> Renderable
         parts.append(f"Efficiency {100 * point.efficiency:.4g} %.")
     if point.stuck:
         parts.append(f"Sticking: {escape(', '.join(point.stuck))}.")
+    parts += point.notices
     return Group(*parts, "", _values(point, names or model.states))
 
 
