@@ -12,6 +12,7 @@ import pytest
 
 import modelica_like
 from modelica_like import Options, WoehlerLine, build, simulate
+from modelica_like.analyse.after.spectra import LoadSpectrum
 from modelica_like.errors import FmuRefused, LanguageError, ModelicaLikeError, ValueOutOfRange
 from modelica_like.netlist import loads
 
@@ -27,6 +28,7 @@ drive = ["motor", "J1", "shaft", "J2"]
 [simulate]
 until = "0.02 s"
 """
+SPECTRUM = LoadSpectrum("shaft.tau", "N.m", np.array([2.0]), np.array([0.0]), np.array([1.0]))
 WRONG = (None, 3, float("nan"), "x", b"x", [], {}, object(), [3], {"x": object()}, print)
 """Each is given to every argument; some are right for some."""
 
@@ -121,6 +123,17 @@ Give one, such as 1.0."""),
     "no Woehler line": (ValueOutOfRange, lambda: WoehlerLine(cast(Any, "2 MPa"), 1e6, 5), """\
 WoehlerLine: amplitude = '2 MPa' is no number.
 Give one, such as 1.0."""),
+    "a Woehler line without a number of cycles": (ValueOutOfRange, lambda: WoehlerLine(1.0, float("nan"), 5.0), """\
+Amplitude, cycles and slope of a Wöhler line must be above zero, not WoehlerLine(amplitude=1.0, cycles=nan, slope=5.0, \
+below='elementary')."""),
+    "a Woehler line of no kind": (ValueOutOfRange, lambda: WoehlerLine(1.0, 1e6, 5.0, cast(Any, "haibac")), """\
+WoehlerLine: below = 'haibac' must be elementary or haibach or original."""),
+    "a Woehler line that rises": (ValueOutOfRange, lambda: WoehlerLine(1.0, 1e6, 0.4, "haibach"), """\
+Haibach's line needs a Wöhler line of slope 1 or more, not 0.4."""),
+    "no slope of an equivalent load": (ValueOutOfRange, lambda: SPECTRUM.equivalent(5.0, 0.0), """\
+Slope and cycles must be above zero, not 5 and 0."""),
+    "fewer repetitions than none": (ValueOutOfRange, lambda: SPECTRUM * -3, """\
+A load spectrum cannot be repeated -3 times."""),
     "no dictionary": (ValueOutOfRange, lambda: modelica_like.characteristic(loads(TEXT), over=cast(Any, 3)), """\
 characteristic: over = 3 is no dictionary.
 Give one, such as {"…": …}."""),

@@ -18,6 +18,7 @@ from modelica_like.style import COLOURS, picture, with_unit
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_BELOW = "elementary", "haibach", "original"
 _ON_LIMIT = 1e-9
 """Share of a class by which rounding may leave a torque below a limit, on which it counts for the class above."""
 
@@ -43,8 +44,12 @@ class WoehlerLine:
         for name in ("amplitude", "cycles", "slope"):
             if not fits(getattr(self, name), float):
                 raise wrong_kind(name, getattr(self, name), float, of="WoehlerLine: ")
-        if min(self.amplitude, self.cycles, self.slope) <= 0:
+        if not all(0 < number < np.inf for number in (self.amplitude, self.cycles, self.slope)):
             raise ValueOutOfRange(f"Amplitude, cycles and slope of a Wöhler line must be above zero, not {self}.")
+        if self.below not in _BELOW:
+            raise ValueOutOfRange(f"WoehlerLine: below = '{self.below}' must be {' or '.join(_BELOW)}.")
+        if self.below == "haibach" and self.slope < 1:
+            raise ValueOutOfRange(f"Haibach's line needs a Wöhler line of slope 1 or more, not {self.slope:g}.")
 
     def life(self, amplitudes: Any) -> Vector:
         """Return the cycles to failure at amplitudes, of their shape; infinite where there is no damage."""
@@ -77,7 +82,13 @@ class LoadSpectrum:
     counts: Vector = field(repr=False)
 
     def __mul__(self, times: float) -> LoadSpectrum:
-        """Return the spectrum of so many repetitions."""
+        """Return the spectrum of so many repetitions.
+
+        Raises:
+            ValueOutOfRange: there are fewer than none.
+        """
+        if not 0 <= times < np.inf:
+            raise ValueOutOfRange(f"A load spectrum cannot be repeated {times:g} times.")
         return LoadSpectrum(self.name, self.unit, self.amplitudes, self.means, self.counts * times)
 
     def damage(self, line: WoehlerLine, mean_sensitivity: float = 0.0) -> float:
@@ -90,7 +101,13 @@ class LoadSpectrum:
         return line.damage(np.maximum(self.amplitudes + mean_sensitivity * self.means, 0.0), self.counts)
 
     def equivalent(self, slope: float, cycles: float) -> float:
-        """Return the amplitude that does the same damage in so many cycles."""
+        """Return the amplitude that does the same damage in so many cycles.
+
+        Raises:
+            ValueOutOfRange: slope or cycles are not above zero.
+        """
+        if not (0 < slope < np.inf and 0 < cycles < np.inf):
+            raise ValueOutOfRange(f"Slope and cycles must be above zero, not {slope:g} and {cycles:g}.")
         return float((np.sum(self.counts * self.amplitudes**slope) / cycles) ** (1 / slope))
 
     def plot(self) -> Figure:
