@@ -7,6 +7,8 @@ import pytest
 from calls import called
 
 from components import (
+    PI,
+    Battery,
     Brake,
     Clutch,
     Constant,
@@ -14,16 +16,20 @@ from components import (
     ConstantSpeed,
     ConstantTorque,
     Fixed,
+    Gearbox,
     IdealGear,
     Inertia,
     Mass,
+    PermanentMagnetDCMachine,
     Ramp,
     Sine,
     Spring,
+    TimingBelt,
     Torque,
+    WormGear,
 )
 from modelica_like import load, simulate
-from modelica_like.language import Assembly, Equations, Variable, var
+from modelica_like.language import Assembly, Component, Equations, Variable, var
 from modelica_like.show.report.plausible import drive_notes, run_notes
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -159,3 +165,31 @@ def test_commands_tell_them_and_go_on() -> None:
     assert "clutch_large, clutch_carrier and brake_carrier never engage: their inputs are 0" in told.stderr
     told = called(["check", str(EXAMPLES / "components" / "position_cascade.toml")])
     assert "Nothing reads total.y" in told.stderr
+
+
+def test_a_value_without_effect_is_noticed() -> None:
+    """Half of a pair, what another value replaces, what a choice leaves out; zeros and defaults are none."""
+    cells = {"ocv": ((0.0, 3.0), (1.0, 4.0)), "Q": "1 A.h"}
+    cases: list[tuple[Component, list[str]]] = [
+        (Battery(**cells, R_1=0.5), ["R_1"]),
+        (Battery(**cells, C_1=0.5), ["C_1"]),
+        (Battery(**cells, R_1=0.5, C_1=10.0), []),
+        (PI(k=1.0, Ti=1.0, y_min=0.0), []),
+        (PI(k=1.0, Ti=1.0, y_min=-1.0), ["y_min"]),
+        (PI(k=1.0, Ti=1.0, y_max=1.0, y_min=-1.0), []),
+        (Clutch(capacity=10.0, fn_max=5.0), ["fn_max"]),
+        (Gearbox(ratio=2.0, c=1e4, d=1.0, has_backlash=False, b=0.1), ["b"]),
+        (Gearbox(ratio=2.0, c=1e4, d=1.0, b=0.1), []),
+        (TimingBelt(r_a=0.1, r_b=0.1, c=1e5, d=10.0, wrap_angle=2.5), ["wrap_angle"]),
+        (WormGear(z_1=2, z_2=40, gamma=0.3, mu=0.05), []),  # z_2/z_1 is the ratio, by default
+        (WormGear(z_2=40, ratio=40, gamma=0.3, mu=0.05), ["z_2"]),
+        (PermanentMagnetDCMachine(k=0.1, quasi_static=True, La=0.0), []),
+        (PermanentMagnetDCMachine(k=0.1, quasi_static=True, La=0.1), ["La"]),
+    ]
+    for part, names in cases:
+        drive = Assembly("drive", parts={"part": part})
+        told = [note for note in drive_notes(drive) if "no effect" in note]
+        assert told == [f"part.{name} has no effect: with what else is given nothing reads it." for name in names]
+    inner = Assembly("inner", parts={"part": Battery(**cells, R_1=0.5)})
+    (told,) = (note for note in drive_notes(Assembly("drive", parts={"inner": inner})) if "no effect" in note)
+    assert told.startswith("inner.part.R_1 has no effect")

@@ -9,6 +9,8 @@ import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import MissingValue, ModelicaLikeError
+from modelica_like.flatten.template import template_of
+from modelica_like.language.assembly import Assembly
 from modelica_like.language.component import Component
 from modelica_like.language.fields import Input, Output, Parameter
 from modelica_like.language.inside import inside
@@ -35,13 +37,13 @@ _HERTZ = parse_unit("Hz")
 def drive_notes(drive: Component) -> list[str]:
     """Return notes about probable mistakes in a drive, before a run.
 
-    Neighbours whose inertias, masses or stiffnesses are four decades apart, and unused signals.
+    Neighbours whose inertias, masses or stiffnesses are four decades apart, unused signals, and values without effect.
 
     Args:
         drive: the drive.
     """
     drawn = diagram(drive, 0)
-    return [*_neighbours(drawn), *_unread(drawn)]
+    return [*_neighbours(drawn), *_unread(drawn), *_without_effect(drive)]
 
 
 def run_notes(drive: Component, run: Solution, *, energy: bool = True) -> list[str]:
@@ -125,6 +127,40 @@ def _unread(drawn: Diagram) -> Iterator[str]:
         outputs = [name for name, field in part.fields.items() if isinstance(field, Output)]
         if outputs and not any(name in node.ports for name in outputs):
             yield f"Nothing reads {node.name}.{outputs[0]}: connect it, or leave {node.name} out."
+
+
+def _without_effect(drive: Component) -> Iterator[str]:
+    """Values that somebody gave to a part, and that no equation, event, energy or formula reads."""
+    parts = [part for part in drive.walk() if part is not drive and _wired_here(part, drive)]
+    unread = [(part, name) for part in parts for name in _not_in_equations(part)]
+    if unread:
+        named = {path.rpartition(".")[2] for part in drive.walk() for path in _named_in_formulas(part)}
+        for part, name in unread:
+            if name not in named:
+                yield f"{part.path}.{name} has no effect: with what else is given nothing reads it."
+
+
+def _wired_here(part: Component, drive: Component) -> bool:
+    owner = inside(part).owner
+    return owner is drive or isinstance(owner, Assembly)
+
+
+def _not_in_equations(part: Component) -> Iterator[str]:
+    values = inside(part).values
+    # A zero has no effect on purpose.
+    given = [name for name in values if isinstance(part.fields.get(name), Parameter) and values[name].number != 0]
+    if given:
+        read = template_of(part).parameters
+        yield from (name for name in given if name not in read)
+
+
+def _named_in_formulas(part: Component) -> Iterator[str]:
+    record = inside(part)
+    own = record.values.keys() | record.starts.keys()
+    defaults = (f.read(f.default) for name, f in part.fields.items() if isinstance(f.default, str) and name not in own)
+    for value in (*record.values.values(), *record.starts.values(), *defaults):
+        if value.formula is not None:
+            yield from value.formula.names()
 
 
 def _input(drive: Component, hold: HeldMotion) -> str | None:
