@@ -13,6 +13,7 @@ from modelica_like.language import (
     Events,
     Expr,
     Input,
+    LanguageError,
     Mode,
     Output,
     Parameter,
@@ -150,6 +151,10 @@ class Controller(Component, partial=True):
     def equations(self) -> Equations:
         free = self.free_output()
         limited = self.given("y_max")
+        if self.given("y_min") and not limited:
+            raise LanguageError(
+                f"{self.label} has a y_min, but no y_max.", advice="Give y_max, too, or leave y_min out."
+            )
         yield self.y == (self.limit.choose(free=free, high=self.y_max, low=self.lowest) if limited else free)
 
     def events(self) -> Events:

@@ -32,8 +32,8 @@ class KinematicPTP2(Component):
     icon = icons.PATH
     q_begin: Parameter = param("*", "position at the start", default=0.0)
     q_end: Parameter = param("*", "position at the end")
-    qd_max: Parameter = param("*", "largest speed")
-    qdd_max: Parameter = param("*", "largest acceleration")
+    qd_max: Parameter = param("*", "largest speed", min=1e-30)
+    qdd_max: Parameter = param("*", "largest acceleration", min=1e-30)
     start_time: Parameter = param("s", "start of the motion", default=0.0)
     q: Output = signal_out("*", "position")
     qd: Output = signal_out("*", "speed")

@@ -10,6 +10,7 @@ from modelica_like.language import (
     Equations,
     Events,
     Expr,
+    LanguageError,
     Mode,
     Parameter,
     Variable,
@@ -55,6 +56,12 @@ class Battery(Tabulated, Lossy, TwoPins):
 
     def equations(self) -> Equations:
         yield from super().equations()
+        if self.given("R_1") != self.given("C_1"):
+            there, missing = ("R_1", "C_1") if self.given("R_1") else ("C_1", "R_1")
+            raise LanguageError(
+                f"{self.label} has {there}, but no {missing}.",
+                advice=f"Give both, for resistance that acts with a delay, or leave {there} out.",
+            )
         yield self.i_cell == self.i / self.N_p
         yield self.Q * der(self.soc) == self.i_cell
         yield self.v_cell == self.v_scale * self.look_up(self.soc, self.ocv)

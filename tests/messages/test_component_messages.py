@@ -10,6 +10,8 @@ import pytest
 
 import modelica_like.errors as errors
 from components import (
+    PI,
+    Battery,
     BearingFriction,
     Clutch,
     ClutchActuator,
@@ -498,6 +500,24 @@ case(
 clutch is of type Inertia and has no 'f_normalized', which its owner uses.
   in test_component_messages.py:{pressed} `self.clutch.f_normalized`
 A part that takes the place of another needs its connectors and signals.""",
+)
+
+
+case(
+    errors.LanguageError,
+    "a controller with one limit",
+    lambda: flatten(Assembly("d", parts={"speed": PI(k=1.0, Ti=1.0, u_s=0.0, u_m=0.0, y_min=-1.0)})),
+    """\
+speed has a y_min, but no y_max.
+Give y_max, too, or leave y_min out.""",
+)
+case(
+    errors.LanguageError,
+    "half of what acts with a delay",
+    lambda: flatten(Assembly("d", parts={"cells": Battery(ocv=((0.0, 3.0),), Q=1.0, R_1=0.5)})),
+    """\
+cells has R_1, but no C_1.
+Give both, for resistance that acts with a delay, or leave R_1 out.""",
 )
 
 
