@@ -7,6 +7,7 @@ from components.clutches.actuators import ElectromagneticActuator
 from components.clutches.friction import Brake
 from components.electrical.analog import Pin
 from components.interfaces import Flange, LinearCompliantWithRelativeStates
+from components.tabulated import ROUNDING
 from components.thermal import Lossy
 from components.translational.wheels import RotationToTranslation
 from modelica_like.language import (
@@ -18,6 +19,7 @@ from modelica_like.language import (
     Output,
     Parameter,
     Variable,
+    all_of,
     connect,
     der,
     maximum,
@@ -31,7 +33,8 @@ class WinchDrum(RotationToTranslation):
     """Drum of a winch with a rope that hangs down; positive turns haul it up: s = radius·phi.
 
     The rope's length on the drum and below it moves at one velocity, so it counts with its whole mass rho·length, while
-    only what hangs, hanging - s, weighs. The rope is inextensible; a `Rope` below makes it elastic and slack.
+    only what hangs, hanging - s, weighs. The report of a run tells where that is below zero or more than there is. The
+    rope is inextensible; a `Rope` below makes it elastic and slack.
     """
 
     icon = icons.DRUM
@@ -42,12 +45,20 @@ class WinchDrum(RotationToTranslation):
     g: Parameter = param("m/s2", "gravity", default=9.80665)
     s: Variable = var("m", "way of the rope's end, upwards")
     v: Variable = var("m/s", "velocity of the rope")
+    rope = Mode(
+        "hanging", "hauled", "gone", description="whether the end of a rope with mass always hung from the drum"
+    )
+
+    @property
+    def below(self) -> Expr:
+        """Length that hangs below the drum."""
+        return maximum(self.hanging - self.s, 0)
 
     def travel(self) -> Expr:
         return self.radius
 
     def pull(self) -> Expr:
-        weight = self.rho * self.g * (self.hanging - self.s)
+        weight = self.rho * self.g * self.below
         return self.flange_t.f - weight - self.rho * self.length * der(self.v)
 
     def equations(self) -> Equations:
@@ -57,7 +68,14 @@ class WinchDrum(RotationToTranslation):
 
     def stored_energy(self) -> Expr:
         rope = 0.5 * self.rho * self.length * self.v**2
-        return rope - 0.5 * self.rho * self.g * (self.hanging - self.s) ** 2
+        return rope - 0.5 * self.rho * self.g * self.below**2
+
+    def events(self) -> Events:
+        yield from super().events()
+        heavy, slack = self.rho > 0, ROUNDING * self.length
+        hauled, gone = self.s > self.hanging + slack, self.hanging - self.s > self.length + slack
+        yield self.rope.go("hanging", "hauled", when=all_of(heavy, hauled), notice="has hauled in all of its rope")
+        yield self.rope.go("hanging", "gone", when=all_of(heavy, gone), notice="has let out more rope than it has")
 
 
 class Rope(Lossy, LinearCompliantWithRelativeStates):
