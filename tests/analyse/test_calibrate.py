@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from components import ConstantTorque, Damper, Fixed, Inertia
+from components import ConstantTorque, Damper, Fixed, HeatSource, Inertia, ThermalMass
 from modelica_like import build
 from modelica_like.analyse.calibration.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
 from modelica_like.analyse.calibration.measurements import read_table
@@ -145,6 +145,46 @@ def test_many_starts_find_the_same(braked):
 def test_a_bound_that_stops_it_is_told(braked):
     found = calibrate(braked, Numbers({"mass.w": SPEEDS[4]}, until=3.0), {"damper.d": (1.0, 3.0)})
     assert found.at_bounds == ("damper.d",)
+
+
+def test_a_parameter_that_is_zero_is_determined(braked):
+    """Without damping w = 2 t/J: data tell that d is zero, though no relative change of it changes anything."""
+    data = Trajectories({"time": TIMES, "mass.w": 2.0 * TIMES / 0.8})
+    found = calibrate(braked, data, {"mass.J": (0.1, 5.0), "damper.d": (0.0, 3.0)})
+    assert found.identifiable
+    assert found["damper.d"] == pytest.approx(0.0, abs=1e-6)
+    assert np.all(found.confidence < 1e-4)
+
+
+def test_as_many_numbers_as_parameters_have_the_interval_of_their_uncertainty(braked):
+    """There is no scatter: w = 4 (1 - exp(-t d/J)) with d = 0.5 known; J is off by 1.96 sigma / |dw/dJ|."""
+    time, sigma = 0.7, 0.01
+    measured = Numbers({"mass.w": 4 * (1 - np.exp(-0.5 * time / 0.8))}, {"mass.w": sigma}, time, {"damper.d": 0.5})
+    found = calibrate(braked, measured, {"mass.J": (0.1, 5.0)})
+    slope = 4 * np.exp(-0.5 * time / 0.8) * 0.5 * time / 0.8**2
+    assert found.confidence == pytest.approx(1.959964 * sigma / slope, rel=1e-5)
+
+
+class Warm(Component):
+    """A body without losses: T = 300 K + Q t / C."""
+
+    def build(self) -> None:
+        self.source = HeatSource(Q_flow=100.0)
+        self.body = ThermalMass(C=50.0, T=300.0)
+
+    def equations(self) -> Equations:
+        yield connect(self.source.port, self.body.port)
+
+
+def test_an_uncertainty_of_a_temperature_is_a_difference():
+    """Two readings that contradict each other by 10 K: the more certain one counts four times as much."""
+    temperature, wanted = 300.0 + 100.0 * 2.0 / 40.0, {"body.T": 300.0 + 100.0 * 2.0 / 40.0}
+    data = [
+        Numbers(wanted, {"body.T": "1 degC"}, 2.0),
+        Numbers({"body.T": f"{temperature - 273.15 + 10.0} degC"}, {"body.T": "2 K"}, 2.0),
+    ]
+    found = calibrate(build(Warm()), data, {"body.C": (10.0, 100.0)})
+    assert 200.0 / found["body.C"] == pytest.approx(200.0 / 40.0 + 10.0 / 5.0, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -149,6 +149,23 @@ State it, e.g. uncertainty={"mass.w": …}."""),
 Measured trajectories need a column 'time'."""),
     "columns of different length": (ValueOutOfRange, lambda: read_table({"time": [1.0], "mass.w": [1.0, 2.0]}), """\
 Measured columns must have the same length, and at least one row."""),
+    "two columns of one name": (DuplicateName, lambda: read_table({"mass.w [rpm]": [1.0], "mass.w [rad/s]": [1.0]}), """\
+Two columns are called 'mass.w'.
+Rename one of them."""),
+    "a column of words": (ValueOutOfRange, lambda: read_table({"time": [1.0], "mass.w": ["fast"]}), """\
+The column 'mass.w' is no list of numbers."""),
+    "a gap": (ValueOutOfRange, lambda: fitted(Trajectories({"time": [1.0, 2.0], "mass.w": [1.0, float("nan")]})), """\
+mass.w in row 2 is nan, no finite number.
+Leave the row out; variables with gaps at other times are measurements of their own."""),
+    "nothing is measured": (ValueOutOfRange, lambda: fitted(OperatingPoints({"torque.tau_constant": [1.0]}, given=["torque.tau_constant"])), """\
+A measurement has nothing that is measured."""),
+    "no such column is given": (UnknownName, lambda: fitted(OperatingPoints({"torque.tau_constant": [1.0], "mass.w": [1.0]}, given=["torque.tau"])), """\
+The table of operating points has no column 'torque.tau'; did you mean 'torque.tau_constant'?"""),
+    "an uncertainty of nothing": (UnknownName, lambda: fitted(Numbers({"mass.w": 1.0}, uncertainty={"mas.w": 0.1}, until=1.0)), """\
+The uncertainty of 'mas.w' belongs to nothing measured; did you mean 'mass.w'?"""),
+    "a measurement sets what is to be found": (ValueOutOfRange, lambda: fitted(Numbers({"mass.w": 1.0}, until=1.0, parameters={"mass.J": 2.0})), """\
+mass.J is to be found, and a measurement sets it.
+Leave it out at one of the two places."""),
     "a column that does not exist": (UnknownName, lambda: fitted(Trajectories({"time": [1.0], "mass.v": [1.0]})), """\
 Accelerated has no variable or parameter 'mass.v'; did you mean 'mass.w'?"""),
     "a model that cannot be computed": (CalibrationFailed, lambda: fitted(OperatingPoints({"torque.tau_constant": [1.0], "mass.w": [1.0]}, given=["torque.tau_constant"])), """\

@@ -30,6 +30,8 @@ Matrix = np.ndarray[Any, np.dtype[np.float64]]
 _RANK = 1e-8
 """Relative size of a singular value below which the data do not determine a combination of parameters."""
 _CONFIDENCE = 0.95
+_SMALL = 1e-4
+"""Of the bounds' distance: a parameter nearer to zero has no relative change that could say what data determine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,8 @@ class Calibration:
         covariance: of the values, shape (parameters, parameters), scaled to the scatter of the residuals (with no more
             numbers than parameters, by the stated uncertainties); nan for undetermined parameters.
         rank: number of combinations of parameters that the data determine.
-        undetermined: combinations that the data do not determine, as weights of relative changes, by parameter.
+        undetermined: combinations that the data do not determine, as weights of relative changes, by parameter (near
+            zero, of changes relative to 1e-4 of the distance of the bounds).
         at_bounds: parameters that stopped at a bound.
         starts: sum of squares reached from each start.
     """
@@ -80,10 +83,13 @@ class Calibration:
 
     @property
     def confidence(self) -> Matrix:
-        """Half widths of the 95 % intervals of the values (Student's t), shape (parameters,)."""
+        """Half widths of the 95 % intervals of the values, shape (parameters,).
+
+        They are those of Student's t; of the normal distribution where only the stated uncertainties count.
+        """
         from scipy.stats import t
 
-        freedom = max(len(self.residuals) - self.rank, 1)
+        freedom = len(self.residuals) - self.rank or np.inf
         return np.sqrt(np.diag(self.covariance)) * float(t.ppf(0.5 + _CONFIDENCE / 2, freedom))
 
     @property
@@ -126,7 +132,7 @@ def calibrate(
 
     Raises:
         UnknownName: a name is not known.
-        ValueOutOfRange: there are no data, or bounds are not in order.
+        ValueOutOfRange: there are no data, they set what is to be found, or bounds are not in order.
         CalibrationFailed: the model could not be solved from any start.
         MissingExtra: scipy is not installed.
     """
@@ -141,6 +147,7 @@ def calibrate(
                 advice='Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the '
                 "uncertainties.",
             )
+        item.check([*parameters])
     problem = _Problem(model, measured, parameters)
     begins = problem.starts(guess or {}, starts, seed)
     results: list[Any] = []
@@ -217,7 +224,7 @@ class _Problem:
         """Compute covariance and rank at the solution."""
         residuals, slopes = self.evaluate(fit.x)
         values = self.low + self.span * fit.x
-        sizes = np.where(values == 0.0, self.span, np.abs(values))
+        sizes = np.maximum(np.abs(values), _SMALL * self.span)
         relative = slopes / self.span * sizes
         _, singular, right = np.linalg.svd(relative, full_matrices=True)
         padded = np.concatenate([singular, np.zeros(len(self.names) - len(singular))])

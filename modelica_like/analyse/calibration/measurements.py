@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from modelica_like.analyse.operating.steady import OperatingPoint, steady, steady_slopes
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import DuplicateName, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import Unit, parse_unit, to_si
 from modelica_like.runs.measured import read_columns, title_and_unit
 from modelica_like.runs.readings import read_output
@@ -29,6 +29,14 @@ Residuals = tuple[Matrix, Matrix, list[str]]
 
 class Measurement(ABC):
     """Data for a comparison with a model."""
+
+    @abstractmethod
+    def check(self, names: Sequence[str]) -> None:
+        """Refuse what contradicts itself, before the first run of a search for the parameters `names`.
+
+        Raises:
+            UnknownName, ValueOutOfRange: a name fits nothing, or the measurement sets what is to be found.
+        """
 
     @abstractmethod
     def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
@@ -51,14 +59,16 @@ class Numbers(Measurement):
     until: float | str | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
+    def check(self, names: Sequence[str]) -> None:
+        """Refuse uncertainties of what is not measured, and parameters that are to be found."""
+        _check(names, self.parameters, self.values, self.uncertainty)
+
     def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
         """Run the model with its sensitivities."""
         outputs = [read_output(model, name) for name in self.values]
         wanted = np.array([to_si(v, o.unit, o.name) for v, o in zip(self.values.values(), outputs, strict=True)])
-        pairs = zip(outputs, wanted, strict=True)
-        sizes = np.array(
-            [_uncertainty(self.uncertainty, quantity.name, quantity.unit, value) for quantity, value in pairs]
-        )
+        named = zip(self.values, outputs, wanted, strict=True)
+        sizes = np.array([_uncertainty(self.uncertainty, name, output.unit, value) for name, output, value in named])
         run = quick_run(model, until=self.until, parameters=self.parameters, readings=[*self.values])
         sensitivity = sensitivities(run, list(self.values), names)
         now = np.array([output.value for output in sensitivity.outputs])
@@ -79,6 +89,14 @@ class OperatingPoints(Measurement):
     table: Any
     given: Sequence[str]
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
+
+    def check(self, names: Sequence[str]) -> None:
+        """Refuse columns that are not there, and given ones that are to be found."""
+        columns = read_table(self.table)
+        for name in self.given:
+            if name not in columns:
+                raise UnknownName(f"The table of operating points has no column '{name}'{_hint(name, columns)}")
+        _check(names, self.given, [name for name in columns if name not in self.given], self.uncertainty)
 
     def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
         """Find the steady state of every row, each starting from the one before."""
@@ -111,12 +129,17 @@ class Trajectories(Measurement):
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
+    def check(self, names: Sequence[str]) -> None:
+        """Refuse a table without times, uncertainties of what is not measured, and parameters that are to be found."""
+        columns = read_table(self.table)
+        if "time" not in columns:
+            raise UnknownName("Measured trajectories need a column 'time'.")
+        _check(names, self.parameters, [name for name in columns if name != "time"], self.uncertainty)
+
     def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
         """Run the model with the sensitivities of every number."""
         table = read_table(self.table)
         columns = _in_si(model, table)
-        if "time" not in columns:
-            raise UnknownName("Measured trajectories need a column 'time'.")
         times = columns.pop("time")
         sizes = [_of_column(model, self.uncertainty, name, columns[name]) for name in columns]
         run = quick_run(model, until=float(times.max()), parameters=self.parameters)
@@ -138,15 +161,24 @@ def read_table(table: Any) -> Columns:
 
     Raises:
         NetlistError: a file is not a table of numbers.
-        ValueOutOfRange: columns differ in length, or there are none.
+        DuplicateName: two columns have one name.
+        ValueOutOfRange: columns are no numbers, differ in length, or there are none.
     """
     if isinstance(table, str | Path):
         return dict(read_columns(Path(table)))
     columns: Columns = {}
     for title in getattr(table, "variables", None) or table:
         name, unit = title_and_unit(str(title))
+        if name in columns:
+            raise DuplicateName(f"Two columns are called '{name}'.", advice="Rename one of them.")
         values = table[title]
-        columns[name] = np.asarray(values, float).ravel(), unit or getattr(values, "attrs", {}).get("units", "")
+        try:
+            numbers = np.atleast_1d(np.asarray(values, float))
+        except (TypeError, ValueError):
+            numbers = np.empty((0, 0))
+        if numbers.ndim != 1:
+            raise ValueOutOfRange(f"The column '{title}' is no list of numbers.")
+        columns[name] = numbers, unit or getattr(values, "attrs", {}).get("units", "")
     lengths = {len(values) for values, _ in columns.values()}
     if len(lengths) != 1 or 0 in lengths:
         raise ValueOutOfRange("Measured columns must have the same length, and at least one row.")
@@ -157,6 +189,10 @@ def _in_si(model: CompiledDae, columns: Columns) -> dict[str, Matrix]:
     values: dict[str, Matrix] = {}
     for name, (numbers, unit) in columns.items():
         si_unit = _SECOND if name == "time" else _unit(model, name)
+        if not np.isfinite(numbers).all():
+            row = int(np.argmin(np.isfinite(numbers))) + 1
+            advice = "Leave the row out; variables with gaps at other times are measurements of their own."
+            raise ValueOutOfRange(f"{name} in row {row} is {numbers[row - 1]:g}, no finite number.", advice=advice)
         values[name] = np.array(
             [to_si(f"{n!r} {unit}" if unit else float(n), si_unit, name) for n in map(float, numbers)]
         )
@@ -165,9 +201,26 @@ def _in_si(model: CompiledDae, columns: Columns) -> dict[str, Matrix]:
 
 def _unit(model: CompiledDae, name: str) -> Unit:
     if name not in model.units:
-        near = did_you_mean(name, model.units)
-        raise UnknownName(f"{model.name} has no variable or parameter '{name}'{near or '.'}")
+        raise UnknownName(f"{model.name} has no variable or parameter '{name}'{_hint(name, model.units)}")
     return model.units[name]
+
+
+def _hint(name: str, known: Iterable[str]) -> str:
+    return did_you_mean(name, known) or "."
+
+
+def _check(names: Sequence[str], given: Iterable[str], measured: Collection[str], stated: Iterable[str]) -> None:
+    """Check what a measurement sets, measures and states uncertainties of."""
+    if not measured:
+        raise ValueOutOfRange("A measurement has nothing that is measured.")
+    for name in given:
+        if name in names:
+            raise ValueOutOfRange(
+                f"{name} is to be found, and a measurement sets it.", advice="Leave it out at one of the two places."
+            )
+    for name in stated:
+        if name not in measured:
+            raise UnknownName(f"The uncertainty of '{name}' belongs to nothing measured{_hint(name, measured)}")
 
 
 def _of_column(model: CompiledDae, stated: Mapping[str, Any], name: str, values: Matrix) -> float:
@@ -175,7 +228,7 @@ def _of_column(model: CompiledDae, stated: Mapping[str, Any], name: str, values:
 
 
 def _uncertainty(stated: Mapping[str, Any], name: str, unit: Unit, value: float) -> float:
-    size = to_si(stated[name], unit, name) if name in stated else 0.01 * abs(value)
+    size = to_si(stated[name], unit, name, difference=True) if name in stated else 0.01 * abs(value)
     if not size > 0:
         raise ValueOutOfRange(
             f"{name}: the uncertainty of a measurement must be positive, not {size:g}.",

@@ -44,13 +44,14 @@ def read_quantity(text: str) -> tuple[float, Unit] | None:
     return float(number), parse_unit(unit)
 
 
-def to_si(value: object, unit: Unit, name: str) -> float:
+def to_si(value: object, unit: Unit, name: str, *, difference: bool = False) -> float:
     """Return the value of a parameter or variable in coherent SI units.
 
     Args:
         value: a number in `unit`, a text such as `"8.5 kg.cm2"`, or a `pint.Quantity`.
         unit: the declared unit.
         name: the declared name, such as `Inertia.J`, for messages.
+        difference: whether it is one of two values, as an uncertainty: 1 degC is 1 K then.
 
     Raises:
         UnitError: the value has another dimension, or is not a quantity.
@@ -62,7 +63,7 @@ def to_si(value: object, unit: Unit, name: str) -> float:
     if counts_turns(given, unit):
         raise UnitError(f"{name} expects {unit}; '{value}' does not say whether it counts turns or radians.",
                         advice="Write rpm or rad/s for a speed, Hz for a frequency.")  # fmt: skip
-    result = number * given.factor + given.offset
+    result = number * given.factor + (0.0 if difference else given.offset)
     if not math.isfinite(result):
         raise ValueOutOfRange(f"{name} must be a finite number, not {value}.")
     return result
