@@ -17,11 +17,12 @@ import numpy as np
 import pytest
 from two_masses import J1, J2, M, closed_form
 
-from modelica_like import Trajectories
+from modelica_like import Trajectories, export_fmu
 from modelica_like.errors import FmuCrashed, FmuFailed, FmuTimeout, StepFailed
 from modelica_like.fmi.cosimulation.run import cosim
 from modelica_like.fmi.cosimulation.split import Split, split
 from modelica_like.fmi.cosimulation.system import System
+from modelica_like.netlist import loads
 
 MASTERS = pytest.mark.parametrize("master", ["jacobi", "gauss-seidel"])
 SIGNALS = ("J2.w", "shaft.tau")
@@ -216,3 +217,27 @@ def wait_for(condition: Callable[[], Any], seconds: float = 20.0) -> Any:
         assert time.monotonic() < end
         time.sleep(0.05)
     return found
+
+
+SOURCE = '[parts]\nwave = { is = "Sine", amplitude = "2 N.m", f = "1 Hz" }\n'
+WHEEL = '[parts]\nmotor = { is = "Torque" }\nwheel = { is = "Inertia", J = "2 kg.m2", phi = 0, w = 0 }\n'
+
+
+@MASTERS
+@pytest.mark.parametrize("order", [("wave", "wheel"), ("wheel", "wave")])
+def test_a_variable_step_watches_what_drives_nothing(tmp_path: Path, master: str, order: tuple[str, str]) -> None:
+    """The torque is exact at every communication point; w = (1 - cos(2 pi t)) / (2 pi) integrates what is between."""
+    for name, text in (("wave", SOURCE), ("wheel", WHEEL + '[series]\nshaft = ["motor", "wheel"]\n')):
+        export_fmu(loads(text + '[simulate]\nuntil = "1 s"\n'), tmp_path / f"{name}.fmu", check=False)
+    fmus = "".join(f'{name} = "{name}.fmu"\n' for name in order)
+    connect = '[connect]\ntorque = ["wave.wave.y", "wheel.motor.tau"]\n'
+    (tmp_path / "system.toml").write_text(f"[fmus]\n{fmus}{connect}")
+
+    def wrong(tolerance: float) -> float:
+        run = cosim(tmp_path / "system.toml", "1 s", tolerance=tolerance, master=master)
+        truth = (1 - np.cos(2 * np.pi * run.time)) / (2 * np.pi)
+        return float(np.abs(run["wheel.wheel.w"] - truth).max() * np.pi)
+
+    # Errors of steps add up: a hundred of them, of 1e-5 each, are 1e-3. They fall like tolerance^(2/3).
+    assert wrong(1e-5) < 1e-3
+    assert wrong(1e-6) < wrong(1e-5) / 3

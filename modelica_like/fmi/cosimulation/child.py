@@ -104,8 +104,24 @@ def connect(slaves: list[Slave], job: dict[str, Any]) -> Master:
         (n, name), *targets = link["ends"]
         nominal = getattr(slaves[n].all[name], "nominal", None)
         signals.append(Signal((n, name), [(m, other) for m, other in targets], float(nominal or 1.0)))
+    if job["tolerance"] is not None:
+        signals += results_of(slaves, signals)
     balances = [Balance(bond["flow"], bond["rate"], bond["name"]) for bond in job["bonds"]]
     return Master(slaves, signals, balances, job["master"] == "gauss-seidel", job["inputs"] == "linear")
+
+
+def results_of(slaves: list[Slave], signals: list[Signal]) -> list[Signal]:
+    """Return states and outputs that drive nothing, of FMUs that are driven: a variable step keeps their errors small.
+
+    The values that FMUs exchange can be exact at communication points (a source, a gain), and say nothing of them.
+    """
+    sources, driven = {signal.source for signal in signals}, {n for signal in signals for n, _ in signal.targets}
+    return [
+        Signal((n, name), [], float(getattr(slaves[n].all[name], "nominal", None) or 1.0))
+        for n in sorted(driven)
+        for name in slaves[n].results
+        if (n, name) not in sources
+    ]
 
 
 def start(slaves: list[Slave], master: Master, job: dict[str, Any]) -> None:

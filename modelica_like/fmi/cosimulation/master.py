@@ -121,7 +121,7 @@ class Master:
 
     Attributes:
         slaves: in the order of a Gauss-Seidel master.
-        signals: the connections.
+        signals: the connections, and what else a variable step watches, without targets.
         balances: energies at the bonds.
         sequential: Gauss-Seidel instead of Jacobi.
         linear: inputs are interpolated linearly if FMUs support it.

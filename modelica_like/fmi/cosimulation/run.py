@@ -68,7 +68,7 @@ def cosim(
         step: communication step, likewise; by default that of the system, or a thousandth of the run.
         master: `jacobi` or `gauss-seidel`.
         inputs: `linear` (FMUs get the slopes of their inputs if they support it) or `hold`.
-        tolerance: relative tolerance of the signals between FMUs, for a variable step.
+        tolerance: relative, for a variable step: of what FMUs exchange, and of states and outputs of driven FMUs.
         parameters: start values and parameters, by the FMU's name and the variable's: `motor.J1.J`.
         fmu_tolerance: relative tolerance inside the FMUs; by default their own, or a tenth of `tolerance`.
         outputs: names or patterns (`load.*`) of variables to record; by default all that are not parameters.

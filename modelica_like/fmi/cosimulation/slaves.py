@@ -29,6 +29,7 @@ class Slave:
 
     Attributes:
         variables: FMPy's descriptions of the scalar variables by name, without parameters.
+        results: names of its continuous outputs and of its states.
         slopes: whether it takes the slopes of its inputs.
         can_save: whether its state can be saved and restored (`save`, `load`, `free`) and its steps may vary.
     """
@@ -45,6 +46,12 @@ class Slave:
         variables = (v for v in self.description.modelVariables if v.type in _STORED and not v.shape)
         self.all = {v.name: v for v in variables if v.causality != "independent"}
         self.variables = {n: v for n, v in self.all.items() if "arameter" not in (v.causality or "")}
+        states = {v.derivative.name for v in self.all.values() if v.derivative is not None}
+        self.results = [
+            name
+            for name, v in self.variables.items()
+            if v.type in REAL and v.variability in (None, "continuous") and (v.causality == "output" or name in states)
+        ]
         self.slopes = second and bool(about.canInterpolateInputs)
         self.can_save = bool(about.canGetAndSetFMUstate and about.canHandleVariableCommunicationStepSize)
         self._fmu: Any = instantiate_fmu(
