@@ -93,10 +93,10 @@ def compare(
     """Compare two trajectories of one system: the largest deviation of each signal, the times of the events.
 
     Signals are compared by name, at common times; with few common times, the second side is interpolated, and the
-    report says so. Mode changes are paired by mode and new mode; between the two times of a pair, nothing is compared.
-    A signal's range is its largest minus its smallest value in A, at least a millionth of the largest value of its
-    unit. `--set` sets a value in both, where they are netlists or FMUs. The picture has the signals that deviate most,
-    or those chosen.
+    report says so. Signals with other units are left out and named. Mode changes are paired by mode and new mode;
+    between the two times of a pair, nothing is compared. A signal's range is its largest minus its smallest value in A,
+    at least a millionth of the largest value of its unit. `--set` sets a value in both, where they are netlists or
+    FMUs. The picture has the signals that deviate most, or those chosen.
     """
     with told(debug, json=json, pictures=[plot]) as page:
         from modelica_like.show.report.compare import compare as run

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.errors import UnknownName, ValueOutOfRange
+from modelica_like.errors import UnitError, UnknownName, ValueOutOfRange
+from modelica_like.language.units import parse_unit, same_dimension
 from modelica_like.runs.display import Display
 from modelica_like.runs.trajectories import Trajectories, fitting
 from modelica_like.solve.recorder import Event
@@ -95,6 +96,7 @@ class Curves(Shown):
         events: by time.
         labels: names of the two: their files, or their models.
         interpolated: whether the result times differ and the second is interpolated, which costs precision.
+        unlike: signals that are not compared, with their two units: their numbers do not mean the same.
     """
 
     first: Trajectories
@@ -103,6 +105,7 @@ class Curves(Shown):
     events: tuple[EventDifference, ...]
     labels: tuple[str, str]
     interpolated: bool
+    unlike: tuple[tuple[str, str, str], ...] = ()
 
     @property
     def largest(self) -> float:
@@ -190,6 +193,7 @@ def compare_solutions(
     Raises:
         UnknownName: nothing matches a pattern, or they have no signal in common.
         ValueOutOfRange: they have no time in common.
+        UnitError: no signal has the same unit in both.
     """
     if min(first.time[-1], second.time[-1]) <= max(first.time[0], second.time[0]):
         raise ValueOutOfRange(f"{' and '.join(labels)} have no time in common.")
@@ -200,8 +204,18 @@ def compare_solutions(
             advice="Signals are compared by their names, such as clutch.tau.",
         )
     names = fitting(common, signals, "They have no common signal") or common
+    unlike = tuple((name, *units) for name in names if not _alike(*(units := _units(name, first, second))))
+    names = [name for name in names if name not in {name for name, *_ in unlike}]
+    if not names:
+        name, mine, other = unlike[0]
+        raise UnitError(f"{name} is in {mine} in {labels[0]} and in {other} in {labels[1]}: this cannot be compared.")
     events = tuple(_match_events(first, second))
     grid = _Grid.of(first, second, events)
+    if not len(grid.rows):
+        raise ValueOutOfRange(
+            f"No time of {labels[0]}, but those of events, lies within the times of {labels[1]}.",
+            advice="Compare them the other way round.",
+        )
     scales = ranges(first, names, least)
     both = zip(_each(first, names), _each(second, names), strict=True)
     deviations = [
@@ -210,7 +224,22 @@ def compare_solutions(
         for largest, time in [_largest(second, mine, other, grid)]
     ]
     ordered = tuple(sorted(deviations, key=lambda deviation: -deviation.relative))
-    return Curves(first, second, ordered, events, labels, grid.interpolated)
+    return Curves(first, second, ordered, events, labels, grid.interpolated, unlike)
+
+
+def _units(name: str, first: Trajectories, second: Trajectories) -> tuple[str, str]:
+    return first.unit_of(name), second.unit_of(name)
+
+
+def _alike(mine: str, other: str) -> bool:
+    """Return whether numbers in both units mean the same; `1` may be a unit that was not said."""
+    if mine == other or "1" in (mine, other):
+        return True
+    try:
+        one, two = parse_unit(mine), parse_unit(other)
+    except UnitError:  # a word of another tool
+        return False
+    return same_dimension(one, two) and (one.factor, one.offset) == (two.factor, two.offset)
 
 
 def _instants(events: Sequence[Event], start: float, modes: set[str]) -> dict[str, list[tuple[float, str]]]:

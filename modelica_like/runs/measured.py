@@ -51,7 +51,7 @@ def read_columns(path: Path) -> dict[str, tuple[Vector, str]]:
     titles = [title_and_unit(title) for title in _trimmed(rows[0][1], 0)] if rows else []
     rows = [(line, _trimmed(row, len(titles))) for line, row in rows]
     if len(rows) > 1 and len(rows[1][1]) == len(titles) and _number(rows[1][1][0]) is None:
-        units = [unit.strip() for unit in rows.pop(1)[1]]
+        units = [unit.strip().removeprefix("[").removesuffix("]").strip() for unit in rows.pop(1)[1]]
         titles = [(name, unit or unit_text) for (name, unit), unit_text in zip(titles, units, strict=True)]
     if len(rows) < 2 or _number(titles[0][0]) is not None:
         raise NetlistError(f"{path.name} is not a table: it needs a line of names, and lines of numbers.")
@@ -76,8 +76,10 @@ def read_csv(path: Path) -> RecordedSolution:
     if next(iter(columns)) != "time":
         raise NetlistError(f"{path.name}: the first column of a table of trajectories is `time`.")
     values = {name: _in_si(numbers, unit) for name, (numbers, unit) in columns.items()}
-    time, _ = values.pop("time")
-    if np.any(np.diff(time) < 0):
+    time, unit = values.pop("time")
+    if unit not in ("", "s"):
+        raise NetlistError(f"{path.name}: '{columns['time'][1]}' is no unit of time.", advice="Write s, ms, min or h.")
+    if not np.all(np.isfinite(time)) or np.any(np.diff(time) < 0):
         raise NetlistError(f"{path.name}: the times must increase.")
     variables = tuple(RecordedVariable(name, unit or "1") for name, (_, unit) in values.items())
     table = np.array([numbers for numbers, _ in values.values()]).reshape(len(values), len(time))

@@ -57,6 +57,18 @@ def test_other_times_are_interpolated(tmp_path: Path) -> None:
     assert "interpolated linearly" in shown(comparison)
 
 
+def test_what_has_other_units_is_left_out_and_told(tmp_path: Path) -> None:
+    """1 kN is 1000 N, 60 rpm are 2 pi rad/s; without a unit, numbers are those of the other."""
+    a = write(tmp_path / "a.csv", "time [ms],f [kN],w [rpm],p [bar],n", "0,1,60,1,5", "1000,1,60,1,5")
+    b = write(tmp_path / "b.csv", "time;f;w;p;n", "[s];[N];[rad/s];[psia?];1/s", "0;1000;0;1;6", "1;1000;0;1;5")
+    comparison = compare(a, b)
+    assert [(row.signal, row.unit) for row in comparison.deviations] == [("w", "rad/s"), ("n", "1"), ("f", "N")]
+    assert comparison["f"].largest == pytest.approx(0.0, abs=1e-9)
+    assert comparison["w"].largest == pytest.approx(2 * np.pi)
+    assert comparison["n"].largest == 1.0
+    assert shown(comparison).splitlines()[-1] == "Not compared: p in Pa and psia?."
+
+
 def test_events_are_paired_and_the_time_between_them_is_left_out() -> None:
     """The first jumps at 1.0 s, the second at 1.1 s: in between they are 10 apart, and both right."""
     first = recorded("first", [0, 1, 1, 1.05, 2], [0, 0, 10, 10, 10], [0, 0, 1, 1, 1])
@@ -154,6 +166,36 @@ MESSAGES = {
         "a.csv is not a table: it needs a line of names, and lines of numbers.",
     ),
     "times that fall": (("time,x", "1,0", "0,1"), ("time,x", "0,0"), (), "a.csv: the times must increase."),
+    "times without a number": (
+        ("time,x", "0,0", "nan,1", "1,1"),
+        ("time,x", "0,0"),
+        (),
+        "a.csv: the times must increase.",
+    ),
+    "a unit that is none of time": (
+        ("time [turns],x", "0,0", "1,1"),
+        ("time,x", "0,0"),
+        (),
+        "a.csv: 'turns' is no unit of time.\nWrite s, ms, min or h.",
+    ),
+    "other quantities": (
+        ("time,x [m/s]", "0,0", "1,1"),
+        ("time,x [rpm]", "0,0", "1,1"),
+        (),
+        "x is in m/s in a.csv and in rad/s in b.csv: this cannot be compared.",
+    ),
+    "a unit that nobody knows": (
+        ("time,x [U/min]", "0,0", "1,1"),
+        ("time,x [rad/s]", "0,0", "1,1"),
+        (),
+        "x is in U/min in a.csv and in rad/s in b.csv: this cannot be compared.",
+    ),
+    "times around those of the other": (
+        ("time,x", "0,0", "9,9"),
+        ("time,x", "2,2", "3,3", "4,4"),
+        (),
+        "No time of a.csv, but those of events, lies within the times of b.csv.\nCompare them the other way round.",
+    ),
     "a word": (("time,x", "0,0", "1,fast"), ("time,x", "0,0"), (), "a.csv:3: 'fast' is not a number."),
     "a value too many": (("time,x", "0,0", "1,1,1"), ("time,x", "0,0"), (), "a.csv:3: 3 values under 2 names."),
 }

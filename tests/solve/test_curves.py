@@ -52,7 +52,7 @@ def test_the_largest_difference_of_each_signal_over_the_range_of_the_first() -> 
     second = table(TIMES, w=[0, 1, np.nan, 3, 4])
     assert compare_solutions(first, second, [], ("a", "b"))["w"].largest == np.inf
     other = table(TIMES, w=TIMES)
-    other.model = RecordedModel("other", (RecordedVariable("w", "rpm"),), (), {})
+    other.model = RecordedModel("other", (RecordedVariable("w"),), (), {})
     assert compare_solutions(first, other, [], ("a", "b"))["w"].unit == "rad/s"
     pair = table(TIMES, tau=0, w=0, slip=0), table(TIMES, slip=0, w=0, tau=0)
     assert [one.signal for one in compare_solutions(*pair, [], ("a", "b")).deviations] == ["tau", "w", "slip"]

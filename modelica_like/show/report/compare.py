@@ -51,6 +51,7 @@ def compare(
     Raises:
         UnknownName: nothing matches a pattern, or they have no signal in common.
         ValueOutOfRange: they have no time in common.
+        UnitError: no signal has the same unit in both.
         ModelicaLikeError: a run fails.
     """
     first = trajectories(a, until, points, tolerance, values, option)
@@ -79,6 +80,10 @@ def comparison_report(comparison: Comparison) -> RenderableType:
         shown = [f"{row.signal} at {row.first:g} and {row.second:g} {row.unit}".removesuffix(" 1") for row in starts]
         more = f", and {len(shown) - _STARTS} more" if len(shown) > _STARTS else ""
         parts += ["", f"[yellow]They start differently: {escape(', '.join(shown[:_STARTS]) + more)}.[/]"]
+    if comparison.unlike:
+        shown = [f"{name} in {mine} and {other}" for name, mine, other in comparison.unlike]
+        more = f", and {len(shown) - _STARTS} more" if len(shown) > _STARTS else ""
+        parts += ["", f"[yellow]Not compared: {escape(', '.join(shown[:_STARTS]) + more)}.[/]"]
     if comparison.interpolated:
         parts += ["", "[dim]Their results have different times; the second is interpolated linearly.[/]"]
     return Group(*parts)
