@@ -18,7 +18,7 @@ from modelica_like.analyse.linear.linearize import linearize, when
 from modelica_like.analyse.operating.curves import characteristic
 from modelica_like.analyse.operating.steady import steady
 from modelica_like.analyse.sweeps.importance import importance
-from modelica_like.analyse.sweeps.plan import LatinHypercube
+from modelica_like.analyse.sweeps.plan import LatinHypercube, Sobol
 from modelica_like.analyse.sweeps.ranges import by_name, read_assignment, read_range
 from modelica_like.analyse.sweeps.sweep import sweep
 from modelica_like.analyse.sweeps.workers import Job, in_processes
@@ -122,6 +122,13 @@ A sweep needs at least one output, and positive numbers of processes and runs in
 mass.J: a sweep needs at least one value, not []."""),
     "no bounds": (ValueOutOfRange, lambda: swept(over={"mass.J": [2.0, 1.0]}, sampling=LatinHypercube(4)), """\
 mass.J: a sweep needs a lower and an upper bound, not [2.0, 1.0]."""),
+    "an output that is varied": (ValueOutOfRange, lambda: sweep(model(), {"mass.J": [2.0]}, ["mass.w", "mass.J"], until=1.0), """\
+mass.J is varied, and cannot be an output, too.
+Its values stand beside every output."""),
+    "no samples": (ValueOutOfRange, lambda: Sobol(-3), """\
+-3 samples are too few: a sweep needs at least 1."""),
+    "one sample of a scatter": (ValueOutOfRange, lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"], samples=1), """\
+samples = 1 must be at least 2: one sample has no scatter."""),
     "a parameter of a sweep": (UnknownName, lambda: swept(over={"mass.j": [2.0]}), """\
 Accelerated has no input or parameter 'mass.j'; did you mean 'mass.J'?"""),
     "a formula in a compiled model": (LanguageError, lambda: sweep(build(GEARED), {"gear.ratio": [0.2]}, ["table.s"]), """\

@@ -17,6 +17,8 @@ from modelica_like.simulation import Model
 Kind = Literal["sobol", "morris"]
 _LEVELS = 4
 _CONSTANT = 1e-9
+_FEWEST = 2
+"""Samples from which there is a scatter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +33,7 @@ class Importance:
             the variance; Morris's mean absolute (`mu_star`) and scatter (`sigma`) of elementary effects, in the unit
             of the output for the whole range of the parameter. Each with its 95 % half width (`S1_conf`, ...).
         runs: number of simulations.
+        notice: that of the sweep: runs in which IDAS differs, or that were left to it.
     """
 
     method: Kind
@@ -38,6 +41,7 @@ class Importance:
     outputs: tuple[str, ...]
     measures: dict[str, Any] = field(repr=False)
     runs: int
+    notice: str = ""
 
     def __getitem__(self, key: tuple[str, str, str]) -> float:
         """Return a measure: `importance["S1", "table.s", "gear.ratio"]`."""
@@ -56,7 +60,7 @@ class Importance:
             for column in np.argsort(-np.abs(self.measures[names[-1] if self.method == "sobol" else first][row])):
                 shown = ", ".join(f"{name} {self.measures[name][row, column]:.4g}" for name in names)
                 lines.append(f"    {self.parameters[column]}: {shown}")
-        return "\n".join(lines)
+        return "\n".join([*lines, *filter(None, [self.notice])])
 
 
 @checked
@@ -72,19 +76,22 @@ def importance(
         outputs: as in `sweep`.
         method: `sobol` (A. Saltelli et al., 2010) takes samples·(parameters + 2) runs, `morris` (M. D. Morris, 1991)
             samples·(parameters + 1).
-        samples: a power of two for Sobol.
+        samples: at least 2; a power of two for Sobol.
         seed: of the random numbers.
         settings: further arguments of `sweep`: processes, scheduler, checkpoint, until, ...
 
     Raises:
         UnknownName: a name is not known.
-        ValueOutOfRange: there are no parameters, or runs failed or gave no number, so the measures are not defined.
+        ValueOutOfRange: there are no parameters or too few samples, or runs failed or gave no number, so the measures
+            are not defined.
         MissingExtra: SALib is not installed.
     """
     if not ranges:
         raise ValueOutOfRange(
             "There is no parameter to rank.", advice='Give bounds by path: importance(…, {"shaft.c": (300, 500)}, …).'
         )
+    if samples < _FEWEST:
+        raise ValueOutOfRange(f"samples = {samples} must be at least {_FEWEST}: one sample has no scatter.")
     sample, analyse = _salib(method)
     problem = {"num_vars": len(ranges), "names": list(ranges), "bounds": [[0.0, 1.0]] * len(ranges)}
     if method == "sobol":
@@ -106,7 +113,8 @@ def importance(
     for column in columns:
         for key, values in _measures(method, analyse, problem, cube, column, seed).items():
             measures.setdefault(key, []).append(values)
-    return Importance(method, tuple(ranges), tuple(outputs), {k: np.array(v) for k, v in measures.items()}, len(cube))
+    arrays = {key: np.array(rows) for key, rows in measures.items()}
+    return Importance(method, tuple(ranges), tuple(outputs), arrays, len(cube), results.attrs["notice"])
 
 
 def _measures(method: Kind, analyse: Any, problem: dict[str, Any], cube: Any, column: Any, seed: int) -> dict[str, Any]:

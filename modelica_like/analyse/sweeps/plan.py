@@ -53,10 +53,17 @@ class LatinHypercube:
     Attributes:
         count: number of runs.
         seed: of the random numbers, to repeat a sweep.
+
+    Raises:
+        ValueOutOfRange: there is no run.
     """
 
     count: int
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.count < 1:
+            raise ValueOutOfRange(f"{self.count} samples are too few: a sweep needs at least 1.")
 
     def unit_cube(self, dimensions: int) -> Any:
         """Return samples in [0, 1], shape (count, dimensions)."""

@@ -81,19 +81,29 @@ def sweep(
 
     Raises:
         UnknownName: a name is not known.
-        ValueOutOfRange: values, outputs or processes are missing.
+        ValueOutOfRange: values, outputs or processes are missing, or an output is varied itself.
         CheckpointMismatch: the checkpoint belongs to another sweep.
         KeyboardInterrupt: the sweep was interrupted; the note says how much is in the checkpoint.
         WorkersLost: workers died repeatedly.
     """
     model = build(drive, free=over).with_parameters(dict(parameters or {}))
     plan = make_plan(model, over, sampling)
+    _check_names(plan, outputs)
     chunks = _chunks(plan, outputs, processes, chunk)
     job = Job.of(model, plan.names, outputs, {"until": until, "points": _POINTS, **settings, "solver": solver})
     job, why = _solvable(job) if scheduler is None else (job, "")
     done = _collect(job, plan, chunks, checkpoint, progress, _workers(job, processes, scheduler, len(plan)))
     _check_extremes(job, plan, done)
     return _dataset(model, plan, job, done, why)
+
+
+def _check_names(plan: Plan, outputs: Sequence[str]) -> None:
+    """Refuse outputs that have the name of a column of their own in the results."""
+    for name in outputs:
+        if name in plan.names:
+            raise ValueOutOfRange(
+                f"{name} is varied, and cannot be an output, too.", advice="Its values stand beside every output."
+            )
 
 
 def _chunks(plan: Plan, outputs: Sequence[str], processes: int | None, chunk: int | None) -> list[Chunk]:
