@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import DuplicateName, LanguageError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language import Assembly, Component, Input, signal_out
 from modelica_like.language.assembly import declare
 from modelica_like.language.inside import inside
@@ -30,13 +30,14 @@ def driven(drive: Any, inputs: Any) -> Assembly:
 
     Args:
         drive: a component or a netlist file with open inputs.
-        inputs: by path a number, a quantity, pairs of time in s and value, two arrays (times, values), or a pandas
-            Series over time; or a table with a column (or index) `time`: a dictionary, a pandas DataFrame, or the path
-            of a CSV file. Names of columns may have a unit in brackets: `motor.tau [N.mm]`; without one values are in
-            SI units.
+        inputs: by path a number, a quantity, pairs of time in s and value, two arrays (times, values), a pandas Series
+            or an xarray DataArray over time; or a table with a column (or index) `time`: a dictionary, a pandas
+            DataFrame, or the path of a CSV file. Names of columns may have a unit in brackets: `motor.tau [N.mm]`;
+            without one values are in SI units.
 
     Raises:
         UnknownName: there is no such input.
+        DuplicateName: one input is given two trajectories.
         LanguageError: it is connected already, or what is given is no trajectory.
         UnitError, ValueOutOfRange: values have another dimension or are not finite, or times do not rise.
     """
@@ -56,15 +57,30 @@ def _trajectories(inputs: Any) -> dict[str, tuple[Any, Any, str]]:
     if isinstance(inputs, str | Path):
         return _of_table(dict(read_columns(Path(inputs))), f"'{Path(inputs).name}'")
     if hasattr(inputs, "columns"):  # a DataFrame
-        titles = {title_and_unit(str(title)): inputs[title] for title in inputs.columns}
-        columns: Columns = {name: (np.asarray(column), unit) for (name, unit), column in titles.items()}
+        columns: Columns = _by_name((title, np.asarray(inputs[title])) for title in inputs.columns)
         return _of_table(columns if "time" in columns else {"time": (np.asarray(inputs.index), ""), **columns}, "It")
     if not isinstance(inputs, Mapping):
         raise LanguageError(f"Something of type {type(inputs).__name__} is no trajectory of inputs.", advice=_PAIRS)
-    given = {title_and_unit(str(name)): value for name, value in cast("Mapping[str, Any]", inputs).items()}
-    if any(name == "time" for name, _ in given):
-        return _of_table({name: (np.asarray(value), unit) for (name, unit), value in given.items()}, "It")
-    return {name: (*_series(name, value), unit) for (name, unit), value in given.items()}
+    given = _by_name(cast("Mapping[str, Any]", inputs).items())
+    if "time" in given:
+        return _of_table({name: (np.asarray(value), unit) for name, (value, unit) in given.items()}, "It")
+    return {name: (*_series(name, value), unit or _unit_of(value)) for name, (value, unit) in given.items()}
+
+
+def _by_name(given: Iterable[tuple[Any, Any]]) -> dict[str, tuple[Any, str]]:
+    """Return values and units by name, of titles that may say a unit."""
+    named: dict[str, tuple[Any, str]] = {}
+    for title, value in given:
+        name, unit = title_and_unit(str(title))
+        if name in named:
+            raise DuplicateName(f"Two trajectories are given for '{name}'.", advice="Leave one of them out.")
+        named[name] = value, unit
+    return named
+
+
+def _unit_of(array: Any) -> str:
+    """Return the unit that an xarray.DataArray says."""
+    return str(getattr(array, "attrs", {}).get("units", ""))
 
 
 def _of_table(columns: Columns, label: str) -> dict[str, tuple[Any, Any, str]]:
@@ -77,7 +93,11 @@ def _of_table(columns: Columns, label: str) -> dict[str, tuple[Any, Any, str]]:
 
 def _series(name: str, value: Any) -> tuple[Any, Any]:
     """Split what one input is given into times and values."""
-    if hasattr(value, "to_numpy"):  # a Series over time
+    if hasattr(value, "dims"):  # a DataArray over time
+        times = value[value.dims[0]]
+        unit = _unit_of(times) or "s"
+        return [to_si(f"{float(t)!r} {unit}", _SECOND, "time") for t in times.to_numpy()], value.to_numpy()
+    if hasattr(value, "index") and hasattr(value, "to_numpy"):  # a Series over time
         return np.asarray(value.index), np.asarray(value)
     if isinstance(value, tuple) and [hasattr(part, "dtype") for part in cast("tuple[Any, ...]", value)] == [True] * 2:
         return np.asarray(value[0]), np.asarray(value[1])

@@ -10,7 +10,15 @@ import pytest
 from components import Fixed
 from components.interfaces import Flange
 from modelica_like import Component, build, simulate
-from modelica_like.errors import LanguageError, ModelicaLikeError, UnitError, UnknownName, ValueOutOfRange, WiringErrors
+from modelica_like.errors import (
+    DuplicateName,
+    LanguageError,
+    ModelicaLikeError,
+    UnitError,
+    UnknownName,
+    ValueOutOfRange,
+    WiringErrors,
+)
 from modelica_like.netlist import loads
 
 BRAKE = """[parts]
@@ -152,6 +160,10 @@ The input 'push.f' has 2 times and 1 values."""),
         LanguageError, lambda: simulate(loads(PUSHED), 1, inputs={"time": ["a"], "push.f": [1]}), """\
 The times of 'push.f' are no numbers in s.
 Give pairs of time in s and value, arrays (times, values), {"time": …, "path": …}, a pandas table, or a CSV file."""),
+    "an input twice": (
+        DuplicateName, lambda: simulate(loads(PUSHED), 1, inputs={"push.f [kN]": 1, "push.f [N]": 1}), """\
+Two trajectories are given for 'push.f'.
+Leave one of them out."""),
     "an input with another unit": (UnitError, lambda: simulate(loads(PUSHED), 1, inputs={"push.f [m]": [(0, 1)]}), """\
 push.f expects N; '1.0 m' is m."""),
     "an input that is connected": (LanguageError, lambda: simulate(loads(FED), 1, inputs={"push.f": 3}), """\

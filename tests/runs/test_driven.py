@@ -6,6 +6,7 @@ from typing import Any, get_args
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from calls import called
 
 from modelica_like import simulate
@@ -29,6 +30,11 @@ RAMP: dict[str, Any] = {
     "columns": {"time": TIMES, "push.f": [0, 6]},
     "milliseconds": {"time [ms]": [0, 1000], "push.f": [0, 6]},
     "a series": {"push.f": pd.Series([0.0, 6.0], index=TIMES)},
+    "an array of xarray": {"push.f": xr.DataArray([0.0, 6.0], {"time": TIMES}, "time")},
+    "its units": {
+        "push.f": xr.DataArray([0, 6000], {"time": ("time", [0, 1000], {"units": "ms"})}, "time", attrs={"units": "mN"})
+    },
+    "a data set": xr.Dataset({"push.f": ("time", [0.0, 6.0])}, {"time": TIMES}),
     "a table": pd.DataFrame({"time": TIMES, "push.f [N]": [0.0, 6.0]}),
     "a table over time": pd.DataFrame({"push.f": [0.0, 6.0]}, index=TIMES),
 }
