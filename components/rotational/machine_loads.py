@@ -172,7 +172,8 @@ class FormingForce(Tabulated, Lossy, LinearOneFlange):
 
     def events(self) -> Events:
         yield from super().events()
-        yield from self.leaving("table", self.s / self.s_scale, self.table, self.f > 0, least=-inf)
+        if self.table[0][1] or self.table[-1][1]:  # else there is no force beyond
+            yield from self.leaving("table", self.s / self.s_scale, self.table, self.f > 0, least=-inf)
 
     def dissipation(self) -> Expr:
         return self.f * self.v

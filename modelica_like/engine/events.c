@@ -7,6 +7,7 @@
 #define BALANCED 1e-3
 #define SAME_TIME 1e-12
 #define LATER 1e3     /* time resolutions, for the difference of a rate: what turns round in less is at rest */
+#define CLEARS 0.5    /* least height of a rebound above zero, in its whole height: less of it is rounding */
 #define NEVER 1e29    /* s: a moment that does not come */
 #define CONVERGES 0.9 /* length of a crowd over the one before: rebounds come to their end, chattering does not */
 #define CROWDED 1e-6  /* of the run: in less time, CROWD further instants follow each other ever faster */
@@ -325,7 +326,7 @@ Result check_turned_back(Instance *c, const double *before) {
         int slow = fabs(rate) < turn && fabs(before[g]) < (turn + came / LATER) * step;
         if (!slow || c->d_begun[one->mode] == one->target || c->d[one->mode] != one->target) continue;
         if (!m->modes[one->mode].hidden) continue; /* a declared mode may keep its condition */
-        if (rate > -turn / LATER || now[g] > rate * rate * step / (2 * turn))
+        if (rate > -turn / LATER || now[g] > CLEARS * rate * rate * step / (2 * turn))
             return fail(c, STAYS_TRUE, c->state.t, m->guard_transition[g]);
     }
     return RESULT_OK;

@@ -58,7 +58,8 @@ def composite(times: Vector, first: Places, last: Places) -> Vector:
     weights = weights[_MIDDLE : _MIDDLE + count]
     k = ((places < last) & (steps > 0) & ~inner).nonzero()[0]
     those, rest = _rules_of(k, times, steps, first, last, uneven)
-    return weights + np.bincount(those.ravel(), rest[:, 0].ravel(), count)
+    weights += np.bincount(those.ravel(), rest[:, 0].ravel(), count)
+    return weights
 
 
 def _steps(times: Vector) -> Vector:
@@ -69,7 +70,7 @@ def _uneven(times: Vector, steps: Vector) -> Places:
     """Return how many steps before each result differ from the step before them."""
     # Times have rounding errors.
     uneven = np.abs(steps[1:] - steps[:-1]) > _UNIFORM * steps[:-1] + _ROUNDING * np.abs(times[:-1])
-    return np.append(0, uneven.cumsum())
+    return np.concatenate([[0], uneven.cumsum()])
 
 
 def _rules_of(

@@ -150,10 +150,11 @@ class Relay(Component):
 class Rubbing(Component):
     m: Parameter = param("kg", "mass", default=1.0)
     F_c: Parameter = param("N", "friction", default=2.0)
+    push: Parameter = param("N", "force", default=1.0)
     v: Variable = var("m/s", "speed", default=10.0)
 
     def equations(self) -> Equations:
-        yield self.m * der(self.v) == -self.F_c * sign(self.v)  # rubbing
+        yield self.m * der(self.v) == self.push - self.F_c * sign(self.v)  # rubbing
 
 
 class Alarm(Component):
@@ -425,10 +426,10 @@ Or go on: on_chattering = "slide" along the border of two modes, "rest" in conta
 case(
     errors.Chattering,
     "an ideal friction comes to rest",
-    lambda: simulate(Rubbing(), 10.0),
+    lambda: simulate(Rubbing(), 20.0),
     """\
-relation[1] switched 20 times at t = 5 s (true ⇄ false).
-  in test_component_messages.py:{rubbing} `yield self.m * der(self.v) == -self.F_c * sign(self.v)`
+relation[1] switched 20 times at t = 10 s (true ⇄ false).
+  in test_component_messages.py:{rubbing} `yield self.m * der(self.v) == self.push - self.F_c * sign(self.v)`
 Modes still switch after 20 rounds at one instant.
 If this is friction, take a class that can stick, such as BearingFriction, Brake, Clutch or SupportFriction; \
 otherwise give the switching a hysteresis, or smooth what drives it. \

@@ -342,23 +342,21 @@ def test_messages_of_discrete_equations(
     check_message(CASES[kind][0], lambda: simulate(build(kind()), 1.0), CASES[kind][1])
 
 
-@pytest.mark.parametrize(("solver", "e", "told"), [("idas", 0.1, "0.551862227"), ("native", 0.1, "0.551862228")])
+@pytest.mark.parametrize("solver", ["idas", "native"])
 def test_a_ball_that_comes_to_rest_does_not_fall_through_the_floor(
     solver: Any,
-    e: float,
-    told: str,
     check_message: Callable[[type[ModelicaLikeError], Callable[[], object], str], None],
 ) -> None:
-    """It rebounds until (1 + e) / (1 - e) times its first fall, sqrt(2 m / 9.81 m/s2) = 0.4515236 s, is over."""
+    """It rebounds until (1 + e) / (1 - e) times its first fall, sqrt(2 m / 9.81 m/s2), is over: 0.5518622279 s."""
     text = (
-        f"At {told} s the condition of relation[1] stays true: what is set there is at rest, and would pass "
+        "At 0.551862228 s the condition of relation[1] stays true: what is set there is at rest, and would pass "
         "without another event.\n"
         f"  in {HERE}:{{rebound}} `yield when(self.h < 0, {{self.v: -self.e * self.v}})`\n"
         "Let it rest: a mode that holds the motion, with a restitution (docs/language.md, what a mode holds), or a "
         "smallest speed below which `when` sets zero and a mode keeps it. What stops once and goes on from there is a "
         "transition of a mode with a reset."
     )
-    check_message(Chattering, lambda: simulate(build(Rebound(e=e)), 3.0, solver=solver), text)
+    check_message(Chattering, lambda: simulate(build(Rebound(e=0.1)), 3.0, solver=solver), text)
 
 
 @pytest.mark.parametrize("solver", ["idas", "native"])
