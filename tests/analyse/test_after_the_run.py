@@ -154,6 +154,10 @@ def test_the_orders_of_a_two_mass_drive() -> None:
         np.testing.assert_allclose(found.amplitudes("shaft.tau")[k], wanted, rtol=1e-9)
     damped = sqrt(C / reduced - (D / (2 * reduced)) ** 2)
     assert found.resonances() == {2.0: pytest.approx([damped / 2]), 4.0: pytest.approx([damped / 4])}
+    both = order_response(linear, {2.0: 100.0}, np.linspace(-200.0, 200.0, 40))
+    assert both.resonances() == {2.0: pytest.approx([-damped / 2, damped / 2])}
+    np.testing.assert_allclose(both.amplitudes("shaft.tau")[0], both.amplitudes("shaft.tau")[0][::-1], rtol=1e-9)
+    assert str(both).count(f"meets {damped / (2 * np.pi):.4g} Hz") == 2
     assert f"order 2 meets {damped / 2 / pi:.4g} Hz at {damped / 2 * 30 / pi:.5g} rpm" in str(found)
     assert len(found.plot("shaft.tau").axes[0].lines) == 4
     with pytest.raises(ModelicaLikeError, match="is not one of the speeds"):

@@ -167,6 +167,10 @@ Give runs by name: overlay({"old": …, "new": …})."""),
         ValueOutOfRange,
         lambda: modelica_like.order_map(simulate(loads(TEXT)), "shaft.tau", "J1.phi", revolutions=float("nan")), """\
 The highest order and the length of a window must be positive and finite, not 10 and nan."""),
+    "no response where a motion is free": (
+        ValueOutOfRange, lambda: modelica_like.linearize(loads(TEXT), "rest").response([1.0, 0.0]), """\
+two_mass has no response at 0 Hz: nothing holds or damps a motion there.
+Leave that frequency out."""),
     "no ranges": (ValueOutOfRange, lambda: modelica_like.importance(loads(TEXT), {}, ["J1.w"]), """\
 There is no parameter to rank.
 Give bounds by path: importance(…, {"shaft.c": (300, 500)}, …)."""),

@@ -59,7 +59,8 @@ class OrderResponse:
         """Return the speeds in rad/s at which each order meets an eigenfrequency, within those of the response."""
         modes = sorted({round(value.imag, 9) for value in self.linear.eigenvalues() if value.imag > 0})
         low, high = self.speeds.min(), self.speeds.max()
-        return {n: [w / n for w in modes if low <= w / n <= high] for n in self.orders}
+        both_ways = [-w for w in reversed(modes)] + modes
+        return {n: [w / n for w in both_ways if low <= w / n <= high] for n in self.orders}
 
     def plot(self, output: str) -> Figure:
         """Draw the amplitudes of an output over the speed, with the resonances as dotted lines."""
@@ -75,7 +76,7 @@ class OrderResponse:
 
     def __str__(self) -> str:
         head = f"Orders {', '.join(f'{n:g}' for n in self.orders)} of {self.linear.model.name}"
-        lines = [f"  order {n:g} meets {w * n / (2 * np.pi):.4g} Hz at {w * _RPM:.5g} rpm"
+        lines = [f"  order {n:g} meets {abs(w) * n / (2 * np.pi):.4g} Hz at {w * _RPM:.5g} rpm"
                  for n, speeds in self.resonances().items() for w in speeds]  # fmt: skip
         return "\n".join([head, *lines])
 

@@ -12,7 +12,7 @@ import numpy as np
 from modelica_like.analyse.linear.pictures import bode, mode_name, nyquist
 from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import extra_module
+from modelica_like.errors import ValueOutOfRange, extra_module
 from modelica_like.solve.initialize import Point, variable_slopes
 from modelica_like.solve.initialize.memory import listed
 from modelica_like.solve.initialize.slopes import implicit_slopes, nodes_of
@@ -98,10 +98,21 @@ class LinearModel(Shown):
 
         Args:
             frequencies: in Hz.
+
+        Raises:
+            ValueOutOfRange: at one of them a motion is free, so that it has no amplitude.
         """
         s = 2j * np.pi * np.atleast_1d(np.asarray(frequencies, float))[:, None, None]
-        gains = self.C @ np.linalg.solve(s * np.eye(len(self.states)) - self.A, self.B.astype(complex)) + self.D
-        return np.moveaxis(gains, 0, -1)
+        try:
+            motion = np.linalg.solve(s * np.eye(len(self.states)) - self.A, self.B.astype(complex))
+        except np.linalg.LinAlgError:
+            distances = np.abs(s.ravel()[:, None] - self.eigenvalues()).min(axis=1)
+            free = s.ravel()[np.argmin(distances)].imag / (2 * np.pi)
+            raise ValueOutOfRange(
+                f"{self.model.name} has no response at {free:.4g} Hz: nothing holds or damps a motion there.",
+                advice="Leave that frequency out.",
+            ) from None
+        return np.moveaxis(self.C @ motion + self.D, 0, -1)
 
     def bode(self, frequencies: Any = None) -> Figure:
         """Draw gain in dB and phase of every output by every input, with the modes by number; of a loop its margins.
