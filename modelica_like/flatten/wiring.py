@@ -18,6 +18,7 @@ from modelica_like.language.units import ONE, Unit, same_dimension
 
 End = tuple[int, bool]
 """A connector (its id) seen from inside or from outside (True) its component."""
+_SHAFTS_OF_TWO_SETS = 4
 
 
 @dataclass
@@ -138,11 +139,14 @@ class Wiring:
             if connector.may_be_free or self.is_connected(connector) or id(connector) in self.freed:
                 continue
             label, end, flow = component.label, f"{inside(component).name}.{name}", connector.domain.flow
+            alike = [end for end in component.connectors.values() if type(end) is type(connector) and not end.optional]
+            # Of three shafts of a planetary set none carries torque if one does not; with four, two others do.
+            idle = f"{label} ({type(component).__name__})" if len(alike) < _SHAFTS_OF_TWO_SETS else "it"
             listed = isinstance(inside(component).owner, Assembly)
             say = f'list it: free = ["{end}"]' if listed else f"yield free(self.{end})"
             self.errors.append(
                 FreeFlange(
-                    f"{label}.{name} is free, so {label} ({type(component).__name__}) carries no {flow}.",
+                    f"{label}.{name} is free, so {idle} carries no {flow}.",
                     where=component.place_of(),
                     advice=f"Connect it, or {say}." if inside(component).owner else "Connect it in a drive.",
                 )

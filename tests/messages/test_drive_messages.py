@@ -19,6 +19,7 @@ from components import (
     IdealPlanetary,
     Inertia,
     Mass,
+    Ravigneaux,
     Speed,
     SpringDamper,
     TorqueSensor,
@@ -142,6 +143,14 @@ def short_by_one() -> None:
     reduce(replace(flat, linear=flat.linear[:-1]))
 
 
+def idling() -> Assembly:
+    """A Ravigneaux set in its first gear: its large sun idles."""
+    planets = Ravigneaux(small_ratio=3.0, large_ratio=-2.0)
+    parts: dict[str, Component] = {"planets": planets, "wall": Fixed(), "J": Inertia(J=1.0)}
+    wires = {"a": "wall.flange planets.carrier", "b": "J.flange_a planets.small_sun", "c": "J.flange_b planets.ring"}
+    return Assembly("box", parts=parts, connect={name: wire.split() for name, wire in wires.items()})  # idling
+
+
 CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {}
 
 
@@ -160,6 +169,15 @@ case(
 planet.ring is free, so planet (IdealPlanetary) carries no torque.
   in test_drive_messages.py:{wired} `parts.planet`
 Connect it, or list it: free = ["planet.ring"].""",
+)
+case(
+    errors.FreeFlange,
+    "an idle shaft of four",
+    lambda: flatten(idling()),
+    """\
+planets.large_sun is free, so it carries no torque.
+  in test_drive_messages.py:{idling} `parts.planets`
+Connect it, or list it: free = ["planets.large_sun"].""",
 )
 case(
     errors.WiringErrors,
