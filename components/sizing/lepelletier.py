@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 
-from components.sizing.maths import absolute
+from components.sizing.maths import absolute, require, where
 from components.sizing.ravigneaux_shafts import (
     CARRIER,
     LARGE_SUN,
     MEMBERS,
+    NO_EFFICIENCY,
     RING,
     SMALL_SUN,
     ShaftSpeeds,
     ShaftTorques,
     lossy_ratios,
+    powers_in_meshes,
     rolling_in_meshes,
     rolling_powers,
+    settle_directions,
     shaft_speeds,
     shaft_torques,
     sign_of,
@@ -76,7 +80,7 @@ class LepelletierGear(Result):
     inner_rolling_power: Power = line("rolling power of the small sun")
     outer_rolling_power: Power = line("rolling power of the large sun")
     front_rolling_power: Power = line("rolling power of the front set")
-    efficiency: Ratio = line("efficiency with the torques that the losses leave")
+    efficiency: Ratio = line("efficiency with the torques that the losses leave; nan if power can flow in no way")
     first_order_efficiency: Ratio = line("efficiency with losses of the loss-free rolling powers")
 
 
@@ -124,8 +128,9 @@ def lepelletier_gear(
     """Work out one gear of a Lepelletier gearbox; see `lepelletier`.
 
     Raises:
-        ValueError: there is no such gear.
+        ValueError: there is no such gear, or the efficiency is none.
     """
+    require(NO_EFFICIENCY, mesh_efficiency > 0, mesh_efficiency <= 1)
     if gear not in GEARS:
         raise ValueError(f"There is no gear '{gear}'; there are {', '.join(GEARS)}.")
     pattern, front = GEARS[gear], front_speed(input_speed, front_ratio)
@@ -134,14 +139,16 @@ def lepelletier_gear(
     rolling, front_rolling = rolling_powers(speeds, torques), ring * (input_speed - front)
     total = rolling_in_meshes(rolling) + 2 * absolute(front_rolling)
     carrier_over_ring = 1 - mesh_efficiency ** (2 * sign_of(ring, input_torque)) / front_ratio
-    lossy, _ = _torques(
-        pattern, input_torque, carrier_over_ring, lossy_ratios(small_ratio, large_ratio, rolling, mesh_efficiency)
+    lossy, settled = settle_directions(
+        lambda ratios: _torques(pattern, input_torque, carrier_over_ring, ratios)[0],
+        lambda found: lossy_ratios(small_ratio, large_ratio, powers_in_meshes(speeds, found), mesh_efficiency),
+        (small_ratio, large_ratio),
     )
     power = input_torque * input_speed
     return LepelletierGear(
         gear, input_speed / speeds.ring, speeds.ring, speeds.small_sun, speeds.large_sun, speeds.carrier,
         torques.small_sun, torques.large_sun, torques.carrier, torques.ring, *rolling, front_rolling,
-        -lossy.ring * speeds.ring / power, 1 - (1 - mesh_efficiency) * total / power,
+        where(settled, -lossy.ring * speeds.ring / power, math.nan), 1 - (1 - mesh_efficiency) * total / power,
     )  # fmt: skip
 
 

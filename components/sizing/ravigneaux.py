@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from components.sizing.maths import absolute, floor
+from components.sizing.maths import absolute, floor, require, where
 from components.sizing.ravigneaux_shafts import (
     CARRIER,
     LARGE_SUN,
     MEMBERS,
+    NO_EFFICIENCY,
     RING,
     SMALL_SUN,
     ShaftTorques,
     known_shaft,
     lossy_ratios,
+    powers_in_meshes,
     rolling_in_meshes,
     rolling_powers,
+    settle_directions,
     shaft_speeds,
     shaft_torques,
 )
@@ -80,7 +84,7 @@ class RavigneauxGear(Result):
     outer_carrier_torque: Torque = line("part of the carrier torque from the large sun")
     inner_rolling_power: Power = line("rolling power of the small sun")
     outer_rolling_power: Power = line("rolling power of the large sun")
-    efficiency: Ratio = line("efficiency with the torques that the losses leave")
+    efficiency: Ratio = line("efficiency with the torques that the losses leave; nan if power can flow in no way")
     first_order_efficiency: Ratio = line("efficiency with losses of the loss-free rolling powers")
     meshes: tuple[Mesh, ...] = line("meshes")
 
@@ -106,8 +110,9 @@ def ravigneaux_gear(
         load_sharing: factor K_gamma of uneven loads of the planets.
 
     Raises:
-        ValueError: the shafts are not three different ones.
+        ValueError: the shafts are not three different ones, or the efficiency is none.
     """
+    require(NO_EFFICIENCY, mesh_efficiency > 0, mesh_efficiency <= 1)
     idle = _idle(input, brake, output) if brake else CARRIER
     small, large = teeth.ratios
     held = (brake, 0.0 * input_speed) if brake else (CARRIER, input_speed)
@@ -115,7 +120,10 @@ def ravigneaux_gear(
     speeds = shaft_speeds(small, large, (input, input_speed), held)
     torques = shaft_torques(small, large, *loaded)
     rolling = rolling_powers(speeds, torques)
-    lossy = shaft_torques(*lossy_ratios(small, large, rolling, mesh_efficiency), *loaded)
+    lossy, settled = settle_directions(
+        lambda ratios: shaft_torques(*ratios, *loaded),
+        lambda found: lossy_ratios(small, large, powers_in_meshes(speeds, found), mesh_efficiency), (small, large),
+    )  # fmt: skip
     power = input_torque * input_speed
     lost = (1 - mesh_efficiency) * rolling_in_meshes(rolling)
     short = -(speeds.small_sun - speeds.carrier) * teeth.small_sun / teeth.short_planet
@@ -124,7 +132,7 @@ def ravigneaux_gear(
         input_speed / speeds[output], power, speeds.small_sun, speeds.large_sun, speeds.carrier, speeds.ring, short,
         long, torques.small_sun, torques.large_sun, torques.carrier, torques.ring, -small * torques.small_sun,
         -large * torques.large_sun, (small - 1) * torques.small_sun, (large - 1) * torques.large_sun, *rolling,
-        -lossy[output] * speeds[output] / power, 1 - lost / power,
+        where(settled, -lossy[output] * speeds[output] / power, math.nan), 1 - lost / power,
         ravigneaux_meshes(teeth, torques, rolling, (short, long), load_sharing),
     )  # fmt: skip
 

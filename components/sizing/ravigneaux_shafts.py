@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from components.sizing.maths import Number, absolute, settled, sign, where
 from modelica_like.language.quantities import Power, Ratio, Speed, Torque
 from modelica_like.language.results import Result, line
 
 SMALL_SUN, LARGE_SUN, CARRIER, RING = "small_sun", "large_sun", "carrier", "ring"
 MEMBERS = (SMALL_SUN, LARGE_SUN, CARRIER, RING)
+Ratios = tuple[Ratio, Ratio]
+NO_EFFICIENCY = "The efficiency of a mesh is above 0 and at most 1."
+_ROUNDS = 8
+"""Three meshes have eight combinations of directions."""
 
 
 class Shafts(Result):
@@ -113,7 +119,12 @@ def rolling_powers(speeds: ShaftSpeeds, torques: ShaftTorques) -> tuple[Power, P
     return small, torques.large_sun * _sum(speeds.large_sun, -speeds.carrier)
 
 
-def lossy_ratios(small: Ratio, large: Ratio, rolling: tuple[Power, Power], mesh: Ratio) -> tuple[Ratio, Ratio]:
+def powers_in_meshes(speeds: ShaftSpeeds, torques: ShaftTorques) -> tuple[Power, Power, Power]:
+    """Return the rolling powers in W of the small and the large sun, and that which leaves at the ring."""
+    return *rolling_powers(speeds, torques), -torques.ring * _sum(speeds.ring, -speeds.carrier)
+
+
+def lossy_ratios(small: Ratio, large: Ratio, powers: tuple[Power, Power, Power], mesh: Ratio) -> Ratios:
     """Return the ratios of the torques with losses in the meshes.
 
     Rolling power passes two meshes from the small sun to the long planet and one from the large sun; their sum
@@ -122,13 +133,31 @@ def lossy_ratios(small: Ratio, large: Ratio, rolling: tuple[Power, Power], mesh:
     Args:
         small: fixed-carrier ratio of the small sun.
         large: fixed-carrier ratio of the large sun.
-        rolling: rolling powers of both suns without losses, for their directions.
+        powers: `powers_in_meshes`, for their directions; `settle_directions` finds those with losses.
         mesh: efficiency of a mesh.
     """
-    scale = absolute(rolling[0]) + absolute(rolling[1])
-    total = sign_of(rolling[0] + rolling[1], scale)
-    first, second = (sign_of(power, scale) for power in rolling)
+    scale = absolute(powers[0]) + absolute(powers[1])
+    first, second, total = (sign_of(power, scale) for power in powers)
     return small * mesh ** (2 * first + total), large * mesh ** (second + total)
+
+
+def settle_directions(find: Callable[[Ratios], ShaftTorques], ratios_of: Callable[[ShaftTorques], Ratios],
+                      lossless: Ratios) -> tuple[ShaftTorques, Number]:  # fmt: skip
+    """Return the torques with losses, and whether power flows in every mesh as their losses assume.
+
+    Losses may turn a direction: that of a small rolling power beside a large one.
+
+    Args:
+        find: torques of the shafts for ratios of the torques.
+        ratios_of: ratios with losses for torques of the shafts.
+        lossless: ratios without losses.
+    """
+    torques, used = find(lossless), lossless
+    ratios = ratios_of(torques)
+    for _ in range(_ROUNDS):
+        torques, used = find(ratios), ratios
+        ratios = ratios_of(torques)
+    return torques, (ratios[0] == used[0]) * (ratios[1] == used[1])
 
 
 def rolling_in_meshes(rolling: tuple[Power, Power]) -> Power:

@@ -1,8 +1,10 @@
 """Document 001: every mesh of the Ravigneaux set, its gears and assembly; the Lepelletier gearbox."""
 
+import itertools
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from components.sizing import (
@@ -218,11 +220,60 @@ def test_gear_that_does_not_exist() -> None:
 def test_rolling_powers_that_cancel_but_for_rounding_lose_nothing_at_the_ring() -> None:
     """What the suns send is their own two meshes and one; the ring's mesh passes 1e-14 of it, whose sign is chance."""
     for left in (-1e-14, 1e-14):
-        small, large = lossy_ratios(3.0, -2.0, (1.0, -1.0 + left), 0.9)
+        small, large = lossy_ratios(3.0, -2.0, (1.0, -1.0 + left, left), 0.9)
         assert (small, large) == (pytest.approx(3.0 * 0.9**2, rel=1e-12), pytest.approx(-2.0 / 0.9, rel=1e-12))
 
 
 def test_a_sun_whose_rolling_power_is_rounding_loses_nothing() -> None:
     for left in (-1e-14, 1e-14):
-        assert lossy_ratios(3.0, -2.0, (1.0, left), 0.9) == pytest.approx((3.0 * 0.9**3, -2.0 * 0.9), rel=1e-12)
-        assert lossy_ratios(3.0, -2.0, (left, 1.0), 0.9) == pytest.approx((3.0 * 0.9, -2.0 * 0.9**2), rel=1e-12)
+        assert lossy_ratios(3.0, -2.0, (1.0, left, 1.0), 0.9) == pytest.approx((3.0 * 0.9**3, -2.0 * 0.9), rel=1e-12)
+        assert lossy_ratios(3.0, -2.0, (left, 1.0, 1.0), 0.9) == pytest.approx((3.0 * 0.9, -2.0 * 0.9**2), rel=1e-12)
+
+
+MEMBERS = ("small_sun", "large_sun", "carrier", "ring")
+
+
+def efficiencies(zs: int, zl: int, zr: int, shafts: tuple[str, str, str], mesh: float) -> list[float]:
+    """Efficiencies for all directions of power in the three meshes that agree with themselves."""
+    driving, brake, output = shafts
+    idle = next(member for member in MEMBERS if member not in shafts)
+    i1, i2 = zr / zs, -zr / zl
+    willis = {"small_sun": (1 - i1, i1), "large_sun": (1 - i2, i2), "carrier": (1.0, 0.0), "ring": (0.0, 1.0)}
+    w = np.linalg.solve([willis[driving], willis[brake]], [1.0, 0.0])
+    speed = {member: float(np.dot(willis[member], w)) for member in MEMBERS}
+    found: list[float] = []
+    for one, two, three in itertools.product((1, -1), repeat=3):
+        # Two meshes from the small sun to the long planet, one from the large sun; one more to the ring.
+        a, b, c = mesh ** (2 * one), mesh**two, mesh**three
+        given = [[float(member == which) for member in MEMBERS] for which in (driving, idle)]
+        balance = [[1.0] * 4, [i1 * a * c, i2 * b * c, 0.0, 1.0]]
+        torque = dict(zip(MEMBERS, np.linalg.solve([*given, *balance], [1.0, 0.0, 0.0, 0.0]), strict=True))
+        first, second = (torque[sun] * (speed[sun] - speed["carrier"]) for sun in MEMBERS[:2])
+        if all(power * way > -1e-12 for power, way in ((first, one), (second, two), (first * a + second * b, three))):
+            found.append(-float(torque[output]) * speed[output])
+    return found
+
+
+@pytest.mark.parametrize("teeth", [(21, 39, 60), (30, 31, 80), (58, 20, 60), (20, 58, 60)])
+@pytest.mark.parametrize("mesh", [0.99, 0.97, 0.9])
+def test_losses_may_turn_the_direction_of_a_small_rolling_power(teeth: tuple[int, int, int], mesh: float) -> None:
+    """The large sun of 58, 20 and 60 teeth takes 2.6 % of the rolling power, and gives some of it with losses."""
+    small, large, ring = teeth
+    compared = 0
+    for shafts in itertools.permutations(MEMBERS, 3):
+        only = set(np.round(efficiencies(small, large, ring, shafts, mesh), 12))
+        made = ravigneaux_gear(RavigneauxTeeth(small, large, 15, 18, ring), 100.0, 50.0, *shafts, mesh)
+        if len(only) == 1:
+            assert made.efficiency == pytest.approx(only.pop(), rel=1e-9)
+            compared += 1
+        else:
+            assert np.isnan(made.efficiency) or round(float(made.efficiency), 12) in only
+    assert compared > 12
+
+
+def test_an_efficiency_that_is_none() -> None:
+    for mesh in (0.0, 98.0, -0.5):
+        with pytest.raises(ValueError, match="The efficiency of a mesh is above 0 and at most 1"):
+            ravigneaux_gear(TEETH, 100.0, 100.0, mesh_efficiency=mesh)
+        with pytest.raises(ValueError, match="The efficiency of a mesh is above 0 and at most 1"):
+            lepelletier(100.0, 1.0, -1.917, 2.74, -2.24, mesh)
