@@ -56,9 +56,13 @@ class About:
     fixed_step: float = 0.0
 
 
+_LONGEST = 63
+"""Letters of an identifier that every C compiler tells apart (C99, 5.2.4.1)."""
+
+
 def identifier(name: str) -> str:
-    """Return a C identifier for a model name."""
-    plain = re.sub(r"\W", "_", name, flags=re.ASCII).strip("_")
+    """Return a C identifier for a model name, which names files, too: no longer than any system allows."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII).strip("_")[:_LONGEST].rstrip("_")
     return plain if plain and not plain[0].isdigit() else f"model_{plain}".rstrip("_")
 
 

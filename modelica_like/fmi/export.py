@@ -120,6 +120,7 @@ def export_fmu(
     tell("compiling the model")
     drive = loaded(drive)
     model, description, equations = compiled_open(drive, ends, takes, tables)
+    _check_letters(model)
     variables = interface(model, outputs, as_what)
     tell("writing the model")
     about = _about(model, chosen, kinds, description, fixed)
@@ -163,6 +164,16 @@ def _fixed_step(step: float | str | None, kinds: tuple[Kind, ...]) -> float:
             why="In Model Exchange the importer chooses the steps.", advice="Also export cs.",
         )  # fmt: skip
     return size
+
+
+def _check_letters(model: CompiledDae) -> None:
+    """Refuse names that structured names of the standard cannot have."""
+    for name in model.units:
+        if not name.isascii():
+            raise ExportError(
+                f"An FMU of {model.name} cannot have the name '{name}': the standard knows the letters a to z only.",
+                advice="Rename the part or the variable.",
+            )
 
 
 # -- the model ---------------------------------------------------------------------------------------------------------

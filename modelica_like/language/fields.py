@@ -394,4 +394,4 @@ def require_identifier(name: str, where: str) -> None:
         LanguageError: the name is private, or not an identifier.
     """
     if name.startswith("_") or not name.isidentifier():
-        raise LanguageError(f"{where} declares '{name}'.", advice="Names begin with a letter.")
+        raise LanguageError(f"{where} declares '{name}'.", advice="A name is a letter, then letters, digits and _.")

@@ -150,6 +150,7 @@ def test_structured_names(name: str, expected: str) -> None:
         ("3 masses", "model_3_masses"),
         ("öl", "l"),
         ("ä", "model"),
+        ("drive " * 50, "drive_" * 10 + "dri"),
     ],
 )
 def test_identifiers(name: str, expected: str) -> None:

@@ -152,7 +152,9 @@ def test_a_part_cannot_take_the_name_of_a_method(name):
 
 
 def test_names_begin_with_a_letter():
-    with pytest.raises(LanguageError, match=r"Hidden declares '_phi'"):
+    with pytest.raises(
+        LanguageError, match=r"Hidden declares '_phi'.\nA name is a letter, then letters, digits and _."
+    ):
 
         class Hidden(Component):
             _phi: Variable = var("rad", "hidden")

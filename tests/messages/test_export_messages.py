@@ -22,6 +22,17 @@ def flywheel() -> Assembly:
     return drive
 
 
+def test_names_with_letters_of_other_languages(tmp_path: Path) -> None:
+    drive = Assembly("flywheel", parts={"Läufer": Inertia(J="2 kg.m2", phi=0.0, w="3 rad/s")})
+    with pytest.raises(ExportError) as caught:
+        export_fmu(drive, tmp_path / "drive.fmu")
+    assert str(caught.value) == (
+        "An FMU of flywheel cannot have the name 'Läufer.phi': the standard knows the letters a to z only.\n"
+        "Rename the part or the variable."
+    )
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("options", "error", "told"),
     [
