@@ -146,14 +146,16 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
 def _numbers(name: str, value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
-    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
+    if not isinstance(value, Sequence | np.ndarray) or (isinstance(value, str) and value in ("true", "false")):
         return value
     try:
         return np.asarray(value, float).tolist()
     except (TypeError, ValueError) as error:
         raise ValueOutOfRange(
             f"The parameter '{name}' must be a number or an array of numbers.",
-            advice="All rows of an array have the same length.",
+            advice="All rows of an array have the same length."
+            if not isinstance(value, str)
+            else f"Give '{value}' as a number in the unit of the FMU.",
         ) from error
 
 

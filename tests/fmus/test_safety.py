@@ -88,6 +88,12 @@ MISTAKES = {
         UnknownName,
         "two_mass_fmi2.fmu has no variable 'shaft.cc'; did you mean 'shaft.c'?",
     ),
+    "quantity": (
+        {"parameters": {"J1.J": "200 kg.cm2"}},
+        ValueOutOfRange,
+        "The parameter 'J1.J' must be a number or an array of numbers.\n"
+        "Give '200 kg.cm2' as a number in the unit of the FMU.",
+    ),
     "output": ({"outputs": ["J3.w"]}, UnknownName, "two_mass_fmi2.fmu has no variable 'J3.w'; did you mean 'J2.w'?"),
     "input": (
         {"inputs": {"J1.J": 1.0}},

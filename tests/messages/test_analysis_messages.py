@@ -125,6 +125,9 @@ mass.J: a sweep needs a lower and an upper bound, not [2.0, 1.0]."""),
     "an output that is varied": (ValueOutOfRange, lambda: sweep(model(), {"mass.J": [2.0]}, ["mass.w", "mass.J"], until=1.0), """\
 mass.J is varied, and cannot be an output, too.
 Its values stand beside every output."""),
+    "one value of what is varied": (ValueOutOfRange, lambda: swept(parameters={"mass.J": 2.0}), """\
+mass.J is varied, and has a value for all runs.
+Leave out one of the two."""),
     "no samples": (ValueOutOfRange, lambda: Sobol(-3), """\
 -3 samples are too few: a sweep needs at least 1."""),
     "one sample of a scatter": (ValueOutOfRange, lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"], samples=1), """\

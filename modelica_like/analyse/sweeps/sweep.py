@@ -81,14 +81,14 @@ def sweep(
 
     Raises:
         UnknownName: a name is not known.
-        ValueOutOfRange: values, outputs or processes are missing, or an output is varied itself.
+        ValueOutOfRange: values, outputs or processes are missing, or what is varied is an output or has one value.
         CheckpointMismatch: the checkpoint belongs to another sweep.
         KeyboardInterrupt: the sweep was interrupted; the note says how much is in the checkpoint.
         WorkersLost: workers died repeatedly.
     """
     model = build(drive, free=over).with_parameters(dict(parameters or {}))
     plan = make_plan(model, over, sampling)
-    _check_names(plan, outputs)
+    _check_names(plan, outputs, parameters or {})
     chunks = _chunks(plan, outputs, processes, chunk)
     job = Job.of(model, plan.names, outputs, {"until": until, "points": _POINTS, **settings, "solver": solver})
     job, why = _solvable(job) if scheduler is None else (job, "")
@@ -97,10 +97,14 @@ def sweep(
     return _dataset(model, plan, job, done, why)
 
 
-def _check_names(plan: Plan, outputs: Sequence[str]) -> None:
-    """Refuse outputs that have the name of a column of their own in the results."""
-    for name in outputs:
-        if name in plan.names:
+def _check_names(plan: Plan, outputs: Sequence[str], parameters: Mapping[str, Any]) -> None:
+    """Refuse what is varied as an output, which has a column of its own, and as one of the other parameters."""
+    for name in plan.names:
+        if name in parameters:
+            raise ValueOutOfRange(
+                f"{name} is varied, and has a value for all runs.", advice="Leave out one of the two."
+            )
+        if name in outputs:
             raise ValueOutOfRange(
                 f"{name} is varied, and cannot be an output, too.", advice="Its values stand beside every output."
             )
