@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import UnknownName, did_you_mean
+from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.transition import NAME_IN_NOTICE
+from modelica_like.language.units import parse_unit, to_si
 from modelica_like.options import Options
 from modelica_like.runs.energy import EnergyBalance, energy_balance
 from modelica_like.runs.reading import TOGETHER, energy_term, rate_along, variables
@@ -21,6 +22,7 @@ from modelica_like.solve.idas import Integrator
 from modelica_like.solve.initialize import Impact, Point, StartKind
 from modelica_like.solve.recorder import Ended, Event, Segment
 
+_SECOND = parse_unit("s")
 _PAGE = 2**17
 """Numbers that are read at once where those of all variables are too many: to make a function takes as long."""
 
@@ -51,7 +53,7 @@ class Solution(Trajectories):
     start: StartKind = "given"
     readings: Mapping[str, Any] = field(default_factory=dict, repr=False)
     dense: Callable[[], Dense] | None = field(default=None, repr=False)
-    _balances: dict[tuple[float | None, float | None], EnergyBalance] = field(
+    _balances: dict[tuple[float | str | None, float | str | None], EnergyBalance] = field(
         default_factory=dict, init=False, repr=False
     )
     _pages: dict[int, Vector] = field(default_factory=dict, init=False, repr=False)
@@ -182,18 +184,22 @@ class Solution(Trajectories):
         segment = Segment(np.array([now.t]), now.x[:, None], now.z[:, None], now.d)
         return Values(replace(self, segments=(segment,)))
 
-    def energy(self, begin: float | None = None, end: float | None = None) -> EnergyBalance:
+    def energy(self, begin: float | str | None = None, end: float | str | None = None) -> EnergyBalance:
         """Return the energy balance of every component over the run, or over a part of it.
 
         Args:
-            begin: time in s; an event at that time counts.
-            end: time in s; an event at that time does not count, unless the run ends there.
+            begin: time, a number in s or a quantity; an event at that time counts.
+            end: time, likewise; an event at that time does not count, unless the run ends there.
 
         Raises:
-            ValueOutOfRange: a time is not within the run.
+            ValueOutOfRange: a time is not within the run, or the end is not after the beginning.
+            UnitError: a text is no time.
         """
         if (begin, end) not in self._balances:
-            first, last = (self.time[k] if t is None else float(t) for k, t in ((0, begin), (-1, end)))
+            named = ("begin", 0, begin), ("end", -1, end)
+            first, last = (self.time[k] if t is None else to_si(t, _SECOND, name) for name, k, t in named)
+            if first >= last and (begin, end) != (None, None):
+                raise ValueOutOfRange(f"The end of a balance, {last:g} s, is not after its beginning, {first:g} s.")
             segments = self.segments if (begin, end) == (None, None) else tuple(self._part(first, last))
             until = np.inf if last == self.time[-1] else last
             events = [event for event in self.events if first <= event.time < until]

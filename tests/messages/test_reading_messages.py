@@ -4,6 +4,7 @@
 import pickle
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from modelica_like.runs.results import settled
 DRIVE = Path(__file__).parents[2] / "examples" / "machine_table_direct.toml"
 
 
-def run(until: float = 0.1) -> object:
+def run(until: float = 0.1) -> Any:
     return simulate(DRIVE, until)
 
 
@@ -86,6 +87,8 @@ The first one is time(clutch.mode -> stuck), the second one time(clutch.mode -> 
 The first one is time(clutch.mode: forward -> stuck), the second one time(clutch.mode: forward -> stuck, 2)."""),
     "a mode": (UnknownName, lambda: read_output(build(DRIVE), "duration(clutch.mode: sliding)"), """\
 clutch.mode has no mode 'sliding'. It has free, stuck, start_forward, start_backward, forward, backward."""),
+    "energies of no time": (ValueOutOfRange, lambda: run().energy(0.05, "50 ms"), """\
+The end of a balance, 0.05 s, is not after its beginning, 0.05 s."""),
     "a load": (UnknownName, lambda: load_of(run(), "clutch.tau", "peek"), """\
 A load cannot be the 'peek' of a trajectory; did you mean 'peak'? It can be peak, largest, smallest, final, mean, rms, integral, reading."""),
     "a file as data": (ValueOutOfRange, lambda: calibrate(DRIVE, ["meas.csv"], {"table.J": (1.0, 2.0)}), """\

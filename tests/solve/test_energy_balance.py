@@ -65,8 +65,14 @@ def test_the_energies_of_a_part_of_a_run() -> None:
         np.testing.assert_allclose([one["oil"].lost for one in parts], -0.25 * 9 * np.diff(left), rtol=1e-7)
         np.testing.assert_allclose([one["J"].stored for one in parts], 0.25 * 9 * np.diff(left), rtol=1e-7)
         assert max(one.power_closure for one in parts) < 1e-9
+        assert run.energy("300 ms", "1 s")["oil"].lost == pytest.approx(parts[1]["oil"].lost, rel=1e-12)
     with pytest.raises(ValueOutOfRange, match=r"2\.5"):
         run.energy(1.0, 2.5)
+    for begin, end in ((1.0, 1.0), (1.5, 1.0)):
+        with pytest.raises(
+            ValueOutOfRange, match=f"^The end of a balance, 1 s, is not after its beginning, {begin:g} s"
+        ):
+            run.energy(begin, end)
 
 
 def test_an_impact_belongs_to_the_part_that_begins_with_it() -> None:
