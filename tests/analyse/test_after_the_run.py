@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from components import (
+    Brake,
     CombustionEngine,
     Constant,
     ConstantSpeed,
@@ -81,6 +82,19 @@ def test_the_damage_of_a_steady_vibration() -> None:
     assert spectrum.damage(line) == pytest.approx(20 / 2e6, rel=1e-6)
     assert (spectrum * 1e4).damage(line, 0.3) == pytest.approx(20e4 / 2e6 * 1.12**6, rel=1e-6)
     assert spectrum.equivalent(6.0, 1000.0) == pytest.approx(100 * (20 / 1000) ** (1 / 6), rel=1e-6)
+
+
+def test_rounding_makes_no_cycles() -> None:
+    """A brake of 20 N.m stops a wheel and lets go: half a cycle, and with its mean (20 + 0) / 2 the damage by hand."""
+    parts = {"wheel": Inertia(J=2.0, phi=0.0, w=50.0), "brake": Brake(capacity=20.0)}
+    run = simulate(Assembly("stop", parts=parts, series={"shaft": list(parts)}), 40.0)
+    spectrum = load_spectrum(run, "brake.tau")
+    assert spectrum.counts.tolist() == [0.5]
+    assert spectrum.amplitudes == pytest.approx([10.0], rel=1e-9)
+    line = WoehlerLine(amplitude=5.0, cycles=2e6, slope=5.0)
+    assert spectrum.damage(line, mean_sensitivity=0.3) == pytest.approx(0.5 * (13.0 / 5.0) ** 5 / 2e6, rel=1e-8)
+    constant = load_spectrum(signal_of([20.0, 20.0 + 4e-15, 20.0, 20.0 - 4e-15]), "s.y")
+    assert str(constant) == "Load spectrum of s.y: 0 cycles"
 
 
 def test_the_duty_of_each_gear() -> None:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BELOW = "elementary", "haibach", "original"
+_NO_CYCLE = 1e-9
+"""Share of the largest amount: a smaller range is rounding of the integrator, which would count with its mean."""
 _ON_LIMIT = 1e-9
 """Share of a class by which rounding may leave a torque below a limit, on which it counts for the class above."""
 
@@ -127,7 +129,8 @@ class LoadSpectrum:
 def load_spectrum(run: Trajectories, load: str) -> LoadSpectrum:
     """Count the cycles of a load by rainflow counting (ASTM E1049-85), with what is left over as half cycles.
 
-    Turning points are those between the results, too; a measured table has no others.
+    Turning points are those between the results, too; a measured table has no others. Ranges of less than 1e-9 of the
+    largest amount are no cycles.
 
     Args:
         run: a run of this tool, or a measured table.
@@ -140,8 +143,10 @@ def load_spectrum(run: Trajectories, load: str) -> LoadSpectrum:
     """
     rainflow = extra_module("rainflow", "analyse")
     curve, unit = along(run, run.path(load))
-    cycles = sorted(rainflow.extract_cycles(curve.turning(0).tolist()), key=lambda cycle: -cycle[0])
+    turning = curve.turning(0)
+    cycles = sorted(rainflow.extract_cycles(turning.tolist()), key=lambda cycle: -cycle[0])
     table = np.array([cycle[:3] for cycle in cycles], float).reshape(-1, 3)
+    table = table[table[:, 0] > _NO_CYCLE * np.abs(turning).max(initial=0.0)]
     return LoadSpectrum(run.path(load), unit, table[:, 0] / 2, table[:, 1], table[:, 2])
 
 
