@@ -128,13 +128,13 @@ class RecordedSolution(Trajectories):
         path, model = self.path(key), self.model
         return any(path in positions for positions in (model.position, model.discrete_position, model.parameters))
 
-    def at(self, t: float) -> Values:
+    def at(self, t: float | str) -> Values:
         """Return all variables at a time, interpolated between the results (after an event at that time).
 
         Raises:
             ValueOutOfRange: the time is not within the run.
         """
-        self._check_within(t)
+        t = self._within(t)
         k = int(np.searchsorted(self._time, t, side="right")) - 1
         column = self._values_table[:, k]
         if t > self._time[k]:

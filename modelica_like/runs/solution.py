@@ -12,7 +12,6 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.transition import NAME_IN_NOTICE
-from modelica_like.language.units import parse_unit, to_si
 from modelica_like.options import Options
 from modelica_like.runs.energy import EnergyBalance, energy_balance
 from modelica_like.runs.reading import TOGETHER, energy_term, rate_along, variables
@@ -22,7 +21,6 @@ from modelica_like.solve.idas import Integrator
 from modelica_like.solve.initialize import Impact, Point, StartKind
 from modelica_like.solve.recorder import Ended, Event, Segment
 
-_SECOND = parse_unit("s")
 _PAGE = 2**17
 """Numbers that are read at once where those of all variables are too many: to make a function takes as long."""
 
@@ -152,7 +150,7 @@ class Solution(Trajectories):
         columns = dict(zip(names, variables(self.model, self.segments, rows), strict=True)) if names else {}
         return {path: columns[path] if path in columns else self[path] for path in paths}
 
-    def at(self, t: float) -> Values:
+    def at(self, t: float | str) -> Values:
         """Return all variables at a time, integrated from the result before (after an event at that time).
 
         Raises:
@@ -160,13 +158,13 @@ class Solution(Trajectories):
         """
         return self._values(self.point(t))
 
-    def point(self, t: float) -> Point:
+    def point(self, t: float | str) -> Point:
         """Return states, implicit unknowns and modes at a time, integrated from the result before.
 
         Raises:
             ValueOutOfRange: the time is not within the run.
         """
-        self._check_within(t)
+        t = self._within(t)
         segment = next(s for s in reversed(self.segments) if s.times[0] <= t)
         k = int(np.searchsorted(segment.times, t, side="right")) - 1
         point = segment.point(k)
@@ -196,8 +194,7 @@ class Solution(Trajectories):
             UnitError: a text is no time.
         """
         if (begin, end) not in self._balances:
-            named = ("begin", 0, begin), ("end", -1, end)
-            first, last = (self.time[k] if t is None else to_si(t, _SECOND, name) for name, k, t in named)
+            first, last = (self.time[k] if t is None else self._within(t) for k, t in ((0, begin), (-1, end)))
             if first >= last and (begin, end) != (None, None):
                 raise ValueOutOfRange(f"The end of a balance, {last:g} s, is not after its beginning, {first:g} s.")
             segments = self.segments if (begin, end) == (None, None) else tuple(self._part(first, last))

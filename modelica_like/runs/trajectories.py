@@ -15,6 +15,7 @@ from modelica_like.compile.compiled import Vector
 from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean, extra_module
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
+from modelica_like.language.units import parse_unit, to_si
 from modelica_like.solve.initialize import Point
 from modelica_like.solve.recorder import Ended, Event
 from modelica_like.upper import Shown
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from modelica_like.runs.trajectories import Trajectories
 
 
+_SECOND = parse_unit("s")
 ENERGY_TERMS = ("stored_energy", "loss_power", "source_power")
 
 
@@ -120,7 +122,7 @@ class Trajectories(Shown, ABC):
     def __contains__(self, key: object) -> bool: ...
 
     @abstractmethod
-    def at(self, t: float) -> Values:
+    def at(self, t: float | str) -> Values:
         """Return all variables at a time."""
 
     @property
@@ -132,7 +134,7 @@ class Trajectories(Shown, ABC):
     def energy(self) -> EnergyBalance:
         """Return the energy balance over the run."""
 
-    def point(self, t: float) -> Point:
+    def point(self, t: float | str) -> Point:
         """Return states, implicit unknowns and modes at a time.
 
         Raises:
@@ -186,10 +188,13 @@ class Trajectories(Shown, ABC):
         values = {**self.readings, **(dict(zip(more, read_after(self, more), strict=True)) if more else {})}
         return [values[name] for name in names]
 
-    def _check_within(self, t: float) -> None:
+    def _within(self, time: float | str) -> float:
+        """Return a time, a number in s or a quantity, that is within the run."""
+        t = to_si(time, _SECOND, "t") if isinstance(time, str) else float(time)
         first, last = float(self.time[0]), float(self.time[-1])
         if not first <= t <= last:
             raise ValueOutOfRange(f"t = {t:g} s is not within the run, {first:g} s to {last:g} s.")
+        return t
 
     def plot(self, *patterns: str, title: str = "", display: Mapping[str, str] | None = None) -> Figure:
         """Draw trajectories over time: a panel per quantity, modes as bands, events as numbers.

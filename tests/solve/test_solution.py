@@ -199,6 +199,12 @@ def test_at_integrates_to_the_instant(run, t):
     assert values["left.phi"] == pytest.approx(10 * t - 2.5 * t**2 if t < 1 else 7.5 + 5 * (t - 1), rel=1e-8)
 
 
+def test_a_time_may_be_a_quantity(run):
+    assert run.at("500 ms")["left.w"] == pytest.approx(7.5, rel=1e-8)
+    with pytest.raises(UnitError, match="t expects s; '1 m' is m"):
+        run.at("1 m")
+
+
 def test_at_an_event_it_is_the_right_side(run):
     moment = run.events[0].time
     assert run.at(moment)["clutch.tau"] == pytest.approx(0.0, abs=1e-9)
