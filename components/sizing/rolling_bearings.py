@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from modelica_like.language.quantities import Force, Life, Ratio, Revolutions, Speed
 from modelica_like.language.results import Result, line
 
@@ -42,8 +44,11 @@ def bearing_life(
         required_safety: smallest static safety.
     """
     load = radial_factor * abs(radial_load) + axial_factor * abs(axial_load)
-    revolutions = 1e6 * (dynamic_rating / load) ** exponent
+    # What carries nothing, or does not turn, lasts for ever.
+    with np.errstate(divide="ignore"):
+        safety, turns = np.divide(static_rating, load), 1e6 * np.divide(dynamic_rating, load) ** exponent
+        life = 2 * math.pi * np.divide(turns, abs(speed))
     return BearingLife(
-        equivalent_load=load, static_safety=static_rating / load, required_safety=required_safety,
-        life_revolutions=revolutions, life=2 * math.pi * revolutions / abs(speed), speed=speed, speed_limit=speed_limit,
+        equivalent_load=load, static_safety=safety, required_safety=required_safety, life_revolutions=turns, life=life,
+        speed=speed, speed_limit=speed_limit,
     )  # fmt: skip

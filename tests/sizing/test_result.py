@@ -138,3 +138,10 @@ def test_a_bearing_that_turns_backwards_lives_as_long() -> None:
     made = bearing_life(150.0, -100.0, 2600.0, 1060.0, speed_limit=50.0)
     assert made.life == pytest.approx(2 * np.pi * 1e6 * (2600 / 150) ** 3 / 100.0)
     assert judged(made, "speed").exceeded
+
+
+@pytest.mark.parametrize(("load", "speed"), [(0.0, 100.0), (150.0, 0.0), (0.0, 0.0)])
+def test_a_bearing_without_load_or_speed_lasts_for_ever(load: float, speed: float) -> None:
+    made = bearing_life(load, speed, 2600.0, 1060.0)
+    assert made.life == np.inf
+    assert made.static_safety == pytest.approx(1060.0 / 150.0 if load else np.inf)

@@ -138,8 +138,8 @@ def calibrate(
     """
     model = build(drive, free=parameters)
     measured = [data] if isinstance(data, Measurement | str | Path) else list(data)
-    if not measured or not parameters:
-        raise ValueOutOfRange("A calibration needs data and at least one parameter.")
+    if not measured or not parameters or starts < 1:
+        raise ValueOutOfRange("A calibration needs data, at least one parameter, and at least one start.")
     for item in measured:
         if not isinstance(item, Measurement):
             raise ValueOutOfRange(
