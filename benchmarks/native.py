@@ -1,7 +1,8 @@
 """What runs and steps by the compiled run-time take: python benchmarks/native.py.
 
-CPU time of one warm run with 500 results and 10 outputs, the best of several, by `build(drive).native()` and by
-`simulate(…, solver="native")`; and steps per second of machine_tool_startup under a controller in Python.
+CPU time of one warm run with 500 results and 10 outputs, the best of several, by `build(drive).native()`, with its
+equations compiled and without, and by `simulate(…, solver="native")`; and steps per second of machine_tool_startup
+under a controller in Python.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ DRIVES = {
     "machine_table_direct": (ROOT / "examples/machine_table_direct.toml", 0.3),
     "CoupledClutches": (ROOT / "examples/msl/rotational/CoupledClutches.toml", 4.0),
     "machine_tool_startup": (ROOT / "examples/machine_tool_startup.toml", 8.0),
+    "lepelletier": (ROOT / "examples/lepelletier.toml", 2.5),
     "winch": (ROOT / "tests/system/new_drives/winch.toml", 20.0),
 }
 """Netlists, and goals in ms."""
@@ -35,10 +37,10 @@ def best(run: Callable[[], object], seconds: float = 2.0) -> float:
     return found
 
 
-def whole_run(model: CompiledDae) -> Callable[[], object]:
+def whole_run(model: CompiledDae, *, compiled: bool = False) -> Callable[[], object]:
     """Return a run by the handle with 500 results and 10 outputs."""
     end, paths = seconds(model.settings["until"]), [one.path for one in model.flat_variables]
-    handle = model.native(outputs=paths[:: len(paths) // 10][:10])
+    handle = model.native(outputs=paths[:: len(paths) // 10][:10], compiled=compiled)
 
     def run() -> None:
         handle.reset(until=end)
@@ -63,12 +65,13 @@ def control_loop(model: CompiledDae) -> Callable[[], object]:
 
 def main() -> None:
     """Print a table."""
-    print(f"{'':24}{'handle':>10}{'goal':>8}{'simulate':>10}{'IDAS':>10}   ms")
+    print(f"{'':24}{'handle':>10}{'goal':>8}{'compiled':>10}{'ratio':>8}{'simulate':>10}{'IDAS':>10}   ms")
     for name, (path, goal) in DRIVES.items():
         model = build(path)
-        runs = whole_run(model), lambda m=model: simulate(m, solver="native"), lambda m=model: simulate(m)
-        first, second, third = (1e3 * best(run) for run in runs)
-        print(f"{name:24}{first:10.2f}{goal:8.1f}{second:10.2f}{third:10.1f}")
+        handles = whole_run(model), whole_run(model, compiled=True)
+        runs = *handles, lambda m=model: simulate(m, solver="native"), lambda m=model: simulate(m)
+        tapes, code, second, third = (1e3 * best(run) for run in runs)
+        print(f"{name:24}{tapes:10.3f}{goal:8.1f}{code:10.3f}{tapes / code:8.1f}{second:10.2f}{third:10.1f}")
     steps = 1000 / best(control_loop(build(DRIVES["machine_tool_startup"][0])))
     print(f"machine_tool_startup in steps of 1 ms, controller in Python: {steps:.0f} steps/s (goal 20000)")
 

@@ -53,6 +53,8 @@ class Options:
         on_energy_drift: what happens where the stored energy of a component does not follow its power, so that the
             integrator has stepped over something, even with shorter steps: `stop` with an error, or `note` it without
             repetition; with `off` no energy is looked at.
+        compiled: whether the equations of runs by the compiled run-time become machine code, with the same results. A
+            model takes a C compiler about a second, once; without one the run says so, and interprets its tapes.
     """
 
     rtol: float = 1e-7
@@ -64,6 +66,7 @@ class Options:
     on_chattering: OnChattering = "stop"
     max_step: float = math.inf
     on_energy_drift: OnEnergyDrift = "stop"
+    compiled: bool = False
 
     def __post_init__(self) -> None:
         for name, low, high in _RANGES:

@@ -132,7 +132,7 @@ def simulate(
     start: StartKind | None = None, t0: float = 0.0, rtol: float | None = None, atol: float | None = None,
     points: int | None = None, options: Options | None = None, progress: Progress | None = None,
     solver: Solver | None = None, on_chattering: OnChattering | None = None, readings: Sequence[str] = (),
-    inputs: Any = None,
+    inputs: Any = None, compiled: bool | None = None,
 ) -> Solution:  # fmt: skip
     """Simulate a drive.
 
@@ -154,6 +154,7 @@ def simulate(
             runs that are not too large `Solution.read` reads others afterwards.
         inputs: trajectories of open inputs by path, or a table with a column `time` (a dictionary, pandas, a CSV file):
             see `driven`. They are linear in between, hold their first and last value beyond, and the run says so.
+        compiled: whether the compiled run-time has the equations as machine code, see `Options`.
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot continue.
@@ -163,6 +164,7 @@ def simulate(
     if parameters:
         model = model.with_parameters(dict(parameters))
     given: dict[str, Any] = {"rtol": rtol, "atol": atol, "points": points, "on_chattering": on_chattering}
+    given["compiled"] = compiled
     end, chosen = plan(model, until, t0=t0, options=options, **given)
     chosen.check_memory(len(model.states) + len(model.implicit))
     begin = time.perf_counter()

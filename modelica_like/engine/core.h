@@ -14,17 +14,6 @@
 /* Much of the standard is for what no model here has. */
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 
-/* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
-   Versions can only be told to a linker that is given libm. */
-#if defined(OLD_GLIBC) && defined(__GLIBC__) && (defined(__x86_64__) || defined(__aarch64__))
-#ifdef __x86_64__
-#define OLD(f) ".symver " #f "," #f "@GLIBC_2.2.5\n"
-#else
-#define OLD(f) ".symver " #f "," #f "@GLIBC_2.17\n"
-#endif
-__asm__(OLD(exp) OLD(log) OLD(pow) OLD(hypot) OLD(fmod));
-#endif
-
 #define TIME_RESOLUTION 1e-10 /* as in guards_soon */
 #define JUST_TRUE 1e-300      /* as in conditions.py */
 #define AT_EDGE 1e-12         /* an edge or guard so close to zero rests there: rounding of values of about one */
@@ -35,8 +24,6 @@ __asm__(OLD(exp) OLD(log) OLD(pow) OLD(hypot) OLD(fmod));
 #include "types.h"
 
 /* tape.c */
-/* What does not count is not multiplied: an inactive branch may be infinite. */
-static inline double product(double a, double b) { return a == 0 || b == 0 ? 0 : a * b; }
 void tape_run(const Tape *tape, double *slots, double *outputs);
 void tape_tangent(const Tape *tape, const double *slots, double *dots, double *output_dots);
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars);
@@ -45,6 +32,7 @@ void slopes(int operation, double a, double b, double f, double *by_left, double
 int qr_factor(const QrPattern *pattern, const double *values, Instance *c);
 void qr_solve(const QrPattern *pattern, const Instance *c, double *x);
 int factor_matrix(Instance *c);
+int factor_by_code(Instance *c, double diagonal);
 void solve_step(const Instance *c, double *x);
 int lu_factor(int n, double *matrix, int *order);
 void lu_solve(int n, const double *matrix, const int *order, double *x);
@@ -59,8 +47,13 @@ void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int p
 void evaluate_part(Instance *c, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
 void load(Instance *c, double t, const double *point);
+void load_point(Instance *c, double t, const double *point);
 void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void evaluate_now(Instance *c, const Tape *tape, double *outputs); /* at the present point */
+void values_at(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
+void values_now(Instance *c, const Tape *tape, double *outputs);
+const unsigned char *active_guards(Instance *c);
+void run_slopes(Instance *c, double *rates, double *slopes);
 const double *variables_now(Instance *c);
 double largest_of(int n, const double *values);
 int any_of(const unsigned char *marks, int n);

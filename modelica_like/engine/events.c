@@ -48,9 +48,9 @@ double next_moment(Instance *c, int idle_too) {
 /* Evaluates a tape at states moved by their rates. */
 static void look_ahead(Instance *c, const Tape *tape, double step, double *values) {
     double *point = c->vector + c->model->n_z;
-    evaluate_now(c, &c->model->tapes.rates, c->rhs);
+    values_now(c, &c->model->tapes.rates, c->rhs);
     for (int k = 0; k < c->model->n_unknowns; k++) point[k] = c->x[k] + (k < c->model->n_x ? step * c->rhs[k] : 0);
-    evaluate(c, tape, c->state.t + step, point, values);
+    values_at(c, tape, c->state.t + step, point, values);
 }
 
 /* Adds time events that are due and, unless they were found already, state events that are positive or about to be. */
@@ -67,7 +67,7 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
         /* What has rebounded many times in less than the time resolution is judged where it turns round. */
         double later = TIME_RESOLUTION * fmax(1, fabs(c->state.t));
         if (c->state.resting > 0 && c->state.resting < later) look_ahead(c, &m->tapes.guards_soon, later, values);
-        else evaluate_now(c, &m->tapes.guards_soon, values);
+        else values_now(c, &m->tapes.guards_soon, values);
         for (int k = 0; k < m->n_guards; k++)
             if (number_or_false(values[k]) > 0) wanting[m->guard_transition[k]] = 1;
     }
@@ -83,7 +83,7 @@ void drop_balanced(Instance *c, double *soon) {
     int any = 0;
     for (int k = 0; k < c->model->n_guards; k++) any |= number_or_false(soon[k]) > 0 && guard_active(c, k);
     if (!any) return;
-    evaluate_now(c, &c->model->tapes.guards, now);
+    values_now(c, &c->model->tapes.guards, now);
     for (int k = 0; k < c->model->n_guards; k++)
         if (number_or_false(now[k]) < 0 && soon[k] > 0 && soon[k] <= BALANCED * fabs(now[k])) soon[k] = now[k];
 }
@@ -94,7 +94,7 @@ void drop_balanced(Instance *c, double *soon) {
 static void drop_returning(Instance *c, const double *modes, double *soon) {
     const Model *m = c->model;
     double *now = c->guards_before;
-    evaluate_now(c, &m->tapes.guards, now);
+    values_now(c, &m->tapes.guards, now);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
         int returns = guard_active(c, k) && modes[one->mode] == one->target && now[k] > 0;
@@ -165,7 +165,7 @@ int count_clocks(const Instance *c) {
 static void find_ticking(Instance *c, const double *moments, unsigned char *wanting) {
     const Model *m = c->model;
     unsigned char *changed = memset(c->changed, 0, (size_t)m->n_modes);
-    if (m->n_guards > 0) evaluate_now(c, &m->tapes.guards, c->guards);
+    if (m->n_guards > 0) values_now(c, &m->tapes.guards, c->guards);
     for (int k = 0; k < m->n_transitions; k++) {
         const Transition *one = &m->transitions[k];
         int due = !one->timed && !one->ends && is_source(c, one) && c->guards[one->index] > 0;
@@ -235,14 +235,14 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
     memcpy(c->d_earlier, c->d, size);
     if (!share_and_solve(c)) return RESULT_ERROR;
     if (memcmp(c->d_earlier, c->d, size) == 0) return RESULT_OK; /* only rounding could say that nothing gives way */
-    evaluate_now(c, &c->model->tapes.guards_soon, c->guards);
+    values_now(c, &c->model->tapes.guards_soon, c->guards);
     keep_wanting(c, c->guards, wanting);
     return RESULT_OK;
 }
 
 /* Adds guards that an update has made positive, however soon they will fall again: a rebound may be that short. */
 static void want_jumped(Instance *c, const double *before, unsigned char *wanting) {
-    evaluate_now(c, &c->model->tapes.guards, c->guards_before);
+    values_now(c, &c->model->tapes.guards, c->guards_before);
     for (int g = 0; g < c->model->n_guards; g++)
         if (before[g] < 0 && c->guards_before[g] > 0 && guard_active(c, g)) wanting[c->model->guard_transition[g]] = 1;
 }
@@ -287,7 +287,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             for (int k = 0; k < m->n_ideals; k++) same &= c->d[m->ideals[k].mode] == c->d_earlier[m->ideals[k].mode];
             if (!meet(c, same ? GIVEN_BACK : 0, &met)) return RESULT_ERROR;
         }
-        if (m->n_updates > 0 && m->n_guards > 0) evaluate_now(c, &m->tapes.guards, jumped);
+        if (m->n_updates > 0 && m->n_guards > 0) values_now(c, &m->tapes.guards, jumped);
         if (jolts) keep_motions(c);
         if (!update_once(c, &changes)) return RESULT_ERROR;
         memcpy(c->d_fired, c->d, (size_t)m->n_d * sizeof(double));
@@ -315,7 +315,7 @@ Result check_turned_back(Instance *c, const double *before) {
     const Model *m = c->model;
     double step = LATER * TIME_RESOLUTION * fmax(1, fabs(c->state.t)), *now = c->guards_before;
     double *rates = now + m->n_guards, *later = c->edge_guards + m->n_guards;
-    evaluate_now(c, &m->tapes.guards, now);
+    values_now(c, &m->tapes.guards, now);
     look_ahead(c, &m->tapes.guards, step, c->edge_guards);
     for (int g = 0; g < m->n_guards; g++)
         if (guard_active(c, g) && now[g] + 0.5 * step * (rates[g] + later[g]) > 0) return RESULT_OK; /* it comes */

@@ -11,7 +11,7 @@ static Result ask(Instance *c, const Strike *strike, int approaching, int unsolv
     const Model *m = c->model;
     for (int k = 0; k < m->n_holds; k++) c->d[m->holds[k].approach] = approaching ? strike->approach[k] : 0;
     if (unsolved && !solve_now(c, 0)) return RESULT_ERROR;
-    evaluate_now(c, &m->tapes.rates, rates);
+    values_now(c, &m->tapes.rates, rates);
     if (!strike->hard) return RESULT_OK;
     double *trial = c->trials + (size_t)approaching * (size_t)(m->n_unknowns + m->n_d);
     memcpy(trial, c->x, (size_t)m->n_unknowns * sizeof(double));

@@ -197,6 +197,8 @@ Instance *instance_new(Instance bare, const char *token) {
     const double *values[N_KINDS] = {&c->state.t, c->x, c->seen_rates, c->variables, c->p, c->seen_derived, c->u, c->d,
         c->seen_indicators}; /* as Kind */
     memcpy(c->values, values, sizeof values);
+    memset(c->every, 1, (size_t)m->n_guards);
+    c->altered = 1;
     memcpy(c->slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
     return c;

@@ -60,11 +60,11 @@ static void linearize(Instance *c, double t, const double *y, double *slope) {
     for (int k = 0; k < m->n_u; k++) moving |= c->u_rate[k] != 0;
     memset(slope, 0, (size_t)m->n_unknowns * sizeof(double));
     if (moving) {
-        const Tape *ran = evaluate_special(c, &m->tapes.rates, t, y, c->first_rates);
+        load(c, t, y);
         memset(c->dots, 0, m->slot_results * sizeof(double));
         c->dots[0] = 1;
         for (int k = 0; k < m->n_u; k++) c->dots[m->slot_u + k] = c->u_rate[k];
-        tape_tangent(ran, c->slots, c->dots, slope);
+        run_slopes(c, c->first_rates, slope);
     } else evaluate_special(c, &m->tapes.rates, t, y, c->first_rates);
     run_special(c, &m->tapes.jacobian, c->jacobian);
 }
@@ -72,6 +72,7 @@ static void linearize(Instance *c, double t, const double *y, double *slope) {
 /* M * diagonal - J, factorised. */
 int factor_step(Instance *c, double diagonal) {
     const Model *m = c->model;
+    if (factor_by_code(c, diagonal)) return 1;
     memset(c->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
     for (int k = 0; k < m->n_jacobian; k++) c->matrix[m->jacobian_to_step[k]] = -c->jacobian[k];
     for (int k = 0; k < m->n_x; k++) c->matrix[m->step_diagonal[k]] += diagonal;
@@ -94,13 +95,44 @@ double error_norm(const Instance *c, const double *first, const double *last, co
     return sqrt(sum / c->model->n_x);
 }
 
+typedef double Pair __attribute__((vector_size(2 * sizeof(double)), aligned(sizeof(double)), may_alias));
+
+/* to = from + the sum of weights * rows, in this order, for n columns of rows of length `row`: four at a
+ * time, as sums wait for each other. */
+static void combine(
+    int n, const double *from, int count, const double *weights, const double *rows, int row, double *to) {
+    int k = 0;
+    for (; k + 4 <= n; k += 4) {
+        const Pair *given = (const Pair *)(const void *)(from + k);
+        Pair low = given[0], high = given[1], *result = (Pair *)(void *)(to + k);
+        for (int j = 0; j < count; j++) {
+            const Pair *more = (const Pair *)(const void *)(rows + (size_t)j * (size_t)row + k);
+            low += weights[j] * more[0];
+            high += weights[j] * more[1];
+        }
+        result[0] = low;
+        result[1] = high;
+    }
+    for (; k < n; k++) {
+        double sum = from[k];
+        for (int j = 0; j < count; j++) sum += weights[j] * rows[(size_t)j * (size_t)row + k];
+        to[k] = sum;
+    }
+}
+
+static int all_finite(int n, const double *values) {
+    int finite = 1;
+    for (int k = 0; k < n; k++) finite &= fabs(values[k]) <= DBL_MAX;
+    return finite;
+}
+
 /* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
  * Returns the error in tolerances, or -1 if the equations gave values that are not finite, or a singular matrix. */
 double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece) {
     int n = c->model->n_unknowns;
     size_t size = (size_t)n * sizeof(double);
     double *last = last_of(c->model, piece), *slope = c->stages + (size_t)STAGES * (size_t)n, *y = c->point,
-           factors[STAGES];
+           factors[STAGES], one = 1;
     piece->begin = t;
     piece->end = t + h;
     memcpy(piece->points, first, size);
@@ -108,32 +140,25 @@ double rosenbrock_step(Instance *c, double t, const double *first, double h, int
     if (!factor_step(c, step_diagonal(h))) return -1;
     c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
-        double *stage = c->stages + (size_t)i * n;
-        for (int k = 0; k < n; k++) {
-            double moved = i < LAST_POINTS ? first[k] : y[k] + stage[k - n];
-            for (int j = 0; j < i && i < LAST_POINTS; j++) moved += A[i][j] * c->stages[j * n + k];
-            y[k] = moved;
-        }
+        double *stage = c->stages + (size_t)i * n, by_time = h * D_TIME[i];
+        if (i < LAST_POINTS) combine(n, first, i, A[i], c->stages, n, y);
+        else combine(n, y, 1, &one, stage - n, n, y);
         if (i == 0) memcpy(stage, c->first_rates, size);
-        else evaluate_special(c, &c->model->tapes.rates, t + C_TIME[i] * h, y, stage);
-        for (int j = 0; j < i; j++) factors[j] = C[i][j] / h;
-        for (int k = 0; k < n; k++) {
-            double right = stage[k];
-            for (int j = 0; j < i && k < c->model->n_x; j++) right += factors[j] * c->stages[j * n + k];
-            stage[k] = right + h * D_TIME[i] * slope[k];
-            if (!isfinite(stage[k])) return -1;
+        else {
+            load_point(c, t + C_TIME[i] * h, y);
+            run_special(c, &c->model->tapes.rates, stage);
         }
+        for (int j = 0; j < i; j++) factors[j] = C[i][j] / h;
+        combine(c->model->n_x, stage, i, factors, c->stages, n, stage);
+        combine(n, stage, 1, &by_time, slope, n, stage);
+        if (!all_finite(n, stage)) return -1;
         solve_step(c, stage);
     }
-    for (int k = 0; k < n; k++) {
-        last[k] = y[k] + c->stages[(STAGES - 1) * n + k];
-        if (!isfinite(last[k])) return -1;
-        for (int row = 0; row < 3; row++) {
-            double sum = 0;
-            for (int i = 0; i < STAGES; i++) sum += DENSE[row][i] * c->stages[i * n + k];
-            last[(row + 1) * n + k] = sum;
-        }
-    }
+    combine(n, y, 1, &one, c->stages + (size_t)(STAGES - 1) * n, n, last);
+    if (!all_finite(n, last)) return -1;
+    memset(last + n, 0, 3 * size);
+    for (double *row = last + n; row <= last + 3 * (size_t)n; row += n)
+        combine(n, row, STAGES, DENSE[(row - last) / n - 1], c->stages, n, row);
     return error_norm(c, first, last, c->stages + (STAGES - 1) * n);
 }
 
@@ -144,7 +169,7 @@ double step_diagonal(double h) { return 1 / (h * GAMMA); }
  * rounding tell nothing about it. */
 double first_step(Instance *c) {
     double size, speed, *rates = c->rhs;
-    evaluate_now(c, &c->model->tapes.rates, rates);
+    values_now(c, &c->model->tapes.rates, rates);
     size = error_norm(c, c->x, c->x, c->x);
     speed = error_norm(c, c->x, c->x, rates);
     if (!isfinite(speed) || c->model->n_x == 0) return 1e-3;
@@ -287,7 +312,7 @@ Result take_changes(Instance *c) {
 Result pass_instant(Instance *c, unsigned char *wanting, int located) {
     int whens = c->model->n_updates > 0 && c->model->n_guards > 0;
     size_t size = (size_t)c->model->n_x * sizeof(double);
-    if (whens) evaluate_now(c, &c->model->tapes.guards, c->looks);
+    if (whens) values_now(c, &c->model->tapes.guards, c->looks);
     memcpy(c->first, c->x, size);
     memcpy(c->d_begun, c->d, (size_t)c->model->n_d * sizeof(double));
     if (!iterate_events(c, wanting, located)) return RESULT_ERROR;
@@ -318,14 +343,14 @@ static Result pass_event(Instance *c) {
     s->step = 0;
     s->z_valid = 0;
     if (!settle(c) || !reach_instant(c)) return RESULT_ERROR;
-    if (ticks) evaluate_now(c, &c->model->tapes.rates, rates);
+    if (ticks) values_now(c, &c->model->tapes.rates, rates);
     if (ticks && find_wanting(c, wanting, 0)) memcpy(c->ticking, wanting, c->model->n_transitions);
     if (!pass_instant(c, wanting, located)) return RESULT_ERROR;
     s->z_valid = 1;
     if (!leave_instant(c, s->n_events != events)) return RESULT_ERROR;
     if (c->integrator != NULL && was_idle(c, ticks)) s->panel_valid = panel_valid;
     if (!ticks || memcmp(c->first, c->x, size) != 0) return RESULT_OK;
-    evaluate_now(c, &c->model->tapes.rates, c->rhs);
+    values_now(c, &c->model->tapes.rates, c->rhs);
     if (memcmp(rates, c->rhs, size) == 0) s->step = step; /* a tick without effect on what moves now */
     return RESULT_OK;
 }

@@ -1,13 +1,7 @@
 /* Linear algebra: sparse LU and QR with patterns known ahead, dense LU, dense least squares. */
 #include "core.h"
 
-#define MOST_GROWTH 1e4    /* without exchanges: rounding is 2e-12 of a row's and column's size, below tolerances */
 #define SAYS_NOTHING 1e-24 /* square of the relative size of an equation that is none */
-
-/* To a value that is larger, or no number. */
-static inline void raise_to(double *most, double value) {
-    if (!(value <= *most)) *most = value;
-}
 
 static inline void reflect(const QrPattern *a, const Instance *c, int column, double *x) {
     double dot = 0;
@@ -159,13 +153,30 @@ int factor_matrix(Instance *c) {
     return c->by_lu || qr_factor(a, c->matrix, c);
 }
 
+/* As compiled code does it; returns 0 where there is none, or it is not by LU without exchanges. */
+int factor_by_code(Instance *c, double diagonal) {
+    const Codes *codes = c->model->codes;
+    int last = 2 * c->model->step.size + 1 - c->model->lu.n_ends;
+    c->by_lu = codes != NULL && codes->factor != NULL &&
+               codes->factor(c->jacobian, diagonal, c->lu, c->lu_pivots, c->lu_last) &&
+               lu_factor(last, c->lu_last, c->last_order);
+    return c->by_lu;
+}
+
 void solve_step(const Instance *c, double *x) {
     const LuPattern *lu = &c->model->lu;
     double *y = c->qr_work;
     int n = c->model->step.size, first = lu->n_ends - 1 - n;
     const int *l_end = lu->ends, *u_end = l_end + first;
+    const Codes *codes = c->model->codes;
     if (!c->by_lu) {
         qr_solve(&c->model->step, c, x);
+        return;
+    }
+    if (codes != NULL && codes->factor != NULL) {
+        codes->lower(c->lu, x, y);
+        lu_solve(n - first, c->lu_last, c->last_order, y + first);
+        codes->upper(c->lu, c->lu_pivots, y, x);
         return;
     }
     for (int k = 0; k < n; k++) y[lu->row_place[k]] = x[k];

@@ -16,6 +16,9 @@ typedef struct { /* guards and their rates at a time within a step; behind them 
 
 enum { QUIET, CROSSING, HUMP }; /* guards that are not quiet are candidates */
 
+/* Guards that present modes can fire, as they were at the last look. */
+#define EACH_ACTIVE(g) for (int place = 0, g; place < c->n_active && (g = c->active_guard[place], 1); place++)
+
 static Look room_for_look(const Instance *c, int number) {
     double *values = c->looks + 3 * (size_t)c->model->n_guards * (size_t)number;
     return (Look){0, values, values + c->model->n_guards};
@@ -31,7 +34,8 @@ static int look_at(Instance *c, double t, double *point, int candidates, Look *l
     if (!solve_implicit(c, t, point, 1)) return 0;
     take_guards(c, t, point, candidates, look->values);
     look->t = t;
-    for (int g = 0; g < c->model->n_guards; g++) {
+    active_guards(c);
+    EACH_ACTIVE (g) {
         if (candidates && c->kinds[g] == QUIET) continue;
         look->values[g] = number_or_false(look->values[g]);
         if (!isfinite(look->rates[g])) look->rates[g] = 0;
@@ -96,21 +100,23 @@ static double guess(const Look *before, const Look *after, int g) {
 
 static int find_candidates(Instance *c, const Look *before, const Look *after) {
     double h = after->t - before->t;
-    for (int g = 0; g < c->model->n_guards; g++) {
+    int any = 0;
+    memset(c->kinds, QUIET, (size_t)c->model->n_guards);
+    EACH_ACTIVE (g) {
         double g0 = before->values[g], g1 = after->values[g];
-        c->kinds[g] = QUIET;
-        if (!guard_active(c, g) || g0 > 0) continue;
+        if (g0 > 0) continue;
         if (g1 > 0) c->kinds[g] = CROSSING;
         else if (is_hump(g0, before->rates[g] * h, g1, after->rates[g] * h)) c->kinds[g] = HUMP;
+        any |= c->kinds[g];
     }
-    return any_of(c->kinds, c->model->n_guards);
+    return any;
 }
 
 /* Newton's step to the earliest zero of a candidate; tells whether one is positive already. */
 static int newton(const Instance *c, const Look *look, double *step) {
     int positive = 0;
     *step = INFINITY;
-    for (int g = 0; g < c->model->n_guards; g++) {
+    EACH_ACTIVE (g) {
         if (c->kinds[g] == QUIET) continue;
         positive |= look->values[g] > 0;
         if (look->rates[g] > 0) *step = fmin(*step, -look->values[g] / look->rates[g]);
@@ -121,7 +127,7 @@ static int newton(const Instance *c, const Look *look, double *step) {
 /* The first time at which a guard that rises and falls again is positive; infinite if none is. */
 static double positive_top(Instance *c, const Look *before, const Look *after, Look *look) {
     double first = INFINITY;
-    for (int g = 0; g < c->model->n_guards; g++) {
+    EACH_ACTIVE (g) {
         double low = before->t, high = after->t, t = c->kinds[g] == HUMP ? guess(before, after, g) : low,
                top = INFINITY;
         for (int n = 0; n < MAX_TRIALS && c->kinds[g] == HUMP && isinf(top); n++) {
@@ -144,7 +150,7 @@ static int locate(Instance *c, const Look *before, const Look *after, Look *look
     int positive = newton(c, after, &step);
     last = fmin(positive ? last : INFINITY, positive_top(c, before, after, look));
     if (!isfinite(last)) return 0;
-    for (int g = 0; g < c->model->n_guards; g++)
+    EACH_ACTIVE (g)
         if (c->kinds[g] != QUIET) t = fmin(t, guess(before, after, g));
     t = fmin(t, last);
     for (int rough = 1; rough >= 0; rough--) {
@@ -165,8 +171,8 @@ static int mark_wanting(Instance *c, const Look *look, double tolerance) {
     const Model *m = c->model;
     double *soon = look->rates + m->n_guards;
     int any = 0;
-    evaluate(c, &m->tapes.guards_soon, c->piece->end, last_of(m, c->piece), soon);
-    for (int g = 0; g < m->n_guards; g++) {
+    values_at(c, &m->tapes.guards_soon, c->piece->end, last_of(m, c->piece), soon);
+    EACH_ACTIVE (g) {
         int near = look->values[g] > 0 || (look->rates[g] > 0 && -look->values[g] <= 10 * tolerance * look->rates[g]);
         if (c->kinds[g] != QUIET && near && number_or_false(soon[g]) > 0) any = c->wanting[m->guard_transition[g]] = 1;
     }
@@ -181,11 +187,12 @@ static const double *guards_moved(Instance *c, const Piece *piece, double t, con
     memset(moved, 0, (size_t)m->n_guards * sizeof(double));
     piece_at(m, piece, t, point);
     evaluate_part(c, t, point, here);
+    active_guards(c);
     for (int bit = 1; bit < 2 * m->n_x; bit *= 2) {
         piece_at(m, piece, t, point);
         for (int k = 0; k < m->n_x; k++) point[k] += k & (bit / 2) ? -changes[k] : changes[k];
         evaluate_part(c, t, point, shaken);
-        for (int g = 0; g < m->n_guards; g++)
+        EACH_ACTIVE (g)
             if (c->kinds[g] != QUIET) moved[g] = fmax(moved[g], fabs(shaken[g] - here[g]));
     }
     return moved;
@@ -207,7 +214,7 @@ const double *rounding_of_guards(Instance *c, const Piece *piece, double t) {
  * another integrator swing by them: there own steps decide. */
 static int is_within_tolerance(Instance *c, const Look *before, const Look *after) {
     const double *moved = moved_relatively(c, c->whole, after->t, c->state.tolerance, c->state.absolute);
-    for (int g = 0; g < c->model->n_guards; g++)
+    EACH_ACTIVE (g)
         if (c->kinds[g] != QUIET && fmax(fabs(before->values[g]), fabs(after->values[g])) <= moved[g]) return 1;
     return 0;
 }
@@ -219,11 +226,11 @@ static int is_within_error(Instance *c, const Look *after) {
     if (c->doubts >= MOST_DOUBTS || c->whole->end - begin < least) return 0;
     const double *moved = guards_moved(c, c->whole, after->t, c->step_error);
     int any = 0;
-    for (int g = 0; g < c->model->n_guards; g++) any |= c->kinds[g] == CROSSING && after->values[g] <= moved[g];
+    EACH_ACTIVE (g) any |= c->kinds[g] == CROSSING && after->values[g] <= moved[g];
     if (!any) return 0;
     double *errors = memcpy(room_for_look(c, DEPTH + 2).values, moved, (size_t)c->model->n_guards * sizeof(double));
     const double *rounding = rounding_of_guards(c, c->whole, after->t);
-    for (int g = 0; g < c->model->n_guards; g++)
+    EACH_ACTIVE (g)
         if (c->kinds[g] == CROSSING && after->values[g] <= errors[g] && errors[g] > rounding[g]) return 1;
     return 0;
 }
@@ -234,7 +241,7 @@ typedef enum { NOTHING, ENDED, TOO_LONG } Found;
 static Found look_behind(Instance *c, Look *look) {
     double due = c->piece->end + TIME_RESOLUTION * fmax(1, fabs(c->piece->end));
     if (!step_to(c, fmin(due, c->whole->end), look)) return TOO_LONG;
-    for (int g = 0; g < c->model->n_guards; g++)
+    EACH_ACTIVE (g)
         if (c->kinds[g] == CROSSING && fmin(look->values[g], look->values[g] + (due - look->t) * look->rates[g]) > 0)
             c->state.event_pending = c->wanting[c->model->guard_transition[g]] = 1;
     return ENDED;
@@ -265,10 +272,9 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
 /* Are the guards between two looks what these tell of them? */
 static int behave(const Instance *c, const Look *before, const Look *middle, const Look *after) {
     double h = after->t - before->t;
-    for (int g = 0; g < c->model->n_guards; g++) {
+    EACH_ACTIVE (g) {
         double g0 = before->values[g], g1 = after->values[g], value = middle->values[g];
         double size = fmax(fabs(value), fmax(fabs(g0), fabs(g1)));
-        if (!guard_active(c, g)) continue;
         if (fabs(value - cubic(MIDDLE, g0, before->rates[g] * h, g1, after->rates[g] * h)) > BEHAVES * size) return 0;
     }
     return 1;
@@ -289,9 +295,8 @@ double soonest_zero(Instance *c) {
     Look now = room_for_look(c, DEPTH + 2);
     memcpy(point, c->x, (size_t)c->model->n_unknowns * sizeof(double));
     if (c->model->n_guards == 0 || !look_at(c, c->state.t, point, 0, &now)) return soon;
-    for (int g = 0; g < c->model->n_guards; g++)
-        if (guard_active(c, g) && now.values[g] < 0 && now.rates[g] > 0)
-            soon = fmin(soon, -now.values[g] / now.rates[g]);
+    EACH_ACTIVE (g)
+        if (now.values[g] < 0 && now.rates[g] > 0) soon = fmin(soon, -now.values[g] / now.rates[g]);
     return soon;
 }
 
@@ -303,7 +308,7 @@ int search_events(Instance *c) {
     c->look_valid = 1;
     before.t = whole->begin;
     /* What the last event left positive did not want to fire: it is on its way down. */
-    for (int g = 0; g < c->model->n_guards; g++) before.values[g] = fmin(before.values[g], 0);
+    EACH_ACTIVE (g) before.values[g] = fmin(before.values[g], 0);
     if (!look_inside(c, whole->end, 0, &after)) return 0;
     Found found = look_into(c, &before, &after, DEPTH);
     if (found == NOTHING) memcpy(before.values, after.values, 2 * (size_t)c->model->n_guards * sizeof(double));

@@ -3,12 +3,11 @@
 #define MODEL_H
 
 #include <float.h>
-#include <math.h>
 #include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
+
+#include "code.h"
 
 #define OPERATION(name, value, by_a, by_b) OPERATION_##name,
 typedef enum {
@@ -159,6 +158,8 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     int n_unknowns, n_d, n_y, n_nodes, n_derived, n_moments, n_determinants, n_starts, n_start_values;
     int n_reset_values, most_members;
     int slot_x, slot_z, slot_p, slot_u, slot_d, slot_y, slot_constants, slot_results, n_slots;
+    const Codes *codes; /* compiled, or NULL */
+    int n_known;        /* values that their parameters and modes decide */
     unsigned char *own; /* bytes that belong to the model, or NULL */
     void (*release)(void *memory);
 } Model;

@@ -6,17 +6,6 @@
 #define BOUNDED_NEWTON 3 /* iterations where the work is bounded; the next step takes up what they leave */
 #define SOLVED 1e-8      /* of the residual before an iteration: they are piecewise linear, and solved */
 
-static double sign(double a) { return a < 0 ? -1 : a > 0 ? 1 : a; }
-
-/* a ? b : 0 without a branch: which one is taken cannot be foreseen where a tape has not run for some time. */
-static inline double if_else_zero(double a, double b) {
-    uint64_t bits;
-    memcpy(&bits, &b, sizeof bits);
-    bits &= 0 - (uint64_t)(a != 0);
-    memcpy(&b, &bits, sizeof b);
-    return b;
-}
-
 /* Partial derivatives of a value f = operation(a, b). A unary operation has its operand on both sides. */
 void slopes(int operation, double a, double b, double f, double *by_left, double *by_right) {
 #define OPERATION(name, value, by_a, by_b) \
@@ -189,10 +178,50 @@ static void write_special(Instance *c, Special *s, const Tape *tape) {
     }
 }
 
+/* Lists and marks the guards of the modes at the point that was loaded last. */
+const unsigned char *active_guards(Instance *c) {
+    if (c->active_by == c->decided_by + 1) return c->active;
+    c->active_by = c->decided_by + 1;
+    c->n_active = 0;
+    for (int g = 0; g < c->model->n_guards; g++)
+        if ((c->active[g] = (unsigned char)guard_active(c, g))) c->active_guard[c->n_active++] = g;
+    return c->active;
+}
+
+/* The compiled code of a tape, or NULL. What parameters and modes decide of it is then known. */
+static const Code *code_of(Instance *c, const Tape *tape, const double **known) {
+    int k = (int)(tape - tapes_of(c->model));
+    if (c->model->codes == NULL || k >= N_CODES || c->model->codes->tapes[k].run == NULL) return NULL;
+    const Code *codes = c->model->codes->tapes;
+    double *values = c->known_values;
+    for (int before = 0; before < k; before++) values += codes[before].n_known;
+    if (c->known_by[k] != c->altered) codes[k].known(c->slots, values);
+    c->known_by[k] = c->altered;
+    *known = values;
+    return &codes[k];
+}
+
+static int run_code(Instance *c, const Tape *tape, const unsigned char *wanted, double *outputs) {
+    const double *known;
+    const Code *code = code_of(c, tape, &known);
+    if (code != NULL) code->run(c->slots, known, wanted, outputs);
+    return code != NULL;
+}
+
+/* The rates, and their slopes along the dots of their arguments. */
+void run_slopes(Instance *c, double *rates, double *slopes) {
+    const Tape *tape = &c->model->tapes.rates;
+    const double *known;
+    const Code *code = code_of(c, tape, &known);
+    if (code != NULL) code->slopes(c->slots, known, c->dots, rates, slopes);
+    else tape_tangent(run_special(c, tape, rates), c->slots, c->dots, slopes);
+}
+
 /* Runs a tape with the slots as they are loaded. Of outputs that are not wanted, any value may come. Returns
  * the tape that has run. */
 const Tape *run_special(Instance *c, const Tape *tape, double *outputs) {
     Special *s = special_of(c, tape);
+    if (run_code(c, tape, active_guards(c), outputs)) return tape;
     if (s->belongs_to != c->decided_by) s->uses = 0;
     s->belongs_to = c->decided_by;
     int special = s->uses > WORTH_IT && !c->bounded; /* where the work is bounded: working out costs more than a step */
@@ -210,6 +239,7 @@ const Tape *run_special(Instance *c, const Tape *tape, double *outputs) {
  * `evaluate_part`, until it is made anew. */
 void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int period) {
     const Special *s = special_of(c, tape);
+    if (c->model->codes != NULL) return;
     const Tape *whole = s->belongs_to == c->decided_by && s->uses > WORTH_IT ? &s->tape : tape;
     Special *part = &c->special[N_SPECIALS];
     unsigned char *needed = memset(c->needed_slots, 0, (size_t)(c->model->n_slots));
@@ -241,11 +271,12 @@ void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int p
     part->tape.n_operations = written;
 }
 
-/* Of outputs that are not wanted, values stay as they are. */
+/* Of outputs that are not wanted, values may stay as they are. */
 void evaluate_part(Instance *c, double t, const double *point, double *outputs) {
     const Special *part = &c->special[N_SPECIALS];
     double *values = c->part_values;
     load(c, t, point);
+    if (run_code(c, &c->model->tapes.guards, active_guards(c), outputs)) return;
     tape_run(&part->tape, c->slots, values);
     for (int k = 0; k < part->tape.n_outputs; k++) outputs[part->wanted[k]] = values[k];
 }
@@ -265,20 +296,29 @@ void ask_for(Instance *c, int node) {
 /* A point of the solution: evaluate tapes there, solve the implicit equations, check that all blocks are regular. */
 double input_at(const Instance *c, int k, double t) { return c->u[k] + c->u_rate[k] * (t - c->state.u_time); }
 
+/* With parameters and modes as they were loaded last. */
+void load_point(Instance *c, double t, const double *point) {
+    const Model *m = c->model;
+    c->slots[0] = t;
+    memcpy(c->slots + m->slot_x, point, m->n_unknowns * sizeof(double));
+    for (int k = 0; k < m->n_u; k++) c->slots[m->slot_u + k] = input_at(c, k, t);
+}
+
 void load(Instance *c, double t, const double *point) {
     const Model *m = c->model;
     double *slots = c->slots;
-    slots[0] = t;
-    memcpy(slots + m->slot_x, point, m->n_unknowns * sizeof(double));
-    for (int k = 0; k < m->n_u; k++) slots[m->slot_u + k] = input_at(c, k, t);
-    if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) != 0)
+    load_point(c, t, point);
+    if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) != 0) {
+        c->altered++;
         for (int k = 0; k < m->n_p; k++) {
             if (slots[m->slot_p + k] != c->p[k] && !c->tuned[k]) c->decided_by++;
             slots[m->slot_p + k] = c->p[k];
         }
+    }
     if (memcmp(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double)) != 0) {
         memcpy(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double));
         c->decided_by++;
+        c->altered++;
     }
 }
 
@@ -286,6 +326,14 @@ void evaluate(Instance *c, const Tape *tape, double t, const double *point, doub
     load(c, t, point);
     tape_run(tape, c->slots, outputs);
 }
+
+/* The same for values alone: slots of operations may keep other values. */
+void values_at(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
+    load(c, t, point);
+    if (!run_code(c, tape, c->every, outputs)) tape_run(tape, c->slots, outputs);
+}
+
+void values_now(Instance *c, const Tape *tape, double *outputs) { values_at(c, tape, c->state.t, c->x, outputs); }
 
 void evaluate_now(Instance *c, const Tape *tape, double *outputs) { evaluate(c, tape, c->state.t, c->x, outputs); }
 
@@ -342,7 +390,7 @@ Result check_singular(Instance *c) {
     for (int k = 0; k < m->n_determinants; k++)
         if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return fail(c, BLOCK_SINGULAR, t, k);
     if (c->bounded) return RESULT_OK; /* the next step tells */
-    tape_run(&m->tapes.rates, c->slots, values);
+    values_now(c, &m->tapes.rates, values);
     for (int k = 0; k < m->n_x; k++)
         if (!isfinite(values[k])) return fail(c, RATE_NOT_FINITE, k, t);
     return RESULT_OK;

@@ -105,19 +105,21 @@ typedef struct {
         A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d),  \
         A(kept_z, n_z), A(reactions, members), A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges),   \
         A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n), A(edge_guards, 2 * guards),           \
-        A(trials, 2 * (n + n_d))
+        A(trials, 2 * (n + n_d)), A(known_values, m->n_known)
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; jolted: what new
  * values of states let go; idle:
  * time events that changed nothing of d that is felt by what moves when they came last */
 #define WORK_INDICES(A)                                                                                           \
     A(order, n_z), A(last_order, last), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), \
-        A(member, members), A(pivots, members), A(same, slots), A(places_of_slots, slots), A(steady_places, n)
+        A(member, members), A(pivots, members), A(same, slots), A(places_of_slots, slots), A(steady_places, n),   \
+        A(active_guard, guards)
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
         A(tuned, m->n_p), A(entered, holds), A(jolted, holds), A(renewed, m->n_x), A(keeps, resets),                \
-        A(positive, guards), A(idle, m->n_transitions), A(ticking, m->n_transitions), A(felt, n_d)
+        A(positive, guards), A(active, guards), A(every, guards), A(idle, m->n_transitions),                        \
+        A(ticking, m->n_transitions), A(felt, n_d)
 
 typedef struct Gradient Gradient; /* see gradient.c */
 
@@ -174,7 +176,11 @@ typedef struct Instance {
     int stopped;                     /* something has been stopped at the present instant */
     Special special[N_SPECIALS + 1]; /* the last one: a part, see `make_part` */
     double *part_values;
-    uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
+    uint64_t decided_by;        /* counts changes of what decides about tapes: modes and parameters */
+    uint64_t altered;           /* counts all changes of these, those of tuned parameters, too */
+    uint64_t known_by[N_CODES]; /* at which of the latter what compiled tapes know was worked out */
+    uint64_t active_by;         /* behind which of the former guards were marked `active` */
+    int n_active;               /* of `active_guard` */
 
     const char *name;
     void *environment;

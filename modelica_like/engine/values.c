@@ -57,7 +57,7 @@ Result get_value(Instance *c, const Variable *v, double *value) {
 Result make_consistent(Instance *c) { return make_ready(c) && settle(c); }
 
 void get_derivatives(Instance *c, double *derivatives) {
-    evaluate_now(c, &c->model->tapes.rates, c->rhs);
+    values_now(c, &c->model->tapes.rates, c->rhs);
     memcpy(derivatives, c->rhs, c->model->n_x * sizeof(double));
     rest_rates(c, derivatives);
 }
@@ -68,7 +68,7 @@ void get_derivatives(Instance *c, double *derivatives) {
  * an offset. It shifts no event, as it is gone above zero; its size is that of rounding, and products of it do not
  * underflow, by whose sign root finders judge. */
 void get_indicators(Instance *c, double *indicators) {
-    evaluate_now(c, &c->model->tapes.guards_soon, c->guards);
+    values_now(c, &c->model->tapes.guards_soon, c->guards);
     drop_balanced(c, c->guards);
     for (int k = 0; k < c->model->n_guards; k++) {
         double value = guard_active(c, k) ? number_or_false(c->guards[k]) : -1;

@@ -63,7 +63,7 @@ def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
 def own_sources(faces: Iterable[Face]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
     files = (name for face in faces for name in _FACES[face])
-    headers = ("codes.h", "core.h", "types.h", "model.h", "modelica_like.h", "operations.h")
+    headers = ("code.h", "codes.h", "core.h", "types.h", "model.h", "modelica_like.h", "operations.h")
     names = (*headers, "model_data.c", *RUNTIME, *files)
     return {name: (_ENGINE / name).read_text(encoding="utf-8") for name in names}
 

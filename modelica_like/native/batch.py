@@ -51,6 +51,9 @@ class Batch:
         span: start and end time in s.
         start: kind of start; by default that of the netlist.
 
+    Attributes:
+        notice: why equations are not compiled that should be, or "".
+
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.
         ExportError: there is no library, and none can be compiled.
@@ -62,7 +65,8 @@ class Batch:
         start: StartKind | None = None,
     ) -> None:  # fmt: skip
         settings = {**model.settings, "on_chattering": options.on_chattering}
-        self._native = NativeModel.of(model.twin(settings=settings), start)
+        self._native = NativeModel.of(model.twin(settings=settings), start, compiled=options.compiled)
+        self.notice = self._native.notice
         self._options, self._span = options, span
         rows = [(_KINDS.index(reading.kind), reading.place, *reading.change, 0, reading.moment) for reading in readings]
         self._readings = np.array(rows, _RECORD)

@@ -45,6 +45,8 @@ class Native:
         by: parameters, inputs that are held, and start values; `gradient` differentiates with respect to them.
         fixed_step: step size in s, or a time such as "1 ms", for bounded work per step; steps and output intervals
             are whole numbers of it. By default the step size is adaptive.
+        compiled: whether the equations become machine code, with the same results: at first use the C compiler takes
+            about a second. Without a compiler `notice` says so, and they run as tapes.
 
     Raises:
         ValueOutOfRange: the fixed step is not a positive time.
@@ -52,18 +54,20 @@ class Native:
     Attributes:
         inputs: set by the next step, shape (inputs,); write into it.
         outputs: read by the last step, shape (outputs,); the next step overwrites it.
+        notice: why equations are not compiled that should be, or "".
     """
 
     @checked
     def __init__(
         self, model: CompiledDae, inputs: Sequence[str] = (), outputs: Sequence[str] = (), *, by: Sequence[str] = (),
         start: StartKind | None = None, rtol: float = Options.rtol, atol: float | None = None,
-        fixed_step: float | str | None = None,
+        fixed_step: float | str | None = None, compiled: bool = False,
     ) -> None:  # fmt: skip
-        self._instance = Instance(model, start, positive_step(fixed_step))
+        self._instance = Instance(model, start, positive_step(fixed_step), compiled=compiled)
         self._library, self._address = self._instance.library, self._instance.address
         self._tolerances = rtol, rtol / 100 if atol is None else atol
         names = self._instance.native
+        self.notice = names.notice
         self._references = names.references(inputs), names.references(outputs)
         self._by = names.references(by)
         self.inputs, self.outputs = np.zeros(len(inputs)), np.zeros(len(outputs))

@@ -81,6 +81,7 @@ INTEGRATOR = c.CFUNCTYPE(c.c_int, _NUMBER, c.POINTER(Panel))
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "open": (_POINTER, [c.c_char_p, c.c_size_t, c.c_char_p]),
     "close": (None, [_POINTER]),
+    "compiled": (None, 2 * [_POINTER]),
     "new": (_POINTER, [_POINTER]),
     "free": (None, [_POINTER]),
     "message": (c.c_char_p, [_POINTER]),

@@ -18,6 +18,7 @@ from modelica_like.fmi.model_file import model_file
 from modelica_like.fmi.start_tables import start_tables
 from modelica_like.fmi.tables import make_tables
 from modelica_like.garbage import without_garbage_search
+from modelica_like.native.code import compiled_code
 from modelica_like.native.codes import Code
 from modelica_like.native.failures import Failure, error_of
 from modelica_like.native.library import MESSAGE_LENGTH, OK, POINT, library
@@ -34,6 +35,10 @@ class NativeModel:
         start: kind of start, if instances compute it themselves; by default that of the netlist.
         fixed_step: of its instances in s, 0 for adaptive steps.
         plan: which start values determine what; by default as the parameters and declared modes of the model ask for.
+        compiled: whether its equations run as compiled code.
+
+    Attributes:
+        notice: why they do not in spite of that, or "".
 
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.
@@ -43,18 +48,23 @@ class NativeModel:
 
     @without_garbage_search()
     def __init__(
-        self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0, plan: StartPlan | None = None
-    ) -> None:
+        self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0,
+        plan: StartPlan | None = None, *, compiled: bool = False,
+    ) -> None:  # fmt: skip
         twin = model.twin(settings={**model.settings, **({"start": start} if start else {})})
         face = interface(twin)
         tables = start_tables(twin, plan) if plan else face.start
-        data = model_file(make_tables(twin, tables), face.variables, "{native}", Options.rtol, fixed_step)
+        made = make_tables(twin, tables)
+        data = model_file(made, face.variables, "{native}", Options.rtol, fixed_step)
         self.library = library()
         message = ctypes.create_string_buffer(MESSAGE_LENGTH)
         self.address = self.library.open(data, len(data), message)
         if not self.address:
             raise ModelicaLikeError(message.value.decode())
         weakref.finalize(self, self.library.close, self.address)
+        self._code, self.notice = compiled_code(made) if compiled else (None, "")
+        if self._code is not None:
+            self.library.compiled(self.address, ctypes.addressof(ctypes.c_char.in_dll(self._code, "codes")))
         self.start: StartKind = twin.settings.get("start", "given")
         self.plan = tables.plan
         self.variables = {variable.name: variable for variable in face.variables}
@@ -62,14 +72,16 @@ class NativeModel:
 
     @staticmethod
     def of(
-        model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0, plan: StartPlan | None = None
-    ) -> NativeModel:
+        model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0,
+        plan: StartPlan | None = None, *, compiled: bool = False,
+    ) -> NativeModel:  # fmt: skip
         """Return the cached one of the same model, for any parameter values."""
         model, kind = as_asked(model), start or model.settings.get("start", "given")
-        key = Cached.NATIVE, kind, fixed_step, model.settings.get("on_chattering") == "rest", plan and plan.choice
-        if not (fixed_step or plan):
+        rests = model.settings.get("on_chattering") == "rest"
+        key = Cached.NATIVE, kind, fixed_step, rests, plan and plan.choice, compiled
+        if not (fixed_step or plan or compiled):
             _made(model).setdefault(kind, None)
-        return model.once(key, lambda: NativeModel(model, kind, fixed_step, plan))
+        return model.once(key, lambda: NativeModel(model, kind, fixed_step, plan, compiled=compiled))
 
     @staticmethod
     def any_start(model: CompiledDae) -> StartKind:
@@ -102,13 +114,14 @@ class Instance:
 
     Args:
         model: the compiled model; its parameters and inputs are those of the instance.
-        start, fixed_step, plan: as of `NativeModel`.
+        start, fixed_step, plan, compiled: as of `NativeModel`.
     """
 
     def __init__(
-        self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0, plan: StartPlan | None = None
-    ) -> None:
-        self.model, self.native = model, NativeModel.of(model, start, fixed_step, plan)
+        self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0,
+        plan: StartPlan | None = None, *, compiled: bool = False,
+    ) -> None:  # fmt: skip
+        self.model, self.native = model, NativeModel.of(model, start, fixed_step, plan, compiled=compiled)
         self.library = self.native.library
         self.address = self.library.new(self.native.address)
         if not self.address:

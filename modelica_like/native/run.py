@@ -97,7 +97,9 @@ class EngineLoop:
         self.record, self._span = Recorder(), end - start.t
         self._part = self._span / min(options.points, _PARTS)
         self._passed = (start.t, 0)  # time, and steps until then
-        self._instance = Instance(model)
+        # IDAS is the reference: its runs do not depend on a compiler.
+        self._instance = Instance(model, compiled=options.compiled and not idas)
+        self.record.notices += filter(None, [self._instance.native.notice])
         self._instance.reset(start.t, end, options.rtol, options.atol)
         if options.max_step < end - start.t:
             self._instance.limit(options.max_step)

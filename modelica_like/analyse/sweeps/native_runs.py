@@ -28,6 +28,9 @@ class NativeRuns:
         outputs: numbers to read off every run.
         settings: arguments of `simulate` besides parameters.
 
+    Attributes:
+        notice: as of `Batch`.
+
     Raises:
         ModelicaLikeError: the run-time cannot do these runs; the message says why.
     """
@@ -50,6 +53,7 @@ class NativeRuns:
         self._batch = Batch(
             extended, [part for some in readings for part in some], options, span, settings.get("start")
         )
+        self.notice = self._batch.notice
         self._places = [model.fixed_position[name] for name in names]
 
     def run(self, points: Any, stop: ctypes.c_int | None = None) -> tuple[Vector, dict[int, str], list[int]]:

@@ -121,10 +121,10 @@ def _chunks(plan: Plan, outputs: Sequence[str], processes: int | None, chunk: in
 
 
 def _solvable(job: Job) -> tuple[Job, str]:
-    """Return the job, for IDAS if the run-time cannot do it, and the reason."""
+    """Return the job, for IDAS if the run-time cannot do it, and what to tell about that."""
     try:
         if job.settings["solver"] == "native":
-            Reference(job).native()
+            return job, Reference(job).native().notice
     except ExportError:
         raise  # there is no run-time: IDAS has its events, too
     except ModelicaLikeError as error:

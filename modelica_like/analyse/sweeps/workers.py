@@ -29,7 +29,7 @@ _RESTARTS = 3
 _DEAF = signal.SIGINT, signal.SIG_IGN
 _PATIENCE = 10.0
 """Seconds to wait for a scheduler."""
-_PLANNED = ("until", "t0", "rtol", "atol", "points", "options", "on_chattering")
+_PLANNED = ("until", "t0", "rtol", "atol", "points", "options", "on_chattering", "compiled")
 _AGREE = 1e3
 """Difference between solvers that is reported, in tolerances of their steps."""
 ONE_IN = 100

@@ -1,0 +1,187 @@
+"""Equations as machine code: the same runs to the bit, compiled once, and tapes where there is no compiler."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from some import some
+
+from modelica_like import build, simulate
+from modelica_like.analyse.sweeps.sweep import sweep
+from modelica_like.fmi import build as compiler
+from modelica_like.native import code, model
+from modelica_like.native.straight import straight
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+STARTUP = EXAMPLES / "machine_tool_startup.toml"
+NETLISTS = sorted(
+    path.relative_to(EXAMPLES).with_suffix("").as_posix()
+    for path in EXAMPLES.rglob("*.toml")
+    if path.parent.name != "cosim"
+    and {"parts", "simulate"} <= set(content := tomllib.loads(path.read_text()))
+    and "until" in content["simulate"]
+)
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """An empty folder for what is compiled."""
+    monkeypatch.setattr(code, "cache_folder", lambda: tmp_path)
+    code._version.cache_clear()
+    return tmp_path
+
+
+def counted(monkeypatch):
+    """Notes what is compiled."""
+    names = []
+    build_really = code.build
+
+    def noted(sources, *rest):
+        names.append(sources)
+        return build_really(sources, *rest)
+
+    monkeypatch.setattr(code, "build", noted)
+    return names
+
+
+def same(first, second):
+    """Whether two runs have the same numbers and events; of zeros, the sign is free: x + 0 of a tape is x."""
+    assert second.notices == first.notices
+    assert second.events == first.events
+    assert second.statistics.steps == first.statistics.steps
+    for ours, theirs in zip(first.segments, second.segments, strict=True):
+        assert np.array_equal(ours.times, theirs.times)
+        for one, other in ((ours.x, theirs.x), (ours.z, theirs.z), (ours.d, theirs.d)):
+            assert np.array_equal(one, other, equal_nan=True)
+
+
+@pytest.mark.parametrize("name", some(NETLISTS))
+def test_examples_are_equal_to_the_bit(name):
+    drive = build(EXAMPLES / f"{name}.toml")
+    same(*(simulate(drive, solver="native", compiled=compiled) for compiled in (False, True)))
+
+
+def test_long_tapes_are_cut(monkeypatch, cache):
+    """Values pass from one function to the next by the slots, those of conditional blocks, too."""
+    monkeypatch.setattr("modelica_like.native.straight._LONGEST", 7)
+    drive = build(STARTUP)
+    same(*(simulate(drive, 1.0, solver="native", compiled=compiled) for compiled in (False, True)))
+
+
+def test_without_exchanges_only_where_that_is_precise(monkeypatch, cache):
+    """Without the compiled LU, or with one that always refuses, linear.c does the same."""
+    drive = build(STARTUP)
+    expected = simulate(drive, 0.2, solver="native")
+    monkeypatch.setattr("modelica_like.native.straight_lu._MOST", 0)
+    same(expected, simulate(build(STARTUP), 0.2, solver="native", compiled=True))
+    monkeypatch.setattr("modelica_like.native.straight_lu._MOST", 3000)
+    monkeypatch.setattr("modelica_like.native.straight_lu._Lu.factor", lambda _: iter(["return 0;"]))
+    same(expected, simulate(build(STARTUP), 0.2, solver="native", compiled=True))
+
+
+def test_a_handle_with_inputs_that_move_and_change(cache):
+    """Tuned parameters, copies, states and gradients of a handle."""
+    drive = build(STARTUP)
+    found = []
+    for compiled in (False, True):
+        handle = drive.native(["force", "k1"], ["J3.w", "shaft1.tau"], by=["J1.J"], compiled=compiled)
+        handle.reset({"J1.J": 1.7}, until=1.0)
+        values = []
+        for k in range(1, 101):
+            handle.inputs[0] = 5000.0 + 20.0 * (k % 7)
+            handle.inputs[1] = 6120.0 + 5.0 * (k % 3)
+            values.append(handle.step(2e-3 * k).copy())
+        copy, slope = handle.copy(), handle.gradient()
+        times, after = handle.run(0.6, 50)
+        handle.restore(copy)
+        again = handle.run(0.6, 50)[1]
+        assert np.array_equal(after, again)
+        found.append((np.array(values), slope, times, after, handle.states))
+    for one, other in zip(*found, strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_fixed_steps(cache):
+    drive = build(STARTUP)
+    ends = []
+    for compiled in (False, True):
+        handle = drive.native([], ["J3.w"], fixed_step="1 ms", compiled=compiled)
+        handle.reset(until=1.0)
+        ends.append(handle.run(1.0, 100)[1])
+    assert np.array_equal(*ends)
+
+
+def test_it_is_compiled_once(cache, monkeypatch):
+    made = counted(monkeypatch)
+    first = build(STARTUP).native(outputs=["J3.w"], compiled=True)
+    assert first.notice == ""
+    assert len(made) == 1
+    build(STARTUP).native(compiled=True)  # another model, of the same structure
+    build(STARTUP).with_parameters({"J1.J": 1.9}).native(compiled=True)
+    assert len(made) == 1
+    assert [one.name for one in (cache / compiler.native_platform()).iterdir()] == [
+        one.name for one in (cache / compiler.native_platform()).glob("code-*")
+    ]
+
+
+def test_twins_share_the_code(cache, monkeypatch):
+    made, drive = counted(monkeypatch), build(STARTUP)
+    for inertia in (1.5, 1.9):
+        twin = drive.with_parameters({"J1.J": inertia})
+        same(*(simulate(twin, 0.3, solver="native", compiled=compiled) for compiled in (False, True)))
+    assert len(made) == 1
+
+
+def test_a_sweep_uses_it(cache, monkeypatch):
+    made, values = counted(monkeypatch), {"J1.J": [1.5, 1.6, 1.7]}
+    first, second = (
+        sweep(build(STARTUP), values, ["J3.w", "max(shaft1.tau)"], until=0.5, compiled=compiled)
+        for compiled in (False, True)
+    )
+    assert len(made) == 1
+    assert first.equals(second)
+    assert second.attrs["notice"] == ""
+
+
+def test_without_a_compiler_tapes_run(cache, monkeypatch):
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(compiler.shutil, "which", lambda _: None)
+    monkeypatch.setattr(compiler, "find_spec", lambda _: None)
+    told = (
+        "The equations run as tapes, since they cannot be compiled. There is no C compiler.\n"
+        "Install cc, gcc or clang, or zig by `pip install modelica-like[cross]`."
+    )
+    drive = build(STARTUP)
+    assert drive.native(compiled=True).notice == told
+    expected, found = (simulate(drive, 0.2, solver="native", compiled=compiled) for compiled in (False, True))
+    assert found.notices == (told,)
+    assert found.events == expected.events
+    assert np.array_equal(found["J3.w"], expected["J3.w"])
+    assert sweep(drive, {"J1.J": [1.5]}, ["J3.w"], until=0.2, compiled=True).attrs["notice"] == told
+
+
+def test_with_a_broken_compiler_tapes_run(cache, monkeypatch):
+    broken = cache / "broken"
+    broken.write_text("#!/bin/sh\necho 'error: it is broken' >&2\nexit 1\n")
+    broken.chmod(0o755)
+    monkeypatch.setenv("CC", str(broken))
+    run = simulate(STARTUP, 0.2, solver="native", compiled=True)
+    (told,) = run.notices
+    assert told.startswith(
+        "The equations run as tapes, since they cannot be compiled. "
+        f"The C compiler failed for {compiler.native_platform()}: error: it is broken\n"
+    )
+    assert not list(cache.rglob("code-*"))
+
+
+def test_the_text_has_only_numbers_and_operations(monkeypatch):
+    """Whatever a netlist calls its parts does not get to a compiler."""
+    tables = []
+    monkeypatch.setattr(model, "compiled_code", lambda made: (tables.append(made), (None, ""))[1])
+    drive = build(STARTUP)
+    drive.native(compiled=True)
+    text = straight(tables[0])
+    assert len(text) > 10_000
+    assert not [one.path for one in drive.flat_variables if one.path in text]
+    assert set(text) <= set('abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_ \n;=()[]{},.*+-/<!&|#"')
