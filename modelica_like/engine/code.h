@@ -32,7 +32,7 @@ static inline double if_else_zero(double a, double b) {
 }
 
 typedef struct { /* a tape: what parameters and modes decide; the rest; this with slopes along given dots */
-    int n_known;
+    int n_known, first_known; /* how many values; behind those of the tapes before */
     void (*known)(double *slots, double *known);
     void (*run)(double *slots, const double *known, const unsigned char *wanted, double *outputs);
     void (*slopes)(double *slots, const double *known, double *dots, double *outputs, double *slopes);
@@ -56,6 +56,9 @@ static inline void raise_to(double *most, double value) {
 }
 
 #ifdef CODE_ONLY
+/* One pattern fits all texts. */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#pragma GCC diagnostic ignored "-Wunused-variable"
 #define CODES __attribute__((visibility("default"))) const Codes codes =
 #define OPERATION(name, value, by_a, by_b)                                                              \
     static inline double value_##name(double a, double b) { return (void)b, value; }                    \

@@ -27,9 +27,10 @@ typedef struct {
 typedef struct {
     Instance *c;
     NativeRun *run;
-    void *before;    /* state before an instant for whose events there may be no room */
-    int64_t strikes; /* impacts before the present instant */
-    double pause;    /* number of steps at which to pause */
+    void *before;          /* state before an instant for whose events there may be no room */
+    const Variable **read; /* the outputs of the run */
+    int64_t strikes;       /* impacts before the present instant */
+    double pause;          /* number of steps at which to pause */
     char message[MESSAGE_LENGTH];
 } Native;
 
@@ -81,6 +82,7 @@ EXPORTED Native *native_new(const Model *m) {
 EXPORTED void native_free(Native *n) {
     state_release(n->c, &n->before);
     instance_free(n->c);
+    free(n->read);
     free(n);
 }
 
@@ -279,6 +281,31 @@ static void note_impact(Instance *c, int held, double energy, int first) {
     r->n_impacts = held < 0 ? n->strikes : r->n_impacts + 1;
 }
 
+/* Looks up the outputs of a run. */
+static int find_outputs(Native *n, const NativeRun *r) {
+    free(n->read);
+    n->read = r->outputs == NULL ? NULL : calloc((size_t)r->n_outputs + 1, sizeof *n->read);
+    if (r->outputs != NULL && n->read == NULL) return code(fail(n->c, NO_MEMORY, 0));
+    for (int64_t k = 0; k < r->n_outputs && n->read != NULL; k++) {
+        const Variable *v = n->read[k] = known_variable(n->c, r->references[k], ANY_TYPE);
+        if (v == NULL) return NATIVE_FAILED;
+        if (v->kind == KIND_VARIABLE) ask_for(n->c, v->index);
+    }
+    return NATIVE_OK;
+}
+
+/* Of each kind, the first one computes all. */
+static int read_outputs(Native *n, int64_t count, double *values) {
+    unsigned there = 0;
+    for (int64_t k = 0; k < count; k++) {
+        const Variable *v = n->read[k];
+        if (there >> v->kind & 1) values[k] = n->c->values[v->kind][v->index];
+        else if (!get_value(n->c, v, &values[k])) return NATIVE_FAILED;
+        if (v->kind != KIND_INPUT) there |= 1u << v->kind; /* these move between their times */
+    }
+    return NATIVE_OK;
+}
+
 static int write_point(Native *n, NativeRun *r) {
     const Instance *c = n->c;
     int64_t k = r->n_points++;
@@ -287,7 +314,7 @@ static int write_point(Native *n, NativeRun *r) {
     if (r->states != NULL)
         memcpy(r->states + k * c->model->n_unknowns, c->x, (size_t)c->model->n_unknowns * sizeof(double));
     if (r->outputs == NULL) return NATIVE_OK;
-    return read_values(n->c, r->n_outputs, r->references, r->outputs + k * r->n_outputs);
+    return read_outputs(n, r->n_outputs, r->outputs + k * r->n_outputs);
 }
 
 /* The left side of an event, the event, its right side, which begins a segment. */
@@ -375,7 +402,8 @@ EXPORTED int native_run(Native *n, double end, int64_t results, NativeRun *run) 
         run->begin = n->c->state.t;
         run->next = 1;
     }
-    if (!check_whole(n->c, (end - run->begin) / (double)results)) return NATIVE_FAILED;
+    if (!check_whole(n->c, (end - run->begin) / (double)results) || find_outputs(n, run) != NATIVE_OK)
+        return NATIVE_FAILED;
     n->run = run;
     n->pause = run->steps > 0 ? n->c->state.n_steps + (double)run->steps : INFINITY;
     n->c->noted = note_event;

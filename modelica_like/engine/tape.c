@@ -192,13 +192,12 @@ const unsigned char *active_guards(Instance *c) {
 static const Code *code_of(Instance *c, const Tape *tape, const double **known) {
     int k = (int)(tape - tapes_of(c->model));
     if (c->model->codes == NULL || k >= N_CODES || c->model->codes->tapes[k].run == NULL) return NULL;
-    const Code *codes = c->model->codes->tapes;
-    double *values = c->known_values;
-    for (int before = 0; before < k; before++) values += codes[before].n_known;
-    if (c->known_by[k] != c->altered) codes[k].known(c->slots, values);
+    const Code *code = &c->model->codes->tapes[k];
+    double *values = c->known_values + code->first_known;
+    if (c->known_by[k] != c->altered) code->known(c->slots, values);
     c->known_by[k] = c->altered;
     *known = values;
-    return &codes[k];
+    return code;
 }
 
 static int run_code(Instance *c, const Tape *tape, const unsigned char *wanted, double *outputs) {
@@ -354,20 +353,30 @@ double largest_of(int n, const double *values) {
     return largest;
 }
 
+/* Factorises the Jacobian of the implicit equations, which often is that of the point before. */
+static int factor_again(Instance *c) {
+    int n = c->model->n_z;
+    size_t size = (size_t)n * (size_t)n * sizeof(double);
+    if (c->implicit_kept && memcmp(c->implicit_matrix, c->dense_matrix, size) == 0) return 1;
+    memcpy(c->implicit_matrix, c->dense_matrix, size);
+    memcpy(c->implicit_lu, c->dense_matrix, size);
+    return c->implicit_kept = lu_factor(n, c->implicit_lu, c->implicit_order);
+}
+
 Result solve_implicit(Instance *c, double t, double *point, int quiet) {
     const Model *m = c->model;
-    double *z = point + m->n_x, *step = c->vector, *matrix = c->dense_matrix, change = INFINITY, residual = 0;
-    int *order = c->order, rounds = !c->bounded ? MAX_NEWTON : m->settings->implicit_linear ? 1 : BOUNDED_NEWTON;
+    double *z = point + m->n_x, *step = c->vector, change = INFINITY, residual = 0;
+    int rounds = !c->bounded ? MAX_NEWTON : m->settings->implicit_linear ? 1 : BOUNDED_NEWTON;
     if (m->n_z == 0) return RESULT_OK;
     for (int round = 0; round < rounds; round++) {
         evaluate_special(c, &m->tapes.alg, t, point, step);
         if (c->bounded && round > 0 && largest_of(m->n_z, step) <= SOLVED * residual) return RESULT_OK;
         residual = largest_of(m->n_z, step);
-        run_special(c, &m->tapes.alg_jacobian, matrix);
+        run_special(c, &m->tapes.alg_jacobian, c->dense_matrix);
         for (int k = 0; k < m->n_z; k++)
             if (!isfinite(step[k])) return !quiet && fail(c, UNKNOWN_SINGULAR, t, k);
-        if (!lu_factor(m->n_z, matrix, order)) return !quiet && fail(c, UNKNOWN_SINGULAR, t, 0);
-        lu_solve(m->n_z, matrix, order, step);
+        if (!factor_again(c)) return !quiet && fail(c, UNKNOWN_SINGULAR, t, 0);
+        lu_solve(m->n_z, c->implicit_lu, c->implicit_order, step);
         change = 0;
         for (int k = 0; k < m->n_z; k++) {
             z[k] -= step[k];

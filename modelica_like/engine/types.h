@@ -88,32 +88,32 @@ typedef struct {
  * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
  * steady state began; `impact_x` and `impact_d` are states before the first impact at an instant, `trials` points
  * without and with it, whose powers differ by what sources give in its duration. */
-#define WORK_NUMBERS(A)                                                                                              \
-    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),         \
-        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),  \
-        A(qr_work, 2 * system), A(lu, m->lu.n_rows), A(lu_pivots, n), A(lu_sizes, n), A(lu_last, last *last),        \
-        A(dense_matrix, dense), A(square, square), A(vector, n + n_z), A(residual, n_z),                             \
-        A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n), A(first, n), A(first_rates, n),         \
-        A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards), A(looks, 3 * guards * MOST_LOOKS), \
-        A(seen_rates, n), A(seen_indicators, guards), A(seen_derived, m->n_derived), A(outputs, outputs),            \
-        A(start_unknowns, system), A(start_errors, system), A(start_sizes, system),                                  \
-        A(kept_starts, N_KEPT_STARTS *(n + 2 * n_d)), A(start_values, starts),                                       \
-        A(start_residual, larger(m->n_start_values, resets)), A(delayed, 2 * delays),                                \
-        A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(motions, holds), A(d_before, n_d), A(d_begun, n_d),  \
-        A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),                       \
-        A(target_missing, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x),                \
-        A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d),  \
-        A(kept_z, n_z), A(reactions, members), A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges),   \
-        A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n), A(edge_guards, 2 * guards),           \
+#define WORK_NUMBERS(A)                                                                                             \
+    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),        \
+        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system), \
+        A(qr_work, 2 * system), A(lu, m->lu.n_rows), A(lu_pivots, n), A(lu_sizes, n), A(lu_last, last *last),       \
+        A(dense_matrix, dense), A(implicit_matrix, dense), A(implicit_lu, dense), A(square, square),                \
+        A(vector, n + n_z), A(residual, n_z), A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n),  \
+        A(first, n), A(first_rates, n), A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards),   \
+        A(looks, 3 * guards * MOST_LOOKS), A(seen_rates, n), A(seen_indicators, guards),                            \
+        A(seen_derived, m->n_derived), A(outputs, outputs), A(start_unknowns, system), A(start_errors, system),     \
+        A(start_sizes, system), A(kept_starts, N_KEPT_STARTS *(n + 2 * n_d)), A(start_values, starts),              \
+        A(start_residual, larger(m->n_start_values, resets)), A(delayed, 2 * delays),                               \
+        A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(motions, holds), A(d_before, n_d), A(d_begun, n_d), \
+        A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),                      \
+        A(target_missing, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x),               \
+        A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), \
+        A(kept_z, n_z), A(reactions, members), A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges),  \
+        A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n), A(edge_guards, 2 * guards),          \
         A(trials, 2 * (n + n_d)), A(known_values, m->n_known)
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; jolted: what new
  * values of states let go; idle:
  * time events that changed nothing of d that is felt by what moves when they came last */
-#define WORK_INDICES(A)                                                                                           \
-    A(order, n_z), A(last_order, last), A(targets, resets), A(standing, holds), A(places, members + m->n_ideals), \
-        A(member, members), A(pivots, members), A(same, slots), A(places_of_slots, slots), A(steady_places, n),   \
-        A(active_guard, guards)
+#define WORK_INDICES(A)                                                                                 \
+    A(order, n_z), A(implicit_order, n_z), A(last_order, last), A(targets, resets), A(standing, holds), \
+        A(places, members + m->n_ideals), A(member, members), A(pivots, members), A(same, slots),       \
+        A(places_of_slots, slots), A(steady_places, n), A(active_guard, guards)
 #define WORK_MARKS(A)                                                                                               \
     A(known, n_x), A(decided, n_d), A(wishes, m->n_transitions), A(changed, n_d), A(kinds, guards), A(held, holds), \
         A(other, members), A(known_slots, slots), A(needed_slots, slots), A(open_rows, n_z), A(asked, m->n_nodes),  \
@@ -203,6 +203,7 @@ typedef struct Instance {
     int budget;          /* rounds of events and further pieces that are left of a bounded step */
     int variables_valid; /* which values belong to the present point, see values.c */
     int look_valid;      /* the last look at the guards was at the present point */
+    int implicit_kept;   /* there are factors of `implicit_matrix` */
     int by_lu;           /* what the step matrix was factorised by; otherwise by QR */
     int edges_valid;     /* the first third of `edges` belongs to the present point */
     double edges_kept;   /* the last third to the beginning of a step of this length, which ended there; or 0 */

@@ -28,12 +28,13 @@ def straight(tables: Tables) -> str:
     guards = sorted((one.index, one.mode, one.sources) for one in tables.model.events.transitions if not one.timed)
     first = {group: guard for guard, *group in reversed(guards) for group in [tuple(group)]}
     marks: list[Path] = [(f"w[{first[tuple(group)]}]",) for _, *group in guards]
-    parts, table = ['#include "code.h"\n'], ""
+    parts, table, count = ['#include "code.h"\n'], "", 0
     for name, number in TAPES.items():
         writer = _Writer(tables, tables.tapes[name], 2 * marks if name == "guards" else ())
         parts += writer.functions(number, moving=name == "rates")
         slopes = f"slopes_{number}" if name == "rates" else "0"
-        table += f"    [{number}] = {{{len(writer.kept)}, known_{number}, run_{number}, {slopes}}},\n"
+        table += f"    [{number}] = {{{len(writer.kept)}, {count}, known_{number}, run_{number}, {slopes}}},\n"
+        count += len(writer.kept)
     solver = straight_lu(tables)
     names = ", ".join(("factor", "lower", "upper") if solver else 3 * "0")
     return "\n".join([*parts, solver, f"CODES {{{{\n{table}}}, {names}}};\n"])

@@ -92,6 +92,6 @@ class _Lu:
         """Lines of `solve_step` behind the last block."""
         yield from (f"double y{row} = y[{row}];" for row in range(self.size))
         for column in reversed(range(self.size)):
-            solved = f"y{column} * p[{column}]" if column < self.first else f"y{column}"
-            yield f"const double x{column} = x[{self.column_order[column]}] = {solved};"
-            yield from (f"y{row} -= l[{k}] * x{column};" for k, row in self.upper_columns[column])
+            solved = f"y{column} *= p[{column}]" if column < self.first else f"y{column}"
+            yield f"x[{self.column_order[column]}] = {solved};"
+            yield from (f"y{row} -= l[{k}] * y{column};" for k, row in self.upper_columns[column])

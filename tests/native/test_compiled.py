@@ -1,5 +1,7 @@
 """Equations as machine code: the same runs to the bit, compiled once, and tapes where there is no compiler."""
 
+import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 
@@ -10,6 +12,10 @@ from some import some
 from modelica_like import build, simulate
 from modelica_like.analyse.sweeps.sweep import sweep
 from modelica_like.fmi import build as compiler
+from modelica_like.fmi import sources
+from modelica_like.fmi.interface import interface
+from modelica_like.fmi.model_file import generate
+from modelica_like.fmi.tables import make_tables
 from modelica_like.native import code, model
 from modelica_like.native.straight import straight
 
@@ -173,6 +179,57 @@ def test_with_a_broken_compiler_tapes_run(cache, monkeypatch):
         f"The C compiler failed for {compiler.native_platform()}: error: it is broken\n"
     )
     assert not list(cache.rglob("code-*"))
+
+
+MAIN = """
+#include "core.h"
+extern const Codes codes;
+Model *native_open(const unsigned char *bytes, size_t size, char *message);
+void native_close(Model *m), native_compiled(Model *m, const Codes *codes), native_free(void *n);
+void *native_new(const Model *m);
+int native_reset(void *n, double start, double stop, double rtol, double atol), native_begin(void *n);
+int native_step(void *n, double time, int64_t n_set, const uint32_t *set, const double *given, int64_t n_get,
+    const uint32_t *get, double *values);
+int main(void) {
+    char message[MESSAGE_LENGTH];
+    double ends[2][2], value;
+    uint32_t time = 0;
+    Model *m = native_open((const unsigned char *)model_data, model_data_size, message);
+    for (int compiled = 0; compiled < 2; compiled++) {
+        if (compiled) native_compiled(m, &codes);
+        void *n = native_new(m);
+        if (native_reset(n, 0, END, 1e-7, 1e-9) || native_begin(n)) return 1;
+        if (native_step(n, END, 0, NULL, NULL, 1, &time, &value)) return 2;
+        const Instance *c = native_instance(n);
+        double sum = 0;
+        for (int k = 0; k < m->n_x; k++) sum += c->x[k];
+        ends[compiled][0] = sum, ends[compiled][1] = c->state.n_steps;
+        native_free(n);
+    }
+    native_close(m);
+    return ends[0][0] == ends[1][0] && ends[0][1] == ends[1][1] ? 0 : 3;
+}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["lepelletier", "machine_tool_startup"])
+def test_sanitizers_find_nothing(name, tmp_path):
+    """The code of a model under AddressSanitizer and UBSan, in one program with the run-time."""
+    drive = build(EXAMPLES / f"{name}.toml")
+    face = interface(drive)
+    texts = generate(drive, face, token="{t}") | sources.own_sources(("native",))
+    texts["code.c"] = "#define CODE_ONLY\n" + straight(make_tables(drive, face.start))
+    texts["main.c"] = "void *native_instance(const void *n);\n" + MAIN.replace("END", "2.0")
+    texts["model_data.c"] = generate(drive, face, token="{t}")["model_data.c"]
+    for file, text in texts.items():
+        (tmp_path / file).write_text(text)
+    files = ["model_data.c", *sources.RUNTIME, "native.c", "batch.c", "code.c", "main.c"]
+    flags = ["-g", "-O1", "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined"]
+    command = [shutil.which("gcc") or "clang", *flags, "-fno-sanitize-recover=undefined", "-o", "driver", *files, "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    result = subprocess.run([tmp_path / "driver"], capture_output=True, text=True, timeout=300, check=False)
+    assert (result.returncode, result.stderr) == (0, "")
 
 
 def test_the_text_has_only_numbers_and_operations(monkeypatch):
