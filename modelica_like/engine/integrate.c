@@ -157,8 +157,10 @@ double rosenbrock_step(Instance *c, double t, const double *first, double h, int
     combine(n, y, 1, &one, c->stages + (size_t)(STAGES - 1) * n, n, last);
     if (!all_finite(n, last)) return -1;
     memset(last + n, 0, 3 * size);
-    for (double *row = last + n; row <= last + 3 * (size_t)n; row += n)
-        combine(n, row, STAGES, DENSE[(row - last) / n - 1], c->stages, n, row);
+    for (size_t k = 0; k < 3; k++) {
+        double *row = last + (k + 1) * (size_t)n;
+        combine(n, row, STAGES, DENSE[k], c->stages, n, row);
+    }
     return error_norm(c, first, last, c->stages + (STAGES - 1) * n);
 }
 
