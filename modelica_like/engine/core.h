@@ -32,7 +32,8 @@ void slopes(int operation, double a, double b, double f, double *by_left, double
 int qr_factor(const QrPattern *pattern, const double *values, Instance *c);
 void qr_solve(const QrPattern *pattern, const Instance *c, double *x);
 int factor_matrix(Instance *c);
-int factor_by_code(Instance *c, double diagonal);
+void combine(int n, const double *from, int count, const double *weights, const double *rows, int row, double *to);
+int all_finite(int n, const double *values);
 void solve_step(const Instance *c, double *x);
 int lu_factor(int n, double *matrix, int *order);
 void lu_solve(int n, const double *matrix, const int *order, double *x);
@@ -50,10 +51,6 @@ void load(Instance *c, double t, const double *point);
 void load_point(Instance *c, double t, const double *point);
 void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void evaluate_now(Instance *c, const Tape *tape, double *outputs); /* at the present point */
-void values_at(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
-void values_now(Instance *c, const Tape *tape, double *outputs);
-const unsigned char *active_guards(Instance *c);
-void run_slopes(Instance *c, double *rates, double *slopes);
 const double *variables_now(Instance *c);
 double largest_of(int n, const double *values);
 int any_of(const unsigned char *marks, int n);
@@ -62,6 +59,13 @@ Result solve_now(Instance *c, int quiet);
 Result check_singular(Instance *c);
 Result settle(Instance *c);
 double input_at(const Instance *c, int k, double t);
+/* code.c */
+void values_at(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
+void values_now(Instance *c, const Tape *tape, double *outputs);
+const unsigned char *active_guards(Instance *c);
+int run_code(Instance *c, const Tape *tape, const unsigned char *wanted, double *outputs);
+void run_slopes(Instance *c, double *rates, double *slopes);
+int factor_by_code(Instance *c, double diagonal);
 /* start.c */
 void start_values(Instance *c);
 Result start_solve(Instance *c);
@@ -175,6 +179,8 @@ const Variable *find_variable(const Model *m, uint32_t reference);
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type);
 #define ANY_TYPE N_TYPES
 Result get_value(Instance *c, const Variable *v, double *value);
+Result find_all(Instance *c, int64_t count, const uint32_t *references, const Variable **found);
+Result get_all(Instance *c, int64_t count, const Variable *const *found, double *values);
 Result set_value(Instance *c, const Variable *v, double value);
 Result set_input_rate(Instance *c, uint32_t reference, int order, double rate);
 Result set_time(Instance *c, double time);

@@ -95,37 +95,6 @@ double error_norm(const Instance *c, const double *first, const double *last, co
     return sqrt(sum / c->model->n_x);
 }
 
-typedef double Pair __attribute__((vector_size(2 * sizeof(double)), aligned(sizeof(double)), may_alias));
-
-/* to = from + the sum of weights * rows, in this order, for n columns of rows of length `row`: four at a
- * time, as sums wait for each other. */
-static void combine(
-    int n, const double *from, int count, const double *weights, const double *rows, int row, double *to) {
-    int k = 0;
-    for (; k + 4 <= n; k += 4) {
-        const Pair *given = (const Pair *)(const void *)(from + k);
-        Pair low = given[0], high = given[1], *result = (Pair *)(void *)(to + k);
-        for (int j = 0; j < count; j++) {
-            const Pair *more = (const Pair *)(const void *)(rows + (size_t)j * (size_t)row + k);
-            low += weights[j] * more[0];
-            high += weights[j] * more[1];
-        }
-        result[0] = low;
-        result[1] = high;
-    }
-    for (; k < n; k++) {
-        double sum = from[k];
-        for (int j = 0; j < count; j++) sum += weights[j] * rows[(size_t)j * (size_t)row + k];
-        to[k] = sum;
-    }
-}
-
-static int all_finite(int n, const double *values) {
-    int finite = 1;
-    for (int k = 0; k < n; k++) finite &= fabs(values[k]) <= DBL_MAX;
-    return finite;
-}
-
 /* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
  * Returns the error in tolerances, or -1 if the equations gave values that are not finite, or a singular matrix. */
 double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece) {

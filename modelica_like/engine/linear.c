@@ -57,6 +57,36 @@ void qr_solve(const QrPattern *a, const Instance *c, double *x) {
     for (int k = 0; k < a->size; k++) x[a->column_order[k]] = y[k];
 }
 
+typedef double Pair __attribute__((vector_size(2 * sizeof(double)), aligned(sizeof(double)), may_alias));
+
+/* to = from + the sum of weights * rows, in this order, for n columns of rows of length `row`: four at a
+ * time, as sums wait for each other. */
+void combine(int n, const double *from, int count, const double *weights, const double *rows, int row, double *to) {
+    int k = 0;
+    for (; k + 4 <= n; k += 4) {
+        const Pair *given = (const Pair *)(const void *)(from + k);
+        Pair low = given[0], high = given[1], *result = (Pair *)(void *)(to + k);
+        for (int j = 0; j < count; j++) {
+            const Pair *more = (const Pair *)(const void *)(rows + (size_t)j * (size_t)row + k);
+            low += weights[j] * more[0];
+            high += weights[j] * more[1];
+        }
+        result[0] = low;
+        result[1] = high;
+    }
+    for (; k < n; k++) {
+        double sum = from[k];
+        for (int j = 0; j < count; j++) sum += weights[j] * rows[(size_t)j * (size_t)row + k];
+        to[k] = sum;
+    }
+}
+
+int all_finite(int n, const double *values) {
+    int finite = 1;
+    for (int k = 0; k < n; k++) finite &= fabs(values[k]) <= DBL_MAX;
+    return finite;
+}
+
 static void swap(double *a, double *b) {
     double kept = *a;
     *a = *b;
@@ -151,16 +181,6 @@ int factor_matrix(Instance *c) {
     }
     c->by_lu = lu_factor(last, c->lu_last, c->last_order);
     return c->by_lu || qr_factor(a, c->matrix, c);
-}
-
-/* As compiled code does it; returns 0 where there is none, or it is not by LU without exchanges. */
-int factor_by_code(Instance *c, double diagonal) {
-    const Codes *codes = c->model->codes;
-    int last = 2 * c->model->step.size + 1 - c->model->lu.n_ends;
-    c->by_lu = codes != NULL && codes->factor != NULL &&
-               codes->factor(c->jacobian, diagonal, c->lu, c->lu_pivots, c->lu_last) &&
-               lu_factor(last, c->lu_last, c->last_order);
-    return c->by_lu;
 }
 
 void solve_step(const Instance *c, double *x) {

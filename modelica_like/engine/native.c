@@ -286,24 +286,7 @@ static int find_outputs(Native *n, const NativeRun *r) {
     free(n->read);
     n->read = r->outputs == NULL ? NULL : calloc((size_t)r->n_outputs + 1, sizeof *n->read);
     if (r->outputs != NULL && n->read == NULL) return code(fail(n->c, NO_MEMORY, 0));
-    for (int64_t k = 0; k < r->n_outputs && n->read != NULL; k++) {
-        const Variable *v = n->read[k] = known_variable(n->c, r->references[k], ANY_TYPE);
-        if (v == NULL) return NATIVE_FAILED;
-        if (v->kind == KIND_VARIABLE) ask_for(n->c, v->index);
-    }
-    return NATIVE_OK;
-}
-
-/* Of each kind, the first one computes all. */
-static int read_outputs(Native *n, int64_t count, double *values) {
-    unsigned there = 0;
-    for (int64_t k = 0; k < count; k++) {
-        const Variable *v = n->read[k];
-        if (there >> v->kind & 1) values[k] = n->c->values[v->kind][v->index];
-        else if (!get_value(n->c, v, &values[k])) return NATIVE_FAILED;
-        if (v->kind != KIND_INPUT) there |= 1u << v->kind; /* these move between their times */
-    }
-    return NATIVE_OK;
+    return code(r->outputs == NULL || find_all(n->c, r->n_outputs, r->references, n->read));
 }
 
 static int write_point(Native *n, NativeRun *r) {
@@ -314,7 +297,7 @@ static int write_point(Native *n, NativeRun *r) {
     if (r->states != NULL)
         memcpy(r->states + k * c->model->n_unknowns, c->x, (size_t)c->model->n_unknowns * sizeof(double));
     if (r->outputs == NULL) return NATIVE_OK;
-    return read_outputs(n, r->n_outputs, r->outputs + k * r->n_outputs);
+    return code(get_all(n->c, r->n_outputs, n->read, r->outputs + k * r->n_outputs));
 }
 
 /* The left side of an event, the event, its right side, which begins a segment. */

@@ -53,6 +53,28 @@ Result get_value(Instance *c, const Variable *v, double *value) {
     return RESULT_OK;
 }
 
+/* Looks up variables that are read many times. */
+Result find_all(Instance *c, int64_t count, const uint32_t *references, const Variable **found) {
+    for (int64_t k = 0; k < count; k++) {
+        const Variable *v = found[k] = known_variable(c, references[k], ANY_TYPE);
+        if (v == NULL) return RESULT_ERROR;
+        if (v->kind == KIND_VARIABLE) ask_for(c, v->index);
+    }
+    return RESULT_OK;
+}
+
+/* Of each kind, the first one computes all, except for inputs. */
+Result get_all(Instance *c, int64_t count, const Variable *const *found, double *values) {
+    unsigned there = 0;
+    for (int64_t k = 0; k < count; k++) {
+        const Variable *v = found[k];
+        if (there >> v->kind & 1) values[k] = c->values[v->kind][v->index];
+        else if (!get_value(c, v, &values[k])) return RESULT_ERROR;
+        if (v->kind != KIND_INPUT) there |= 1u << v->kind;
+    }
+    return RESULT_OK;
+}
+
 /* Solves what getting a value from the present point needs. */
 Result make_consistent(Instance *c) { return make_ready(c) && settle(c); }
 
