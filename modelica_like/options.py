@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal, get_args
 
 from modelica_like.arguments import fits, wrong_kind
@@ -18,6 +19,7 @@ _NUMBER = 2 * 8
 """Bytes of a number, which is copied once when results are put together."""
 
 
+@cache
 def memory() -> float:
     """Return the memory of this machine in bytes; infinite where the system does not tell."""
     try:

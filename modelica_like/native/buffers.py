@@ -80,18 +80,17 @@ class Buffers:
         return self._arrays[name][: getattr(self.run, f"n_{counted}")]
 
     def _make_room(self, counted: str, names: Iterable[str], room: int) -> None:
-        needed, there = 8.0 * room * sum(self._widths.get(name, 0) for name in names), memory()
-        if needed > there:
+        wanted = [name for name in names if name in self._widths]
+        needed = 8.0 * room * sum(self._widths[name] for name in wanted)
+        if wanted and needed > (there := memory()):
             raise ValueOutOfRange(
                 f"By {self.run.last:.6g} s there are {self.run.n_points:,} results, two of them at every event; more "
                 f"of them need room of {needed / 1e9:.3g} GB, and this machine has {there / 1e9:.3g} GB.",
                 advice="Run a shorter time, or a part of the drive.",
             )
         setattr(self.run, f"room_{counted}", room)
-        for name in names:
-            if name not in self._widths:
-                continue
-            new = np.zeros((room, self._widths[name]))
+        for name in wanted:
+            new = np.empty((room, self._widths[name]))
             if name in self._arrays:
                 new[: len(self[name])] = self[name]
             self._arrays[name] = new

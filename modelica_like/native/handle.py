@@ -94,12 +94,14 @@ class Native:
         for name, time in (("t0", t0), ("until", until)):
             _number(name, time)
         self._instance.reset(t0, until, *self._tolerances)
-        self.set(given)
+        if given:
+            self.set(given)
         if self._by.size:
             whole = self._library.instance(self._address)
             self._instance.check(self._library.gradient_start(whole, self._by.ctypes.data, self._by.size))
         self._instance.check(self._library.begin(self._address))
-        self._read(self._references[0], self.inputs)
+        if self.inputs.size:
+            self._read(self._references[0], self.inputs)
         self._read(self._references[1], self.outputs)
 
     def set(self, values: Mapping[str, float]) -> None:
