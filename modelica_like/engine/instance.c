@@ -141,6 +141,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
         TAKE(s->runs, operations);
         TAKE(s->operands, operations);
         TAKE(s->outputs, tape->n_outputs);
+        TAKE(s->wanted, tape->n_outputs);
         s->tape = (Tape){0, 0, tape->n_outputs, tape->first_result, s->runs, s->operands, s->outputs};
         s->first_known = (int)(slots + left); /* among the slots, behind all others */
         left += operations;
@@ -150,7 +151,6 @@ static uint64_t lay_out(Instance *c, double *memory) {
     TAKE(part->operands, m->tapes.guards.n_operations);
     TAKE(part->outputs, 2 * guards);
     TAKE(part->wanted, 2 * guards);
-    TAKE(c->part_values, 2 * guards);
     c->whole = take(memory, &used, piece_size(m), 1);
     TAKE(c->terms, holds);
     TAKE(c->strike_terms, holds);

@@ -20,7 +20,7 @@ void slopes(int operation, double a, double b, double f, double *by_left, double
 #undef OPERATION
 }
 
-void tape_run(const Tape *tape, double *slots, double *outputs) {
+static void run_operations(const Tape *tape, double *slots) {
 #define OPERATION(name, value, by_a, by_b)                                  \
     case OPERATION_##name:                                                  \
         for (int k = 0; k < count; k++) {                                   \
@@ -40,7 +40,17 @@ void tape_run(const Tape *tape, double *slots, double *outputs) {
         result += count;
     }
 #undef OPERATION
+}
+
+void tape_run(const Tape *tape, double *slots, double *outputs) {
+    run_operations(tape, slots);
     for (int k = 0; k < tape->n_outputs; k++) outputs[k] = slots[tape->outputs[k]];
+}
+
+/* Of outputs that are not wanted, values stay as they are. */
+static void run_wanted(const Special *s, double *slots, double *outputs) {
+    run_operations(&s->tape, slots);
+    for (int k = 0; k < s->tape.n_outputs; k++) outputs[s->wanted[k]] = slots[s->outputs[k]];
 }
 
 void tape_tangent(const Tape *tape, const double *slots, double *dots, double *output_dots) {
@@ -172,9 +182,11 @@ static void write_special(Instance *c, Special *s, const Tape *tape) {
             place[slot] = tape->first_result + written++;
         }
     s->tape.n_operations = written;
+    s->tape.n_outputs = 0;
     for (int n = 0; n < tape->n_outputs; n++) {
-        int slot = c->same[tape->outputs[n]];
-        s->outputs[n] = needed[slot] && is_wanted(c, tape, n) ? place[slot] : c->model->slot_constants;
+        if (!is_wanted(c, tape, n)) continue;
+        s->wanted[s->tape.n_outputs] = n;
+        s->outputs[s->tape.n_outputs++] = place[c->same[tape->outputs[n]]];
     }
 }
 
@@ -186,8 +198,8 @@ const Tape *run_special(Instance *c, const Tape *tape, double *outputs) {
     if (s->belongs_to != c->decided_by) s->uses = 0;
     s->belongs_to = c->decided_by;
     int special = s->uses > WORTH_IT && !c->bounded; /* where the work is bounded: working out costs more than a step */
-    tape_run(special ? &s->tape : tape, c->slots, outputs);
-    if (special) return &s->tape;
+    if (special) return run_wanted(s, c->slots, outputs), &s->tape;
+    tape_run(tape, c->slots, outputs);
     if (c->bounded || ++s->uses <= WORTH_IT) return tape;
     work_out(c, tape);
     mark_needed(c, tape);
@@ -206,8 +218,9 @@ void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int p
     unsigned char *needed = memset(c->needed_slots, 0, (size_t)(c->model->n_slots));
     int *place = c->places_of_slots, first = whole->first_result, end = first + whole->n_operations, written = 0, k = 0;
     part->tape = (Tape){0, 0, 0, first, part->runs, part->operands, part->outputs};
+#define OUTPUT(n) (whole == tape ? (n) : s->wanted[n])
     for (int n = 0; n < whole->n_outputs; n++)
-        if (wanted[n % period] && whole->outputs[n] < end) needed[whole->outputs[n]] = 1;
+        if (wanted[OUTPUT(n) % period] && whole->outputs[n] < end) needed[whole->outputs[n]] = 1;
     for (int n = whole->n_operations - 1; n >= 0; n--)
         for (int side = 0; side < 2 && needed[first + n]; side++) {
             int slot = side == 0 ? whole->operands[n].left : whole->operands[n].right;
@@ -224,22 +237,20 @@ void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int p
         if (written > before) part->runs[part->tape.n_runs++] = (Run){whole->runs[r].operation, written - before};
     }
     for (int n = 0; n < whole->n_outputs; n++) {
-        if (!wanted[n % period]) continue;
-        part->wanted[part->tape.n_outputs] = n;
+        if (!wanted[OUTPUT(n) % period]) continue;
+        part->wanted[part->tape.n_outputs] = OUTPUT(n);
         part->outputs[part->tape.n_outputs++] = PLACE(whole->outputs[n]);
     }
 #undef PLACE
+#undef OUTPUT
     part->tape.n_operations = written;
 }
 
 /* Of outputs that are not wanted, values may stay as they are. */
 void evaluate_part(Instance *c, double t, const double *point, double *outputs) {
-    const Special *part = &c->special[N_SPECIALS];
-    double *values = c->part_values;
     load(c, t, point);
     if (run_code(c, &c->model->tapes.guards, active_guards(c), outputs)) return;
-    tape_run(&part->tape, c->slots, values);
-    for (int k = 0; k < part->tape.n_outputs; k++) outputs[part->wanted[k]] = values[k];
+    run_wanted(&c->special[N_SPECIALS], c->slots, outputs);
 }
 
 const Tape *evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {

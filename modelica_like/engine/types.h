@@ -65,7 +65,7 @@ typedef struct { /* a tape for the present modes, see tape.c */
     Run *runs;
     Operands *operands;
     int *outputs;
-    int *wanted; /* of a part: the outputs of the whole */
+    int *wanted; /* the outputs of the whole */
     int first_known, uses;
     uint64_t belongs_to;
 } Special;
@@ -175,12 +175,11 @@ typedef struct Instance {
     Strike strike;
     int stopped;                     /* something has been stopped at the present instant */
     Special special[N_SPECIALS + 1]; /* the last one: a part, see `make_part` */
-    double *part_values;
-    uint64_t decided_by;        /* counts changes of what decides about tapes: modes and parameters */
-    uint64_t altered;           /* counts all changes of these, those of tuned parameters, too */
-    uint64_t known_by[N_CODES]; /* at which of the latter what compiled tapes know was worked out */
-    uint64_t active_by;         /* behind which of the former guards were marked `active` */
-    int n_active;               /* of `active_guard` */
+    uint64_t decided_by;             /* counts changes of what decides about tapes: modes and parameters */
+    uint64_t altered;                /* counts all changes of these, those of tuned parameters, too */
+    uint64_t known_by[N_CODES];      /* at which of the latter what compiled tapes know was worked out */
+    uint64_t active_by;              /* behind which of the former guards were marked `active` */
+    int n_active;                    /* of `active_guard` */
 
     const char *name;
     void *environment;
