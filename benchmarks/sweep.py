@@ -51,13 +51,17 @@ def compare(name: str, runs: int) -> None:
     """Print what both solvers do."""
     # In turns, so that what else the machine does meets all.
     rounds = [
-        (timed(name, runs, "native", 1), timed(name, runs, "native", 2), timed(name, runs / 25, "idas", 1))
+        (
+            timed(name, runs, "native", 1), timed(name, runs, "native", 2),
+            timed(name, runs, "native", 1, compiled=True), timed(name, runs / 25, "idas", 1),
+        )
         for _ in range(ROUNDS)
-    ]
-    best = [tuple(max(one[k][n] for one in rounds) for n in (0, 1)) for k in range(3)]
-    scaling = ", ".join(f"{two[0] / one[0]:.2f}" for one, two, _ in rounds)
+    ]  # fmt: skip
+    best = [tuple(max(one[k][n] for one in rounds) for n in (0, 1)) for k in range(4)]
+    scaling = ", ".join(f"{two[0] / one[0]:.2f}" for one, two, *_ in rounds)
+    kinds = "native, one thread", "native, two threads", "native, machine code", "IDAS, one process"
     print(f"{name}, best of {ROUNDS}; load of the machine {os.getloadavg()[0]:.1f}")
-    for text, (wall, cpu) in zip(("native, one thread", "native, two threads", "IDAS, one process"), best, strict=True):
+    for text, (wall, cpu) in zip(kinds, best, strict=True):
         print(f"  {text:20}{wall:9.0f} runs/s of wall {cpu:9.0f} runs/s of CPU")
     print(f"  two threads for one in each round: {scaling}")
 
