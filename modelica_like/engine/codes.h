@@ -87,6 +87,7 @@ FAILURE(LOST_AT_TOUCH, NO_DERIVATIVES("the guard of that event only touches zero
 FAILURE(LOST_IN_ROUNDS, NO_DERIVATIVES("that event has too many rounds"))
 FAILURE(LOST_AT_OTHER_MODES, NO_DERIVATIVES("a small change of it leads to other modes there"))
 FAILURE(LOST_BY_DELAY, NO_DERIVATIVES("a value is delayed"))
+FAILURE(LOST_BY_MEMORY, NO_DERIVATIVES("its steps take too much memory"))
 
 #undef CANNOT_SET
 #undef NO_DERIVATIVES

@@ -19,6 +19,8 @@
 #define AT_EDGE 1e-12         /* an edge or guard so close to zero rests there: rounding of values of about one */
 #define MOST_DOUBTS 200 /* between two events, each of which makes a step shorter: a signal has decayed with fewer */
 #define NOISE 1e-30     /* a decaying signal ends by swinging around zero with such values; that is no event */
+#define INSTANT 1e-9    /* duration of an impact; finite forces cancel whatever it is */
+#define IDEAL_HEAD 3    /* numbers of an ideal element before its combination of equations, see row_of */
 #define CROWD 24        /* further instants in a short time follow each other ever faster */
 
 #include "types.h"
@@ -31,10 +33,12 @@ void slopes(int operation, double a, double b, double f, double *by_left, double
 /* linear.c */
 int qr_factor(const QrPattern *pattern, const double *values, Instance *c);
 void qr_solve(const QrPattern *pattern, const Instance *c, double *x);
+void qr_solve_transposed(const QrPattern *pattern, const Instance *c, double *x);
 int factor_matrix(Instance *c);
 void combine(int n, const double *from, int count, const double *weights, const double *rows, int row, double *to);
 int all_finite(int n, const double *values);
 void solve_step(const Instance *c, double *x);
+void solve_step_transposed(const Instance *c, double *x);
 int lu_factor(int n, double *matrix, int *order);
 void lu_solve(int n, const double *matrix, const int *order, double *x);
 void lu_solve_transposed(int n, const double *matrix, const int *order, double *x);
@@ -96,6 +100,7 @@ void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
 void replace_dependent(Instance *c);
 int pushed(Instance *c);
+int conditions(Instance *c, int *nodes);
 #define GIVEN_BACK 1e-3 /* of the largest current: none where modes return, as it ends within the time resolution */
 Result meet(Instance *c, double keep, int *any);
 Result refuse_contradiction(Instance *c);
@@ -169,7 +174,6 @@ double seen_length(Instance *c, double least, double *most);
 void keep_edges(Instance *c);
 int is_over_edge(Instance *c);
 int stands_on_edge(Instance *c, unsigned char *zero);
-int leads_off_edge(Instance *c, double least, int crossed);
 int jumps_between(Instance *c, double before, double behind);
 double edge_ahead(Instance *c, double t, double *behind);
 /* fixed.c */
@@ -199,14 +203,16 @@ Result check_knowns(Instance *c, const uint32_t *knowns, size_t n);
 Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n);
 void tangent_now(Instance *c, const Tape *tape, double *results);
 void tangent_of_implicit(Instance *c);
-void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride);
+void adjoint_of_implicit(Instance *c, int regular);
+void seed_unknowns(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const double *seed);
+Result start_adjoint(Instance *c, double *start_bars);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c);
 /* gradient.c */
 void gradient_move(Instance *c, double t);
 int gradient_round(Instance *c, int round, unsigned char *wanting, int any);
 Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start);
-void gradient_lose(Instance *c, FailureCode why, const Variable *by);
+void gradient_lose(Instance *c, FailureCode why);
 void gradient_end(Instance *c);
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 /* instance.c */

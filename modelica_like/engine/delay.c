@@ -206,7 +206,7 @@ Result reach_instant(Instance *c) {
 Result leave_instant(Instance *c, int happened) {
     int begins = c->state.n_past == 0;
     if (c->model->n_delays == 0 || !(begins || happened)) return RESULT_OK;
-    if (begins) gradient_lose(c, FAILURE_LOST_BY_DELAY, NULL);
+    if (begins) gradient_lose(c, FAILURE_LOST_BY_DELAY);
     keep_past(c, c->state.t, c->x, 0);
     return begins ? renew_delays(c) : RESULT_OK;
 }

@@ -104,6 +104,63 @@ static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const
     return m->n_start_unknowns > 0 ? start_system_tangent(c, starts) : RESULT_OK;
 }
 
+/* Equations of discrete variables at the start, backwards: they begin with start values, as start_equations. */
+static void update_adjoint(Instance *c) {
+    const Model *m = c->model;
+    double *bars = c->reset_values, *d = c->dots + m->slot_d;
+    if (m->n_updates == 0 || !factor_implicit(c)) return;
+    memcpy(c->d_begun, c->d, (size_t)m->n_d * sizeof(double));
+    const double *starts = discrete_starts(c);
+    for (int k = 0; k < m->n_updates; k++)
+        if (m->updates[k].at_start >= 0) c->d[m->updates[k].at_start] = starts[m->updates[k].at_start];
+    evaluate_now(c, &m->tapes.updates, bars);
+    memset(bars, 0, (size_t)m->tapes.updates.n_outputs * sizeof(double));
+    for (int k = 0; k < m->n_updates; k++) {
+        int entry = m->updates[k].at_start;
+        if (entry >= 0) bars[k] += d[entry], d[entry] = 0;
+    }
+    tape_adjoint(&m->tapes.updates, c->slots, c->dots, bars);
+    adjoint_of_implicit(c, 1);
+    memcpy(c->d, c->d_begun, (size_t)m->n_d * sizeof(double));
+}
+
+/* The same backwards, from bars of states, parameters, inputs and d, which lie in `dots`, to those of parameters and
+ * inputs there, and of start values. The start has just been found here. */
+Result start_adjoint(Instance *c, double *start_bars) {
+    const Model *m = c->model;
+    double *dots = c->dots, *x = dots + m->slot_x, *step = c->start_unknowns, *bars = c->start_residual;
+    memset(start_bars, 0, (size_t)m->n_starts * sizeof(double));
+    update_adjoint(c);
+    if (m->n_start_unknowns > 0) {
+        evaluate_now(c, &m->tapes.start_jacobian, c->jacobian);
+        if (!qr_factor(&m->start, c->jacobian, c)) return RESULT_ERROR;
+        evaluate_now(c, &m->tapes.start_system, bars);
+        memset(bars, 0, (size_t)m->tapes.start_system.n_outputs * sizeof(double));
+        for (int k = 0; k < m->n_start_unknowns; k++)
+            step[k] = m->start_columns[k] < m->n_x ? x[m->start_columns[k]] : 0;
+        qr_solve_transposed(&m->start, c, step);
+        for (int k = 0; k < m->n_start_unknowns; k++) {
+            if (m->start_rows[k].start >= 0) start_bars[m->start_rows[k].start] += step[k];
+            bars[m->start_rows[k].row] -= step[k];
+        }
+        tape_adjoint(&m->tapes.start_system, c->slots, dots, bars);
+        for (int k = 0; k < m->n_start_unknowns; k++)
+            if (m->start_columns[k] < m->n_x) x[m->start_columns[k]] = 0;
+    }
+    for (int k = 0; k < m->n_start_direct; k++) { /* the first counts */
+        const StartOf *from = &m->start_direct[k];
+        start_bars[from->start] += x[from->position] / from->factor;
+        x[from->position] = 0;
+    }
+    evaluate_now(c, &m->tapes.start_values, c->start_values);
+    for (int k = 0; k < m->n_starts; k++) c->start_values[k] = c->start_given[k] ? 0 : start_bars[k];
+    tape_adjoint(&m->tapes.start_values, c->slots, dots, c->start_values);
+    evaluate_now(c, &m->tapes.discrete_starts, c->guards);
+    for (int k = 0; k < m->n_d; k++) c->guards[k] = c->mode_given[k] ? 0 : dots[m->slot_d + k];
+    tape_adjoint(&m->tapes.discrete_starts, c->slots, dots, c->guards);
+    return RESULT_OK;
+}
+
 /* The tape that gives values of a kind of variables, or NULL. */
 static const Tape *tape_of(const Model *m, int kind) {
     if (kind == KIND_DERIVATIVE) return &m->tapes.rates;
@@ -113,7 +170,7 @@ static const Tape *tape_of(const Model *m, int kind) {
 
 static int is_idle(const Instance *c, const Variable *v) { return v->kind == KIND_GUARD && !guard_active(c, v->index); }
 
-void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride) {
+static void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result) {
     const Model *m = c->model;
     double *dots = c->dots, *values = c->outputs;
     for (int kind = 0; kind < N_KINDS; kind++) {
@@ -122,7 +179,7 @@ void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *resu
         for (size_t k = 0; k < n; k++) {
             const Variable *v = find_variable(m, unknowns[k]);
             if (v->kind != kind) continue;
-            result[k * stride] = is_idle(c, v) ? 0 : tape != NULL ? values[v->index] : dots[known_slot(m, v)];
+            result[k] = is_idle(c, v) ? 0 : tape != NULL ? values[v->index] : dots[known_slot(m, v)];
         }
     }
 }
@@ -134,12 +191,12 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
     else if (!start_tangent(c, knowns, n_knowns, seed)) return RESULT_ERROR;
     if (!factor_implicit(c)) return RESULT_ERROR;
     tangent_of_implicit(c);
-    read_tangents(c, unknowns, n_unknowns, result, 1);
+    read_tangents(c, unknowns, n_unknowns, result);
     return RESULT_OK;
 }
 
 /* From bars of z to bars of the arguments, through the implicit equations. */
-static void adjoint_of_implicit(Instance *c, int regular) {
+void adjoint_of_implicit(Instance *c, int regular) {
     const Model *m = c->model;
     if (m->n_z == 0) return;
     for (int k = 0; k < m->n_z; k++) c->vector[k] = -c->dots[m->slot_z + k];
@@ -154,11 +211,9 @@ static void adjoint_of_implicit(Instance *c, int regular) {
     tape_adjoint(&m->tapes.alg, c->slots, c->dots, c->vector);
 }
 
-Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
-    const double *seed, double *result) {
+/* Leaves the bars of what is known at the present point, where factor_implicit has been called, in `dots`. */
+void seed_unknowns(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const double *seed) {
     const Model *m = c->model;
-    if (!check_unknowns(c, unknowns, n_unknowns) || !check_knowns(c, knowns, n_knowns) || !factor_implicit(c))
-        return RESULT_ERROR;
     memset(c->dots, 0, m->slot_results * sizeof(double));
     for (size_t k = 0; k < n_unknowns; k++) {
         int slot = known_slot(m, find_variable(m, unknowns[k]));
@@ -177,7 +232,14 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
         tape_adjoint(tape, c->slots, c->dots, bars);
     }
     adjoint_of_implicit(c, 1);
-    for (size_t k = 0; k < n_knowns; k++) result[k] = c->dots[known_slot(m, find_variable(m, knowns[k]))];
+}
+
+Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
+    const double *seed, double *result) {
+    if (!check_unknowns(c, unknowns, n_unknowns) || !check_knowns(c, knowns, n_knowns) || !factor_implicit(c))
+        return RESULT_ERROR;
+    seed_unknowns(c, unknowns, n_unknowns, seed);
+    for (size_t k = 0; k < n_knowns; k++) result[k] = c->dots[known_slot(c->model, find_variable(c->model, knowns[k]))];
     return RESULT_OK;
 }
 

@@ -109,20 +109,6 @@ double edge_ahead(Instance *c, double t, double *behind) {
     return fmax(t, fmin(*behind - most, nextafter(*behind, t)));
 }
 
-/* Does a tangent, whose dots are loaded, move an edge on which the piece stands, or that it crosses between the times
- * looked at, by more than a part? */
-int leads_off_edge(Instance *c, double least, int crossed) {
-    int n = c->model->settings->n_kinks, any = 0;
-    const double *here = c->edges_middle, *end = here + c->model->tapes.edges.n_outputs;
-    double *moved = c->edges_middle + 2 * c->model->tapes.edges.n_outputs;
-    if (n > 0) tangent_now(c, &c->model->tapes.edges, moved);
-    for (int k = 0; k < n; k++) {
-        int stands = fabs(here[k]) <= AT_EDGE && fabs(end[k]) <= AT_EDGE;
-        any |= fabs(moved[k]) > least && (crossed ? differs(here[k], end[k]) : stands);
-    }
-    return any;
-}
-
 /* Do slopes differ at two neighbouring times of the piece? Edges tell where a step of a count is but for rounding. */
 int jumps_between(Instance *c, double before, double behind) {
     const Model *m = c->model;

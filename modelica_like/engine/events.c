@@ -129,7 +129,7 @@ static Result fire(Instance *c, unsigned char *wanting) {
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
         if (one->ends == 1) return fail(c, LIMIT_PASSED, c->state.t, k);
-        if (one->ends) gradient_lose(c, FAILURE_LOST_AT_END, NULL);
+        if (one->ends) gradient_lose(c, FAILURE_LOST_AT_END);
         c->state.ended |= one->ends;
         if (*notice) report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", c->state.t, notice);
         d[one->mode] = one->target;

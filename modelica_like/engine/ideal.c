@@ -1,7 +1,7 @@
 /* Ideal elements: equations that replace dependent ones, impulses, conditions on states. */
 #include "core.h"
 
-#define HEAD 3
+#define HEAD IDEAL_HEAD
 #define DEPENDENT_ROW 1e-9
 #define SLOW 1e3
 #define IMPULSE 1e12
@@ -137,6 +137,14 @@ int pushed(Instance *c) {
     int any = 0;
     for (int k = 0; k < c->model->n_ideals; k++) any |= row_of(c, k)[1] != 0;
     return any;
+}
+
+/* Variables that modes of ideal elements keep at zero by conditions on the states; returns how many. */
+int conditions(Instance *c, int *nodes) {
+    int count = 0;
+    for (int k = 0; k < c->model->n_ideals; k++)
+        if (moved(c, k)) nodes[count++] = zero_of(c, k);
+    return count;
 }
 
 /* Move the states so that they meet the conditions of the modes, and end impulses. What is missed by more than `keep`

@@ -1,7 +1,6 @@
 /* Impacts: motions that modes begin to hold are stopped by an impulse. */
 #include "core.h"
 
-#define INSTANT 1e-9 /* duration of an impact; finite forces cancel whatever it is */
 #define WEIGHS_NOTHING 1e-12
 #define TRIALS 50
 #define FELT 1e-9 /* change of a motion, relative to the largest one, from which on it is no rounding */

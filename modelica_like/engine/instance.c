@@ -262,7 +262,7 @@ Result state_copy_in(Instance *c, const void *copy) {
     memcpy(&c->state, copy, sizeof(State));
     memcpy(c->numbers, (const char *)copy + sizeof(State), c->n_numbers * sizeof(double));
     c->variables_valid = c->look_valid = c->edges_valid = 0;
-    gradient_lose(c, FAILURE_LOST_BY_COPY, NULL);
+    gradient_lose(c, FAILURE_LOST_BY_COPY);
     return RESULT_OK;
 }
 

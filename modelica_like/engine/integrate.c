@@ -1,7 +1,7 @@
 /* Co-Simulation: steps that run as far as accuracy allows, events located inside them, results interpolated. A step
  * does not end where a communication step ends: the importer's points are read from the dense output. Only where inputs
  * move does a step end there, so that their jumps fall between steps. */
-#include "core.h"
+#include "rodas.h"
 
 #define MAX_REJECTIONS 60
 #define LEAST_OVER_EDGE 10 /* of the least step: no error is asked of shorter ones at an edge */
@@ -12,39 +12,7 @@
 #define SAME_PART 1e-6     /* of a fixed step */
 #define LEAST_STEPS 50     /* per run, where time itself is in the equations: a pulse could hide between longer ones */
 
-/* One step of RODAS5P: a stiffly accurate, L-stable Rosenbrock method of order 5(4) for index-1 systems with dense
- * output of order 4 (G. Steinebach, BIT Numerical Mathematics 63:27, 2023). Notation as in Hairer & Wanner II, ch.
- * IV.7, with the transformation that avoids products with the Jacobian, M = diag(1 for x, 0 for z): (M/(h gamma) - J)
- * k_i = f(t + c_i h, y + sum a_ij k_j) + sum (C_ij/h) M k_j + h d_i df/dt. */
-#define STAGES 8
-#define LAST_POINTS 6 /* from here on a stage's point is the point of the stage before, moved by that stage */
-#define GAMMA 0.21193756319429014
-
-static const double A[LAST_POINTS][LAST_POINTS - 1] = {
-    {0},
-    {3.0},
-    {2.849394379747939, 0.45842242204463923},
-    {-6.954028509809101, 2.489845061869568, -10.358996098473584},
-    {2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641},
-    {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946},
-};
-static const double C[STAGES][STAGES - 1] = {
-    {0},
-    {-14.155112264123755},
-    {-17.97296035885952, -2.859693295451294},
-    {147.12150275711716, -1.41221402718213, 71.68940251302358},
-    {165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306},
-    {24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471},
-    {30.91273214028599, -3.1208243349937974, 77.79954646070892, 34.28646028294783, -19.097331116725623,
-        -28.087943162872662},
-    {37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047, -40.06618937091002,
-        -54.66780262877968, -9.48861652309627},
-};
-static const double C_TIME[STAGES] = {
-    0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1, 1, 1};
-static const double D_TIME[STAGES] = {
-    0.21193756319429014, -0.42387512638858027, -0.3384627126235924, 1.8046452872882734, 2.325825639765069, 0, 0, 0};
-static const double DENSE[3][STAGES] = {
+static const double RODAS_DENSE[3][STAGES] = {
     {25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
         1.1241088310450404, 0.4272876194431874, -0.17202221070155493},
     {-9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796, 20.176138334709044,
@@ -109,15 +77,15 @@ double rosenbrock_step(Instance *c, double t, const double *first, double h, int
     if (!factor_step(c, step_diagonal(h))) return -1;
     c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
-        double *stage = c->stages + (size_t)i * n, by_time = h * D_TIME[i];
-        if (i < LAST_POINTS) combine(n, first, i, A[i], c->stages, n, y);
+        double *stage = c->stages + (size_t)i * n, by_time = h * RODAS_D_TIME[i];
+        if (i < LAST_POINTS) combine(n, first, i, RODAS_A[i], c->stages, n, y);
         else combine(n, y, 1, &one, stage - n, n, y);
         if (i == 0) memcpy(stage, c->first_rates, size);
         else {
-            load_point(c, t + C_TIME[i] * h, y);
+            load_point(c, t + RODAS_TIME[i] * h, y);
             run_special(c, &c->model->tapes.rates, stage);
         }
-        for (int j = 0; j < i; j++) factors[j] = C[i][j] / h;
+        for (int j = 0; j < i; j++) factors[j] = RODAS_C[i][j] / h;
         combine(c->model->n_x, stage, i, factors, c->stages, n, stage);
         combine(n, stage, 1, &by_time, slope, n, stage);
         if (!all_finite(n, stage)) return -1;
@@ -128,13 +96,13 @@ double rosenbrock_step(Instance *c, double t, const double *first, double h, int
     memset(last + n, 0, 3 * size);
     for (size_t k = 0; k < 3; k++) {
         double *row = last + (k + 1) * (size_t)n;
-        combine(n, row, STAGES, DENSE[k], c->stages, n, row);
+        combine(n, row, STAGES, RODAS_DENSE[k], c->stages, n, row);
     }
     return error_norm(c, first, last, c->stages + (STAGES - 1) * n);
 }
 
 /* Of the matrix of a step of length h. */
-double step_diagonal(double h) { return 1 / (h * GAMMA); }
+double step_diagonal(double h) { return 1 / (h * RODAS_GAMMA); }
 
 /* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4); states that are nothing but
  * rounding tell nothing about it. */

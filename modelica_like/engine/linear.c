@@ -57,6 +57,18 @@ void qr_solve(const QrPattern *a, const Instance *c, double *x) {
     for (int k = 0; k < a->size; k++) x[a->column_order[k]] = y[k];
 }
 
+void qr_solve_transposed(const QrPattern *a, const Instance *c, double *x) {
+    double *y = c->qr_work;
+    for (int column = 0; column < a->size; column++) {
+        int last = a->r_colind[column + 1] - 1;
+        double rest = x[a->column_order[column]];
+        for (int k = a->r_colind[column]; k < last; k++) rest -= c->qr_r[k] * y[a->r_row[k]];
+        y[column] = rest / c->qr_r[last];
+    }
+    for (int column = a->size - 1; column >= 0; column--) reflect(a, c, column, y);
+    for (int k = 0; k < a->size; k++) x[k] = y[a->row_place[k]];
+}
+
 typedef double Pair __attribute__((vector_size(2 * sizeof(double)), aligned(sizeof(double)), may_alias));
 
 /* to = from + the sum of weights * rows, in this order, for n columns of rows of length `row`: four at a
@@ -207,6 +219,27 @@ void solve_step(const Instance *c, double *x) {
         double solved = x[lu->column_order[k]] = k < first ? y[k] * c->lu_pivots[k] : y[k];
         for (int r = u_end[k]; r < u_end[k + 1]; r++) y[lu->rows[r]] -= c->lu[r] * solved;
     }
+}
+
+/* The same with the transposed matrix. */
+void solve_step_transposed(const Instance *c, double *x) {
+    const LuPattern *lu = &c->model->lu;
+    double *y = c->qr_work;
+    int n = c->model->step.size, first = lu->n_ends - 1 - n;
+    const int *l_end = lu->ends, *u_end = l_end + first;
+    if (!c->by_lu) {
+        qr_solve_transposed(&c->model->step, c, x);
+        return;
+    }
+    for (int k = 0; k < n; k++) {
+        double rest = x[lu->column_order[k]];
+        for (int r = u_end[k]; r < u_end[k + 1]; r++) rest -= c->lu[r] * y[lu->rows[r]];
+        y[k] = k < first ? rest * c->lu_pivots[k] : rest;
+    }
+    lu_solve_transposed(n - first, c->lu_last, c->last_order, y + first);
+    for (int k = first - 1; k >= 0; k--)
+        for (int r = l_end[k]; r < l_end[k + 1]; r++) y[k] -= c->lu[r] * y[lu->rows[r]];
+    for (int k = 0; k < n; k++) x[k] = y[lu->row_place[k]];
 }
 
 static void rotate(int n, double *p, double *q, double c, double s) {

@@ -221,7 +221,7 @@ EXPORTED int native_states(Native *n, const double *given, double *x) {
     if (event_first(c) && !handle_event(c)) return NATIVE_FAILED;
     if (given != NULL) {
         if (!set_states(c, given)) return NATIVE_FAILED;
-        gradient_lose(c, FAILURE_LOST_BY_STATES, NULL);
+        gradient_lose(c, FAILURE_LOST_BY_STATES);
         for (int k = 0; k < c->model->n_d; k++) c->d_before[k] = -1;
         memset(c->entered, 0, (size_t)c->model->n_holds);
         c->stopped = c->state.piece_valid = c->state.event_pending = 0;

@@ -129,7 +129,8 @@ static void work_out(Instance *c, const Tape *tape) {
     int slot = tape->first_result;
     memset(known, 0, (size_t)m->n_slots);
     for (int k = 0; k < m->n_p; k++) known[m->slot_p + k] = !c->tuned[k];
-    memset(known + m->slot_d, 1, (size_t)m->n_d);
+    for (int k = 0; k < m->n_d; k++) /* a gradient goes back to discrete values, and to shares where there are any */
+        known[m->slot_d + k] = !c->passing || (k < m->n_modes ? m->modes[k].n_names > 0 : c->d[k] == 0);
     memset(known + m->slot_constants, 1, (size_t)m->n_constants);
     for (int k = 0; k < slot; k++) c->same[k] = k;
     for (int r = 0; r < tape->n_runs; r++)

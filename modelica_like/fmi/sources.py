@@ -20,7 +20,7 @@ _ENGINE = Path(__file__).parents[1] / "engine"
 RUNTIME = (
     "model.c", "tape.c", "code.c", "linear.c", "start.c", "steady.c", "holds.c", "impacts.c", "ideal.c", "events.c",
     "resets.c", "panels.c", "locate.c", "edges.c", "integrate.c", "fixed.c", "values.c", "delay.c", "derivatives.c",
-    "gradient.c", "instance.c",
+    "adjoint.c", "instants.c", "gradient.c", "instance.c",
 )  # fmt: skip
 LOG_CATEGORIES = {
     "logStatusError": "errors: what went wrong, where, and what to do",
@@ -63,7 +63,9 @@ def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
 def own_sources(faces: Iterable[Face]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
     files = (name for face in faces for name in _FACES[face])
-    headers = ("code.h", "codes.h", "core.h", "types.h", "model.h", "modelica_like.h", "operations.h")
+    headers = (
+        "adjoint.h", "code.h", "codes.h", "core.h", "types.h", "model.h", "modelica_like.h", "operations.h", "rodas.h",
+    )  # fmt: skip
     names = (*headers, "model_data.c", *RUNTIME, *files)
     return {name: (_ENGINE / name).read_text(encoding="utf-8") for name in names}
 

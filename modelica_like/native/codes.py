@@ -80,6 +80,7 @@ class Code(IntEnum):
     LOST_IN_ROUNDS = auto()
     LOST_AT_OTHER_MODES = auto()
     LOST_BY_DELAY = auto()
+    LOST_BY_MEMORY = auto()
 
 
 _OF_VALUES = (

@@ -134,15 +134,15 @@ class Native:
     def gradient(self) -> Vector:
         """Return the derivatives of `outputs` with respect to `by`, through all events since the start.
 
-        Where the run stays at a kink that changes no mode (an output limited to what it just is), they are those of one
-        side; `sensitivities` refuses that.
+        It costs about three runs, for any number of parameters and one output. Where the run stays at a kink that
+        changes no mode (an output limited to what it just is), they are those of one side: `sensitivities` refuses it.
 
         Returns:
-            Shape (outputs, by).
+            Shape (outputs, by); nan by what has none, where others have. Alone it is refused with the reason.
 
         Raises:
-            NoGradient: at an event a small change leads to other modes, a rate jumps without an event, or a copy was
-                restored.
+            NoGradient: by nothing there are any: at an event a small change leads to other modes, a rate jumps without
+                an event, a copy was restored, or the run has too many steps to keep.
         """
         self._read(self._references[1], self.outputs)  # after events that come first
         slopes = np.zeros((len(self.outputs), self._by.size))

@@ -231,7 +231,7 @@ ALONE: dict[Code, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
 """What only this solver refuses: class, and pattern of the message."""
 HARD = {
     Code.IMPLICIT_SINGULAR: SingularAtStart, Code.NO_MEMORY: NotEnoughMemory, Code.OF_ARRAY: NoGradient,
-    Code.LOST_AT_SINGULAR: NoGradient, Code.LOST_IN_ROUNDS: NoGradient,
+    Code.LOST_AT_SINGULAR: NoGradient, Code.LOST_IN_ROUNDS: NoGradient, Code.LOST_BY_MEMORY: NoGradient,
 }  # fmt: skip
 """What no small drive does."""
 

@@ -1,0 +1,317 @@
+/* Adjoint vectors over a piece of a run: RODAS5P, as in integrate.c, for the linear equations of the derivatives along
+ * the dense output, transposed. Its one matrix belongs to the begin of the step; how Jacobians change with time there
+ * follows from those at the nodes of its stages. */
+#include "adjoint.h"
+
+#define RESTS 1e-3       /* of a run: a step from which on what is zero at both its ends rests */
+#define NEARBY_KINK 3e-6 /* of sizes: how far slopes beside a kink are looked at */
+#define FELT_SLOPE 1e-9  /* of slopes, by which states change in the time of a run */
+#define FELT_KINK 1e-3   /* of a slope: curvature changes it by about NEARBY_KINK */
+#define CLOSER 0.01      /* the part of that where a kink differs as much */
+#define MOST_EDGES 100   /* in a step: more are noise */
+#define MOST_ERROR 100   /* tolerances, estimated: results have about a hundredth of that */
+#define MOST_HALVINGS 8  /* of a step: what begins on a kink is wrong in its first part only, of 4e-3 */
+
+/* The derivative at the begin of a step of length 1 of the polynomial through values at its nodes. */
+static const double BY_NODES[N_NODES] = {-8.369800827143091, 46.395023689295286, 445.56742342191916, -46.71499414177189,
+    -475.38545395892027, 38.507801816620784};
+
+static int node_of(int stage) { return stage < N_NODES ? stage : N_NODES - 1; }
+
+/* Adds bars of states, parameters, inputs and d, which lie in `dots`, and of the time. */
+void add_bars(Instance *c, double *vector) {
+    const Model *m = c->model;
+    const struct {
+        const double *numbers;
+        int slot, n;
+    } parts[] = {
+        {c->x, m->slot_x, m->n_x}, {c->p, m->slot_p, m->n_p}, {c->u, m->slot_u, m->n_u}, {c->d, m->slot_d, m->n_d}};
+    for (int k = 0; k < 4; k++)
+        for (int n = 0; n < parts[k].n; n++) vector[parts[k].numbers - c->numbers + n] += c->dots[parts[k].slot + n];
+    vector[c->n_smooth] += c->dots[0] + dot(m->n_u, c->dots + m->slot_u, c->u_rate);
+}
+
+/* Derivatives of an output of a tape at the present point, where factor_implicit has been called. */
+void slope_of_output(Instance *c, const Tape *tape, int output, double *bars, double *slope) {
+    memset(slope, 0, (c->n_smooth + 1) * sizeof(double));
+    memset(c->dots, 0, (size_t)c->model->slot_results * sizeof(double));
+    evaluate_now(c, tape, bars);
+    memset(bars, 0, (size_t)tape->n_outputs * sizeof(double));
+    bars[output] = 1;
+    tape_adjoint(tape, c->slots, c->dots, bars);
+    adjoint_of_implicit(c, 1);
+    add_bars(c, slope);
+}
+
+/* Adds the product of a transposed Jacobian, by nonzeros of the step matrix. */
+static void add_product(const Instance *c, const double *matrix, const double *left, double *product) {
+    const QrPattern *a = &c->model->step;
+    for (int column = 0; column < a->size; column++)
+        for (int k = a->colind[column]; k < a->colind[column + 1]; k++) product[column] += matrix[k] * left[a->row[k]];
+}
+
+/* Jacobians at the nodes of a step; the matrix of the step. */
+static int prepare_step(Instance *c, double begin, double h) {
+    Gradient *g = c->gradient;
+    const Model *m = c->model;
+    size_t n = (size_t)m->n_unknowns, nonzeros = (size_t)m->step.n_nonzeros;
+    memset(g->matrices, 0, N_NODES * nonzeros * sizeof(double));
+    for (int node = N_NODES - 1; node >= 0; node--) {
+        double t = begin + RODAS_TIME[node] * h, *point = g->points + (size_t)node * n;
+        piece_at(m, c->piece, t, point);
+        evaluate_special(c, &m->tapes.jacobian, t, point, c->jacobian);
+        for (int k = 0; k < m->n_jacobian; k++)
+            g->matrices[(size_t)node * nonzeros + m->jacobian_to_step[k]] = c->jacobian[k];
+    }
+    return factor_step(c, step_diagonal(h));
+}
+
+/* A vector over a step: `x` holds bars of states behind it, and becomes those of states and implicit unknowns before;
+ * `rates` become bars of rates at the nodes. */
+static void step_back(Instance *c, double h, double *x, double *rates, int of_error) {
+    const Gradient *g = c->gradient;
+    int n = c->model->n_unknowns, n_x = c->model->n_x;
+    size_t size = (size_t)n * sizeof(double), nonzeros = (size_t)c->model->step.n_nonzeros;
+    double *stages = g->stages, *points = stages + STAGES * n, *moving = points + n, *changing = moving + n;
+    memset(stages, 0, (STAGES + 3) * size);
+    memset(rates, 0, N_NODES * size);
+    memcpy(stages + (STAGES - 1) * n, x, size); /* bars of stages, of the present stage's point, of the slope by time */
+    if (!of_error) memcpy(points, x, size);
+    memset(x, 0, size);
+    for (int i = STAGES - 1; i >= 0; i--) {
+        double *stage = stages + i * n, *at_node = rates + node_of(i) * n;
+        solve_step_transposed(c, stage);
+        if (i < LAST_POINTS - 1) memset(points, 0, size);
+        add_product(c, g->matrices + (size_t)node_of(i) * nonzeros, stage, points);
+        for (int k = 0; k < n; k++) {
+            at_node[k] += stage[k];
+            moving[k] += RODAS_D_TIME[i] * stage[k];
+        }
+        for (int j = 0; j < i; j++) {
+            double by_point = i >= LAST_POINTS ? j == i - 1 : RODAS_A[i][j], by_rate = RODAS_C[i][j] / h;
+            double *other = stages + j * n;
+            for (int k = 0; k < n; k++) other[k] += by_point * points[k] + (k < n_x ? by_rate * stage[k] : 0);
+        }
+        for (int k = 0; k < n && i < LAST_POINTS; k++) x[k] += points[k];
+    }
+    for (int node = 0; node < N_NODES; node++) {
+        for (int k = 0; k < n; k++) changing[k] = BY_NODES[node] * moving[k];
+        add_product(c, g->matrices + (size_t)node * nonzeros, changing, x);
+        for (int k = 0; k < n; k++) rates[node * n + k] += changing[k];
+    }
+}
+
+/* Bars of rates at the nodes give those of parameters, inputs and d. */
+static void rates_back(Instance *c, double begin, double h, const double *rates) {
+    Gradient *g = c->gradient;
+    const Model *m = c->model;
+    size_t n = (size_t)m->n_unknowns;
+    for (int node = 0; node < N_NODES; node++) {
+        double t = begin + RODAS_TIME[node] * h, *point = g->points + (size_t)node * n;
+        const Tape *ran = evaluate_special(c, &m->tapes.rates, t, point, c->rhs);
+        for (int v = 0; v < g->n_vectors; v++) {
+            memset(c->dots, 0, (size_t)m->slot_results * sizeof(double));
+            tape_adjoint(ran, c->slots, c->dots, rates + ((size_t)v * N_NODES + (size_t)node) * n);
+            memset(c->dots + m->slot_x, 0, (size_t)m->n_x * sizeof(double));
+            add_bars(c, vector_of(c, v));
+        }
+    }
+    memset(c->dots + c->special[0].first_known, 0,
+        (size_t)m->tapes.rates.n_operations * sizeof(double)); /* does not move */
+}
+
+/* The error of a step, which its last stage estimates, beside the largest effects of states, parameters and inputs on
+ * outputs that have come so far, also over this step (`after`). */
+static double error_back(Instance *c, double h, const double *after) {
+    const Gradient *g = c->gradient;
+    const Model *m = c->model;
+    size_t n = (size_t)m->n_unknowns, all = c->n_smooth;
+    double *x = g->work, *sizes = g->sizes, error = 0;
+    ptrdiff_t first = c->x - c->numbers;
+    for (size_t k = 0; k < all; k++) sizes[k] = fabs(c->numbers[k]);
+    for (int k = 0; k < m->n_x; k++) sizes[first + k] = fabs(g->points[k]) + m->nominals[k];
+    memset(x, 0, n * sizeof(double));
+    for (int v = 0; v < g->n_of; v++) {
+        const double *vector = vector_of(c, v);
+        double *largest = &g->largest[v];
+        for (size_t k = 0; k < all; k++) *largest = fmax(*largest, fabs(vector[k]) * sizes[k]);
+        for (int k = 0; k < m->n_x; k++)
+            *largest = fmax(*largest, fabs(after[(size_t)v * n + (size_t)k]) * sizes[first + k]);
+        for (int k = 0; k < m->n_x && *largest > 0; k++) x[k] += vector[first + k] / *largest;
+    }
+    step_back(c, h, x, g->work + n, 1);
+    for (int k = 0; k < m->n_x; k++) error = fmax(error, fabs(x[k]) * sizes[first + k]);
+    return error;
+}
+
+/* Goes back from one time of the present piece to another, without edges in between. */
+static void smoothly_back(Instance *c, double begin, double end, int halvings) {
+    Gradient *g = c->gradient;
+    const Model *m = c->model;
+    double h = end - begin, *after = g->behind; /* not needed on pieces */
+    size_t n = (size_t)m->n_unknowns;
+    if (!(h > 0)) return;
+    if (!prepare_step(c, begin, h)) lose_back(c);
+    for (int v = 0; v < g->n_vectors; v++) {
+        double *x = after + (size_t)v * n;
+        memset(x, 0, n * sizeof(double));
+        memcpy(x, vector_of(c, v) + (c->x - c->numbers), (size_t)m->n_x * sizeof(double));
+        step_back(c, h, x, g->node_bars + (size_t)v * N_NODES * n, 0);
+    }
+
+    if (halvings > 0 && error_back(c, h, after) > MOST_ERROR * c->state.tolerance) {
+        smoothly_back(c, begin + 0.5 * h, end, halvings - 1);
+        smoothly_back(c, begin, begin + 0.5 * h, halvings - 1);
+        return;
+    }
+    for (int v = 0; v < g->n_vectors; v++)
+        memcpy(vector_of(c, v) + (c->x - c->numbers), after + (size_t)v * n, n * sizeof(double));
+    rates_back(c, begin, h, g->node_bars);
+    c->state.t = begin;
+    memcpy(c->x, g->points, n * sizeof(double));
+    c->state.z_valid = c->variables_valid = 0;
+    if (m->n_z == 0) return;
+    if (!factor_implicit(c)) lose_back(c);
+    for (int v = 0; v < g->n_vectors; v++) {
+        double *states = vector_of(c, v) + (c->x - c->numbers);
+        memset(c->dots, 0, (size_t)m->slot_results * sizeof(double));
+        memcpy(c->dots + m->slot_x, states, n * sizeof(double));
+        memset(states, 0, n * sizeof(double));
+        adjoint_of_implicit(c, 1);
+        add_bars(c, vector_of(c, v));
+    }
+}
+
+/* Slopes along a direction at the present point. */
+static void slopes_along(Instance *c, const double *direction, double *slopes) {
+    const Model *m = c->model;
+    double *dots = c->dots;
+    c->variables_valid = c->state.z_valid = 0;
+    memset(slopes, 0, (size_t)m->n_x * sizeof(double));
+    if (!factor_implicit(c)) return;
+    memset(dots, 0, (size_t)m->slot_results * sizeof(double));
+    memcpy(dots + m->slot_x, direction + (c->x - c->numbers), (size_t)m->n_x * sizeof(double));
+    memcpy(dots + m->slot_p, direction + (c->p - c->numbers), (size_t)m->n_p * sizeof(double));
+    memcpy(dots + m->slot_u, direction + (c->u - c->numbers), (size_t)m->n_u * sizeof(double));
+    memcpy(dots + m->slot_d, direction + (c->d - c->numbers), (size_t)m->n_d * sizeof(double));
+    tangent_of_implicit(c);
+    tangent_now(c, &m->tapes.rates, slopes);
+}
+
+static double span_of(const Instance *c) {
+    return c->state.stop_time_defined ? c->state.stop_time - c->state.start_time : 1;
+}
+
+/* By how much slopes along a direction differ that can be felt in the time of a run. */
+static double felt(const Instance *c, const double *direction, const double *some, const double *others) {
+    const double *x = direction + (c->x - c->numbers), *nominals = c->model->nominals;
+    double largest = 0, most = 0, span = span_of(c);
+    for (int k = 0; k < c->model->n_x; k++) largest = fmax(largest, fabs(x[k]) / nominals[k]);
+    for (int k = 0; k < c->model->n_x; k++) {
+        double change = fabs(some[k] - others[k]), least = FELT_SLOPE * largest * nominals[k] / span;
+        int any = change > least && change > FELT_KINK * fmax(fabs(some[k]), fabs(others[k]));
+        if (any) most = fmax(most, change / nominals[k]);
+    }
+    return most;
+}
+
+/* By how much slopes along a direction differ a little to its two sides, or in a mode (-1: none) and another one. */
+static double felt_beside(Instance *c, const double *direction, double part, int mode, int target) {
+    Gradient *g = c->gradient;
+    size_t size = c->n_smooth * sizeof(double);
+    double *kept = g->sides, *slopes = g->rates;
+    memcpy(kept, c->numbers, size);
+    for (int side = 0; side < 2; side++) {
+        for (size_t k = 0; k < c->n_smooth && mode < 0; k++) c->numbers[k] += (side ? part : -part) * direction[k];
+        if (mode >= 0 && side) c->d[mode] = target;
+        slopes_along(c, direction, slopes + side * c->model->n_unknowns);
+        memcpy(c->numbers, kept, size);
+    }
+    c->variables_valid = c->state.z_valid = 0;
+    return felt(c, direction, slopes, slopes + c->model->n_unknowns);
+}
+
+/* A direction that leads off an edge or guard of which `slope` is the derivative: along it numbers change by up to
+ * their sizes. Of parameters and inputs, only those asked for. */
+static int direction_off(Instance *c, double *slope, double *direction) {
+    const Gradient *g = c->gradient;
+    double largest = 0;
+    memset(direction, 0, c->n_smooth * sizeof(double));
+    for (size_t k = 0; k < c->n_smooth; k++) {
+        ptrdiff_t state = (ptrdiff_t)k - (c->x - c->numbers), entry = (ptrdiff_t)k - (c->d - c->numbers);
+        int is_state = state >= 0 && state < c->model->n_x, is_entry = entry >= 0 && entry < c->model->n_d;
+        double size = fabs(c->numbers[k]) + (is_state ? c->model->nominals[state] : 1);
+        direction[k] = is_state || is_entry || g->asked[k] ? slope[k] * size : 0;
+        largest = fmax(largest, fabs(direction[k]));
+        direction[k] *= size;
+    }
+    for (size_t k = 0; k < c->n_smooth && largest > 0; k++) direction[k] /= largest;
+    return largest > 0;
+}
+
+/* What rests at a limit, an end of play or a row of a table has two derivatives by what leads off it. Behind an event
+ * something may be zero for a short step because it begins there. */
+static void check_kinks(Instance *c) {
+    Gradient *g = c->gradient;
+    const Model *m = c->model;
+    int n = m->tapes.edges.n_outputs, n_kinks = m->settings->n_kinks;
+    double *here = c->edges_middle, *slope = g->slope, *direction = g->work;
+    if (c->piece->end - c->piece->begin < RESTS * span_of(c) || !stands_on_edge(c, c->positive) || !factor_implicit(c))
+        return;
+    for (int k = 0; k < n_kinks; k++) {
+        if (fabs(here[k]) > AT_EDGE || fabs(here[n + k]) > AT_EDGE) continue;
+        slope_of_output(c, &m->tapes.edges, k, here + 2 * n, slope);
+        if (!direction_off(c, slope, direction)) continue;
+        double most = felt_beside(c, direction, NEARBY_KINK, -1, 0);
+        if (most > 0 && felt_beside(c, direction, CLOSER * NEARBY_KINK, -1, 0) > 0.5 * most)
+            add_doubt(c, FAILURE_LOST_AT_KINK, slope);
+        if (!factor_implicit(c)) return;
+    }
+    for (int k = 0; k < m->n_guards; k++) {
+        const Transition *to = &m->transitions[m->guard_transition[k]];
+        if (!c->positive[k]) continue;
+        slope_of_output(c, &m->tapes.guards, k, c->edge_guards, slope);
+        if (!direction_off(c, slope, direction)) continue;
+        if (felt_beside(c, direction, NEARBY_KINK, to->mode, to->target) > 0) add_doubt(c, FAILURE_LOST_AT_KINK, slope);
+        if (!factor_implicit(c)) return;
+    }
+}
+
+/* Slopes jump between two neighbouring times without an event: nothing tells by how much that moves. */
+static void check_jump(Instance *c, double before, double behind) {
+    const Model *m = c->model;
+    int n = m->tapes.edges.n_outputs;
+    const double *here = c->edges_middle;
+    if (!jumps_between(c, before, behind)) return;
+    c->state.t = behind;
+    piece_at(m, c->piece, behind, c->x);
+    c->variables_valid = c->state.z_valid = 0;
+    if (!factor_implicit(c)) return;
+    for (int k = 0; k < m->settings->n_kinks; k++) {
+        if ((here[k] > 0) == (here[n + k] > 0)) continue;
+        slope_of_output(c, &m->tapes.edges, k, c->edges_middle + 2 * n, c->gradient->slope);
+        add_doubt(c, FAILURE_LOST_AT_JUMP, c->gradient->slope);
+    }
+}
+
+/* Goes back along a part of a piece: states are smooth enough at edges within a step, slopes are not. */
+void piece_back(Instance *c, const Record *along) {
+    Gradient *g = c->gradient;
+    double begins[MOST_EDGES + 1], ends[MOST_EDGES + 1], behind = along->begin;
+    int parts = 0;
+    if (g->loaded != along->frame) state_copy_in(c, along->frame);
+    g->loaded = along->frame;
+    memcpy(c->piece, along->own, piece_size(c->model));
+    do {
+        begins[parts] = behind;
+        ends[parts] = parts < MOST_EDGES ? fmin(edge_ahead(c, begins[parts], &behind), along->end) : along->end;
+    } while (parts++ < MOST_EDGES && behind <= along->end && behind < INFINITY);
+    while (parts-- > 0) {
+        smoothly_back(c, begins[parts], ends[parts], MOST_HALVINGS);
+        if (parts > 0) check_jump(c, ends[parts - 1], begins[parts]);
+    }
+    c->state.t = along->begin;
+    piece_at(c->model, c->piece, along->begin, c->x);
+    c->variables_valid = c->state.z_valid = 0;
+    check_kinks(c);
+}
