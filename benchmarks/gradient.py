@@ -1,7 +1,8 @@
 """Gradients against simulations of the same run: `python benchmarks/gradient.py`.
 
 Ratios of CPU times of the same run, best of several; times are for orientation only. The gradient includes everything
-from the finished simulation on: the replay, and the sweep along it.
+from the finished simulation on: the replay, and the sweep along it. That of a handle is run and gradient together, as a
+ratio to the run of a handle without.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 from chain import Chain
 
 from modelica_like import CompiledDae, build, sensitivities, simulate
+from modelica_like.native.model import NativeModel
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 CASES = {
@@ -56,7 +58,41 @@ def measure(
     sys.stdout.flush()
 
 
+def measure_handle(name: str, model: CompiledDae, output: str, until: float) -> None:
+    """Run and gradient by one parameter and by all."""
+
+    def run(by: list[str]) -> float:
+        handle = model.native(outputs=[output], by=by)
+
+        def action() -> None:
+            handle.reset(until=until)
+            handle.step(until)
+            if by:
+                handle.gradient()
+
+        return best(action)
+
+    known = NativeModel.of(model).variables
+    names = [parameter.path for parameter in model.flat_parameters if parameter.path in known]
+    one = run([])
+    ratios = "   ".join(f"by {len(by)}: {run(by) / one:.1f}" for by in (names[:1], names))
+    sys.stdout.write(f"{name:32} handle     {one * 1e3:8.2f} ms   {ratios}\n")
+    sys.stdout.flush()
+
+
+HANDLES = {
+    "machine_tool_startup": ("load.w", 1.0),
+    "msl/rotational/CoupledClutches": ("J1.w", 1.5),
+    "lepelletier": ("car.w", 35.0),
+    "dc_bench": ("clutch.phi_rel", 1.0),
+}
+
+
 def main() -> None:
+    for name, (output, until) in HANDLES.items():
+        measure_handle(name, build(EXAMPLES / f"{name}.toml"), output, until)
+    for n in (100, 200):
+        measure_handle(f"chain {n}", build(Chain(n=n)), "masses[2].w", 1.0)
     for name, output in CASES.items():
         measure(name, build(EXAMPLES / f"{name}.toml"), output, (1, 10, 100))
     for n, repeats in ((10, 5), (100, 3)):
