@@ -44,7 +44,7 @@ struct Gradient {
     double singular_at, speed; /* how fast the guard of an event comes to zero, where it matters; or 0 */
     Doubt doubts[MOST_DOUBTFUL];
     double *vectors, *behind; /* of outputs, then of doubts: derivatives by numbers of the state, and by the time */
-    double *sides, *slope, *moment, *rates, *work, *sizes, *largest;
+    double *sides, *slope, *moment, *rates, *work, *sizes, *motions, *largest;
     double *points, *matrices, *stages, *node_bars; /* of a step */
     ptrdiff_t *listed;
 };

@@ -136,9 +136,9 @@ static double *take_room(const Instance *c, size_t n_of) {
         double **array;
         size_t size;
     } parts[] = {{&g->vectors, vectors * n}, {&g->behind, vectors * n}, {&g->sides, 2 * n}, {&g->slope, n},
-        {&g->moment, n}, {&g->work, n + (N_NODES + 1) * n_y}, {&g->largest, n_of}, {&g->sizes, n}, {&g->rates, 2 * n_y},
-        {&g->points, N_NODES * n_y}, {&g->matrices, N_NODES * nonzeros}, {&g->stages, (STAGES + 3) * n_y},
-        {&g->node_bars, vectors * N_NODES * n_y}};
+        {&g->moment, n}, {&g->work, n + (N_NODES + 1) * n_y}, {&g->largest, n_of}, {&g->sizes, n}, {&g->motions, n},
+        {&g->rates, 2 * n_y}, {&g->points, N_NODES * n_y}, {&g->matrices, N_NODES * nonzeros},
+        {&g->stages, (STAGES + 3) * n_y}, {&g->node_bars, vectors * N_NODES * n_y}};
     size_t total = 0;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) total += parts[k].size;
     double *room = c->allocate(total + n, sizeof(double));

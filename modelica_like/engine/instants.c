@@ -21,11 +21,13 @@ static const double *kept_vector(const Instance *c, int k) {
 }
 
 /* Sizes of numbers at an instant. Lists those by which derivatives are asked for, and those that it may read; behind
- * them those that are zero, of which many lead to other modes. */
+ * them those that are zero, of which many lead to other modes. They are moved so that several do not cancel each other,
+ * and the event by little. */
 static void list_numbers(Instance *c, const Record *at) {
     Gradient *g = c->gradient;
     const Model *m = c->model;
     ptrdiff_t x = c->x - c->numbers, d = c->d - c->numbers, ideal = d + m->settings->ideal, width = IDEAL_HEAD + m->n_z;
+    double t = fabs(((const State *)at->before)->t);
     const double *before = copied(c, at->before, c->numbers), *behind = copied(c, at->behind, c->numbers);
     g->n_listed = 0;
     for (int zero = 0; zero < 2; zero++)
@@ -36,14 +38,12 @@ static void list_numbers(Instance *c, const Record *at) {
             double size = fmax(fabs(before[k]), fabs(behind[k]));
             g->sizes[k] = state ? size + m->nominals[k - x] : size == 0 ? 1 : size;
             if ((size == 0) != zero) continue;
-            if (g->asked[k] || (!at->start && (state || (entry && !mode && !impulse)))) g->listed[g->n_listed++] = k;
+            if (!g->asked[k] && (at->start || !(state || (entry && !mode && !impulse)))) continue;
+            double later = at->start || g->speed == 0 ? 0 : fabs(g->moment[k] / g->speed * g->sizes[k]) / fmax(1, t);
+            double random = 0.5 + 0.5 * fmod(0.6180339887498949 * g->n_listed, 1);
+            g->motions[g->n_listed] = (g->n_listed % 2 ? -random : random) * NEARBY * g->sizes[k] / fmax(1, later);
+            g->listed[g->n_listed++] = k;
         }
-}
-
-/* By how much a listed number is moved: several at once do not cancel each other. */
-static double motion_of(const Instance *c, int k) {
-    const Gradient *g = c->gradient;
-    return (k % 2 ? -1 : 1) * (0.5 + 0.5 * fmod(0.6180339887498949 * k, 1)) * NEARBY * g->sizes[g->listed[k]];
 }
 
 /* States that have been moved meet the conditions of modes as before: no derivative leads off them. */
@@ -74,7 +74,7 @@ static int pass_moved(Instance *c, const Record *at, int begin, int end, int sid
     state_copy_in(c, at->before);
     memcpy(change, behind, c->n_smooth * sizeof(double));
     for (int k = begin; k < end; k++) {
-        double way = side * motion_of(c, k);
+        double way = side * g->motions[k];
         c->numbers[g->listed[k]] += way;
         change[g->listed[k]] += way;
         if (!at->start && g->speed != 0) shift += way * g->moment[g->listed[k]] / g->speed;
@@ -97,7 +97,7 @@ static int pass_moved(Instance *c, const Record *at, int begin, int end, int sid
  * follow, on either side. */
 static void feel(Instance *c, const Record *at, int begin, int end, int modes_only) {
     Gradient *g = c->gradient;
-    double *sides[] = {g->sides, g->sides + c->n_smooth}, step = 2 * motion_of(c, begin);
+    double *sides[] = {g->sides, g->sides + c->n_smooth}, step = 2 * g->motions[begin];
     ptrdiff_t place = g->listed[begin];
     int felt = 0, same = begin >= end || pass_moved(c, at, begin, end, 1, sides[1], &felt);
     if (begin >= end || (same && !felt && !at->start)) return;
