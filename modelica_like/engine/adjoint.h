@@ -40,13 +40,14 @@ struct Gradient {
     double lost_at;
     /* While it goes back: */
     const void *loaded; /* the copy that is in place */
-    int n_of, n_vectors, n_kept, n_doubts, n_listed, singular;
+    int n_of, n_vectors, n_kept, n_doubts, n_listed, n_marked, singular;
     double singular_at, speed; /* how fast the guard of an event comes to zero, where it matters; or 0 */
     Doubt doubts[MOST_DOUBTFUL];
     double *vectors, *behind; /* of outputs, then of doubts: derivatives by numbers of the state, and by the time */
     double *sides, *slope, *moment, *rates, *work, *sizes, *motions, *largest;
     double *points, *matrices, *stages, *node_bars; /* of a step */
     ptrdiff_t *listed;
+    unsigned char *marks; /* numbers that the last instant has felt */
 };
 
 /* Where numbers of the state lie in a copy. */

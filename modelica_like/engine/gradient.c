@@ -141,11 +141,12 @@ static double *take_room(const Instance *c, size_t n_of) {
         {&g->stages, (STAGES + 3) * n_y}, {&g->node_bars, vectors * N_NODES * n_y}};
     size_t total = 0;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) total += parts[k].size;
-    double *room = c->allocate(total + n, sizeof(double));
+    double *room = c->allocate(total + 2 * n, sizeof(double));
     double *next = room;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0] && room != NULL; next += parts[k++].size)
         *parts[k].array = next;
     g->listed = (ptrdiff_t *)(void *)next;
+    g->marks = (unsigned char *)(void *)(next + n);
     return room;
 }
 

@@ -20,9 +20,9 @@ static const double *kept_vector(const Instance *c, int k) {
     return c->gradient->behind + (size_t)k * (c->n_smooth + 1);
 }
 
-/* Sizes of numbers at an instant. Lists those by which derivatives are asked for, and those that it may read; behind
- * them those that are zero, of which many lead to other modes. They are moved so that several do not cancel each other,
- * and the event by little. */
+/* Sizes of numbers at an instant. Lists those by which derivatives are asked for, and those that it may read: first
+ * those that an instant behind has felt, last those that are zero, of which many lead to other modes. They are moved so
+ * that several do not cancel each other, and the event by little. */
 static void list_numbers(Instance *c, const Record *at) {
     Gradient *g = c->gradient;
     const Model *m = c->model;
@@ -30,20 +30,22 @@ static void list_numbers(Instance *c, const Record *at) {
     double t = fabs(((const State *)at->before)->t);
     const double *before = copied(c, at->before, c->numbers), *behind = copied(c, at->behind, c->numbers);
     g->n_listed = 0;
-    for (int zero = 0; zero < 2; zero++)
+    for (int class = 0; class < 3; class++) {
         for (ptrdiff_t k = 0; k < (ptrdiff_t)c->n_smooth; k++) {
             int state = k >= x && k < x + m->n_x, entry = k >= d && k < d + m->n_d;
             int mode = entry && k - d < m->n_modes && m->modes[k - d].n_names > 0;
             int impulse = k > ideal && k < ideal + m->n_ideals * width && (k - ideal) % width == 1;
             double size = fmax(fabs(before[k]), fabs(behind[k]));
             g->sizes[k] = state ? size + m->nominals[k - x] : size == 0 ? 1 : size;
-            if ((size == 0) != zero) continue;
+            if (class != (g->marks[k] && !at->start ? 0 : size == 0 ? 2 : 1)) continue;
             if (!g->asked[k] && (at->start || !(state || (entry && !mode && !impulse)))) continue;
             double later = at->start || g->speed == 0 ? 0 : fabs(g->moment[k] / g->speed * g->sizes[k]) / fmax(1, t);
             double random = 0.5 + 0.5 * fmod(0.6180339887498949 * g->n_listed, 1);
             g->motions[g->n_listed] = (g->n_listed % 2 ? -random : random) * NEARBY * g->sizes[k] / fmax(1, later);
             g->listed[g->n_listed++] = k;
         }
+        if (class == 0) g->n_marked = g->n_listed;
+    }
 }
 
 /* States that have been moved meet the conditions of modes as before: no derivative leads off them. */
@@ -97,10 +99,12 @@ static int pass_moved(Instance *c, const Record *at, int begin, int end, int sid
  * follow, on either side. */
 static void feel(Instance *c, const Record *at, int begin, int end, int modes_only) {
     Gradient *g = c->gradient;
+    if (begin >= end) return;
     double *sides[] = {g->sides, g->sides + c->n_smooth}, step = 2 * g->motions[begin];
     ptrdiff_t place = g->listed[begin];
-    int felt = 0, same = begin >= end || pass_moved(c, at, begin, end, 1, sides[1], &felt);
-    if (begin >= end || (same && !felt && !at->start)) return;
+    g->marks[place] = 0;
+    int felt = 0, same = pass_moved(c, at, begin, end, 1, sides[1], &felt);
+    if (same && !felt && !at->start) return;
     int both = end - begin == 1 || (at->start && (modes_only || !felt));
     if (same && both) same = pass_moved(c, at, begin, end, -1, sides[0], &felt);
     if (same && (!felt || modes_only)) return;
@@ -116,6 +120,7 @@ static void feel(Instance *c, const Record *at, int begin, int end, int modes_on
         add_doubt(c, FAILURE_LOST_AT_OTHER_MODES, g->slope);
         return;
     }
+    g->marks[place] = 1;
     for (int v = 0; v < g->n_kept; v++) {
         double *slope = &vector_of(c, v)[place];
         *slope = 0;
@@ -284,7 +289,8 @@ void event_back(Instance *c, const Record *at) {
     int tells = g->speed == 0 || isfinite(1 / g->speed);
     if (!tells) g->speed = 0;
     list_numbers(c, at);
-    if (!plain) feel(c, at, 0, g->n_listed, 0);
+    for (int k = 0; k < g->n_marked && !plain; k++) feel(c, at, k, k + 1, 0);
+    if (!plain) feel(c, at, g->n_marked, g->n_listed, 0);
     else stop_back(c, at), assign_back(c, at);
     for (int v = 0; v < g->n_kept && plain && g->speed != 0; v++) {
         double *vector = vector_of(c, v), *x = vector + (c->x - c->numbers);
