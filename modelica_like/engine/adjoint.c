@@ -9,7 +9,7 @@
 #define FELT_KINK 1e-3   /* of a slope: curvature changes it by about NEARBY_KINK */
 #define CLOSER 0.01      /* the part of that where a kink differs as much */
 #define MOST_EDGES 100   /* in a step: more are noise */
-#define MOST_ERROR 100   /* tolerances, estimated: results have about a hundredth of that */
+#define MOST_ERROR 10    /* tolerances, as estimated, beside the largest effects on an output: results have less */
 #define MOST_HALVINGS 8  /* of a step: what begins on a kink is wrong in its first part only, of 4e-3 */
 
 /* The derivative at the begin of a step of length 1 of the polynomial through values at its nodes. */

@@ -61,7 +61,7 @@ static Record *add_record(Instance *c, size_t bytes, int copies) {
     Gradient *g = c->gradient;
     g->bytes += (double)(sizeof(Record) + bytes) + copies * (double)state_size(c);
     Record *record = g->bytes > MOST_MEMORY ? NULL : c->allocate(1, sizeof *record + bytes);
-    if (record == NULL) return gradient_lose(c, FAILURE_LOST_BY_MEMORY), NULL;
+    if (record == NULL) return drop_records(c, g), gradient_lose(c, FAILURE_LOST_BY_MEMORY), NULL;
     record->previous = g->last;
     record->own = (double *)(void *)(record + 1);
     return g->last = record;
