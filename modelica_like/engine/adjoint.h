@@ -5,7 +5,7 @@
 #include "rodas.h"
 
 enum { N_NODES = LAST_POINTS }; /* of stages: the last ones have one */
-#define MOST_DOUBTFUL 8         /* of missing derivatives that are told apart */
+#define MOST_DOUBTFUL 8         /* reasons that are told apart */
 
 typedef struct Record { /* a part of a piece along which the run has moved, or an instant */
     struct Record *previous;
@@ -19,6 +19,7 @@ typedef struct Record { /* a part of a piece along which the run has moved, or a
 
 typedef struct {
     FailureCode why;
+    int n; /* of them */
     double t;
 } Doubt;
 

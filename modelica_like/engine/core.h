@@ -100,7 +100,6 @@ void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
 void replace_dependent(Instance *c);
 int pushed(Instance *c);
-int conditions(Instance *c, int *nodes);
 #define GIVEN_BACK 1e-3 /* of the largest current: none where modes return, as it ends within the time resolution */
 Result meet(Instance *c, double keep, int *any);
 Result refuse_contradiction(Instance *c);

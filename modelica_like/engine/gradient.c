@@ -22,13 +22,16 @@ void lose_back(Instance *c) {
     c->gradient->singular_at = c->state.t;
 }
 
+/* Those that follow each other for the same reason are one, as what rests at a kink for many steps; the factors keep
+ * them from cancelling each other. */
 void add_doubt(Instance *c, FailureCode why, const double *slope) {
     Gradient *g = c->gradient;
-    int k = g->n_doubts < MOST_DOUBTFUL ? g->n_doubts++ : MOST_DOUBTFUL - 1; /* behind the last, they are one */
-    double *vector = vector_of(c, g->n_of + k);
+    int same = g->n_doubts > 0 && (g->doubts[g->n_doubts - 1].why == why || g->n_doubts == MOST_DOUBTFUL);
+    Doubt *doubt = &g->doubts[same ? g->n_doubts - 1 : g->n_doubts++];
+    double *vector = vector_of(c, g->n_of + g->n_doubts - 1), factor = 1 + fmod(0.6180339887498949 * doubt->n, 1);
     g->n_vectors = g->n_of + g->n_doubts;
-    g->doubts[k] = (Doubt){why, c->state.t};
-    for (size_t n = 0; n < c->n_smooth; n++) vector[n] += slope[n];
+    *doubt = (Doubt){why, doubt->n + 1, c->state.t};
+    for (size_t n = 0; n < c->n_smooth; n++) vector[n] += factor * slope[n];
 }
 
 /* Notes which transitions fire in a round, or says it; tells whether any do. */
@@ -253,6 +256,7 @@ int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, dou
     if (room == NULL) return !fail(c, NO_MEMORY, 0);
     g->n_of = g->n_vectors = (int)n_of;
     g->n_doubts = g->singular = 0;
+    memset(g->doubts, 0, sizeof g->doubts);
     g->loaded = NULL;
     Result result = go_back(c, of);
     if (result && g->singular) result = fail_with(c, FAILURE_LOST_AT_SINGULAR, UINT32_MAX, g->singular_at, 0);

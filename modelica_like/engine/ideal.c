@@ -139,14 +139,6 @@ int pushed(Instance *c) {
     return any;
 }
 
-/* Variables that modes of ideal elements keep at zero by conditions on the states; returns how many. */
-int conditions(Instance *c, int *nodes) {
-    int count = 0;
-    for (int k = 0; k < c->model->n_ideals; k++)
-        if (moved(c, k)) nodes[count++] = zero_of(c, k);
-    return count;
-}
-
 /* Move the states so that they meet the conditions of the modes, and end impulses. What is missed by more than `keep`
  * keeps its impulse; if that is negative, it is an error. */
 Result meet(Instance *c, double keep, int *any) {

@@ -48,23 +48,6 @@ static void list_numbers(Instance *c, const Record *at) {
     }
 }
 
-/* States that have been moved meet the conditions of modes as before: no derivative leads off them. */
-static void meet_again(Instance *c, const Record *at) {
-    double *values = c->target_values, *moved = c->gradient->work, t = c->state.t;
-    int count = conditions(c, c->targets);
-    if (count == 0) return;
-    memcpy(moved, c->numbers, c->n_smooth * sizeof(double));
-    state_copy_in(c, at->before);
-    variables_now(c);
-    for (int k = 0; k < count; k++) values[k] = c->variables[c->targets[k]];
-    memcpy(c->numbers, moved, c->n_smooth * sizeof(double));
-    c->state.t = t;
-    c->state.z_valid = 0;
-    if (!solve_now(c, 1)) return;
-    move_states(c, c->targets, values, count);
-    c->state.z_valid = c->variables_valid = 0;
-}
-
 /* Passes an instant with some of the numbers moved to a side, which gives `moved`. Tells whether the same modes follow,
  * and whether there is more behind it than what was moved. */
 static int pass_moved(Instance *c, const Record *at, int begin, int end, int side, double *moved, int *felt) {
@@ -83,7 +66,6 @@ static int pass_moved(Instance *c, const Record *at, int begin, int end, int sid
     }
     c->state.t += shift;
     for (int k = 0; k < m->n_x && shift != 0; k++) c->x[k] += shift * g->rates[k];
-    if (!at->start && m->n_ideals > 0) meet_again(c, at);
     Result same = at->pass(c);
     for (int k = 0; k < m->n_x && shift != 0; k++) c->x[k] -= shift * g->rates[m->n_unknowns + k];
     memcpy(moved, c->numbers, c->n_smooth * sizeof(double));
@@ -256,7 +238,8 @@ static double find_cause(Instance *c, double *slope) {
     evaluate_now(c, tape, c->outputs);
     if (!cause->timed) rate = c->outputs[m->n_guards + cause->index];
     slope_of_output(c, tape, cause->index, c->outputs, slope);
-    for (size_t n = 0; n < c->n_smooth && largest_of((int)c->n_smooth, slope) == 0 && rate == 0; n++) slope[n] = 1;
+    int nothing = rate == 0 && largest_of((int)c->n_smooth, slope) == 0;
+    for (size_t n = 0; n < c->n_smooth && nothing; n++) slope[n] = 1; /* whatever moves, it may move the instant */
     return rate == 0 ? NAN : -rate;
 }
 
