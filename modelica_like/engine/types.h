@@ -121,7 +121,7 @@ typedef struct {
         A(positive, guards), A(active, guards), A(every, guards), A(idle, m->n_transitions),                        \
         A(ticking, m->n_transitions), A(felt, n_d)
 
-typedef struct Gradient Gradient; /* see gradient.c */
+typedef struct Gradient Gradient; /* see adjoint.h */
 
 #define FAILURE(name, sentence) FAILURE_##name,
 typedef enum {

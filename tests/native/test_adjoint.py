@@ -186,3 +186,26 @@ def test_a_gradient_on_the_way_does_not_change_the_run():
                 handle.gradient()
         runs.append(rows)
     assert np.array_equal(*runs)
+
+
+class Pushed(Component):
+    """A state that grows as a step of a control loop says."""
+
+    units_checked = False
+    x: Variable = var("1", "state")
+    a: Parameter = param("1", "factor", default=0.5)
+    p: Parameter = param("1", "push", default=1.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.a * self.p
+
+
+def test_what_steps_set():
+    """By what is set before every step the derivative is that by a shift of all these values."""
+    handle = build(Pushed(x=0.0)).native(["p"], ["x"], by=["a", "p", "x"])
+    handle.reset(until=1.0)
+    pushes = [1.0, 3.0, -2.0, 0.5]
+    for k, push in enumerate(pushes):
+        handle.inputs[0] = push
+        handle.step(0.25 * (k + 1))
+    np.testing.assert_allclose(handle.gradient(), [[0.25 * sum(pushes), 0.5, 1.0]], rtol=1e-12)
