@@ -271,10 +271,14 @@ void event_back(Instance *c, const Record *at) {
     if (g->speed != 0 && !matters(c, at, before, behind)) g->speed = 0;
     int tells = g->speed == 0 || isfinite(1 / g->speed);
     if (!tells) g->speed = 0;
-    list_numbers(c, at);
-    for (int k = 0; k < g->n_marked && !plain; k++) feel(c, at, k, k + 1, 0);
-    if (!plain) feel(c, at, g->n_marked, g->n_listed, 0);
-    else stop_back(c, at), assign_back(c, at);
+    if (plain) {
+        stop_back(c, at);
+        assign_back(c, at);
+    } else {
+        list_numbers(c, at);
+        for (int k = 0; k < g->n_marked; k++) feel(c, at, k, k + 1, 0);
+        feel(c, at, g->n_marked, g->n_listed, 0);
+    }
     for (int v = 0; v < g->n_kept && plain && g->speed != 0; v++) {
         double *vector = vector_of(c, v), *x = vector + (c->x - c->numbers);
         double later = vector[c->n_smooth] + dot(m->n_x, x, before);
