@@ -8,6 +8,7 @@ and no value of a model; models of one structure share it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from heapq import heappop, heappush
 from itertools import accumulate
 
 from modelica_like.fmi.tables import Tables
@@ -18,6 +19,11 @@ TAPES = {"rates": 0, "jacobian": 1, "alg": 2, "alg_jacobian": 3, "guards": 5, "e
 """Tapes that are compiled, with their numbers in model.h."""
 _LONGEST = 1000
 """Operations of a function: compilers take more than proportional time for long ones."""
+_FEW = 64
+"""Copies that are no loop."""
+
+_PLAIN = {"ADD": "{} + {}", "SUB": "{} - {}", "MUL": "{} * {}", "DIV": "{} / {}", "NEG": "-{}"}
+"""As in operations.h; compilers take half the time for these as for calls that they inline."""
 
 Path = tuple[str | int, ...]
 """Conditions under which an operation counts, from the outside: their slots, or marks of guards as C text."""
@@ -110,7 +116,8 @@ class _Writer:
         return "".join(f" o[{n}] = {value};" for n in self.places.get(slot, ()))
 
     def _output_slope(self, slot: int, value: str, slope: str) -> str:
-        return "".join(f" o[{n}] = {value}; g[{n}] = {slope};" for n in self.places.get(slot, ()))
+        slopes = slope != "0"  # of others they are zero before
+        return "".join(f" o[{n}] = {value};" + slopes * f" g[{n}] = {slope};" for n in self.places.get(slot, ()))
 
     def _function(
         self, name: str, arguments: str, paths: dict[int, Path], after: Callable[[int, str, str], str], *,
@@ -128,7 +135,8 @@ class _Writer:
                 body.write(slot)
             if k == len(parts) - 1 and after != self._keep:
                 body.rest(slot for slot in dict.fromkeys(self.tape.outputs) if slot not in paths)
-            texts.append(f"static void {name}_{k}(double *restrict s, {arguments}) {{\n{body.text()}}}\n")
+            apart_too = "__attribute__((noinline)) " if len(parts) > 1 else ""
+            texts.append(f"static {apart_too}void {name}_{k}(double *restrict s, {arguments}) {{\n{body.text()}}}\n")
         calls = "".join(f"    {name}_{k}(s, {called});\n" for k in range(len(parts)))
         return "".join([*texts, f"static void {name}(double *restrict s, {arguments}) {{\n{calls}}}\n"])
 
@@ -142,23 +150,30 @@ class _Writer:
         users: dict[int, list[int]] = {slot: [] for slot in paths}
         missing: dict[int, int] = {}
         ready: dict[Path, list[int]] = {}
-        for slot, path in sorted(paths.items()):
+        waiting: list[tuple[int, int, Path]] = []  # paths that are ready, the shortest first
+
+        def add(slot: int) -> None:
+            if paths[slot] not in ready:
+                heappush(waiting, (len(paths[slot]), slot, paths[slot]))
+            ready.setdefault(paths[slot], []).append(slot)
+
+        for slot in sorted(paths):
             reads = self._reads(slot, paths)
             for other in reads:
                 users[other].append(slot)
             missing[slot] = len(reads)
             if not reads:
-                ready.setdefault(path, []).append(slot)
+                add(slot)
         order: list[int] = []
-        while ready:
-            chosen = ready[min(ready, key=lambda path: (len(path), -len(ready[path])))]
-            for slot in chosen:  # grows while it is read
+        while waiting:
+            path = heappop(waiting)[-1]
+            for slot in ready[path]:  # grows while it is read
                 order.append(slot)
                 for user in users[slot]:
                     missing[user] -= 1
                     if not missing[user]:
-                        ready.setdefault(paths[user], []).append(user)
-            del ready[paths[order[-1]]]
+                        add(user)
+            del ready[path]
         return order
 
 
@@ -182,7 +197,8 @@ class _Body:
         name, left, right = self._writer.tape.operations[slot - self._writer.base]
         values = self._value(left), self._value(right)
         self._here[slot] = self._open[-1][1] if self._open else 0
-        line = f"v{slot} = value_{name}({', '.join(values)});"
+        value = _PLAIN.get(name, f"value_{name}({{}}, {{}})").format(*values)
+        line = f"v{slot} = {value};"
         slope = "0"
         if self._slopes and self._writer.moving[slot]:
             slope = f"g{slot}"
@@ -192,9 +208,22 @@ class _Body:
         self._lines.append((slot, line + self._after(slot, f"v{slot}", slope)))
 
     def rest(self, slots: Iterable[int]) -> None:
-        """Write outputs that are no operations of this function."""
+        """Write outputs that are no operations of this function; compilers are slow with many stores."""
         self._enter(())
-        self._lines += [(-1, self._after(slot, self._value(slot), self._slope(slot))) for slot in slots]
+        copies: dict[str, list[tuple[int, int]]] = {}
+        for slot in slots:
+            array, place = self._value(slot)[:-1].split("[")
+            copies.setdefault(array, []).extend((n, int(place)) for n in self._writer.places[slot])
+            if self._slopes and self._writer.moving[slot]:
+                self._lines += [(-1, f"g[{n}] = m[{slot}];") for n in self._writer.places[slot]]
+        for array, pairs in copies.items():
+            if len(pairs) <= _FEW:
+                self._lines += [(-1, f"o[{n}] = {array}[{place}];") for n, place in pairs]
+                continue
+            to, of = ("{" + ", ".join(map(str, places)) + "}" for places in zip(*pairs, strict=True))
+            self._lines.append((-1, f"static const int to_{array}[] = {to}, of_{array}[] = {of};"))
+            loop = f"for (int n = 0; n < {len(pairs)}; n++) o[to_{array}[n]] = {array}[of_{array}[n]];"
+            self._lines.append((-1, loop))
 
     def text(self) -> str:
         """Return the text; what is read outside of its block is declared before."""

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 from modelica_like.fmi.tables import Tables
 
-_MOST = 3000
-"""Entries of L and U: with more, loops take no longer than what the processor has to fetch of a text."""
+_MOST = 600
+"""Entries of L and U: these take a compiler 4 s, and more of them more than proportionally."""
 
 
 def straight_lu(tables: Tables) -> str:

@@ -81,7 +81,7 @@ def test_without_exchanges_only_where_that_is_precise(monkeypatch, cache):
     expected = simulate(drive, 0.2, solver="native")
     monkeypatch.setattr("modelica_like.native.straight_lu._MOST", 0)
     same(expected, simulate(build(STARTUP), 0.2, solver="native", compiled=True))
-    monkeypatch.setattr("modelica_like.native.straight_lu._MOST", 3000)
+    monkeypatch.setattr("modelica_like.native.straight_lu._MOST", 600)
     monkeypatch.setattr("modelica_like.native.straight_lu._Lu.factor", lambda _: iter(["return 0;"]))
     same(expected, simulate(build(STARTUP), 0.2, solver="native", compiled=True))
 
@@ -219,12 +219,12 @@ def test_sanitizers_find_nothing(name, tmp_path):
     drive = build(EXAMPLES / f"{name}.toml")
     face = interface(drive)
     texts = generate(drive, face, token="{t}") | sources.own_sources(("native",))
-    texts["code.c"] = "#define CODE_ONLY\n" + straight(make_tables(drive, face.start))
+    texts["straight.c"] = "#define CODE_ONLY\n" + straight(make_tables(drive, face.start))
     texts["main.c"] = "void *native_instance(const void *n);\n" + MAIN.replace("END", "2.0")
     texts["model_data.c"] = generate(drive, face, token="{t}")["model_data.c"]
     for file, text in texts.items():
         (tmp_path / file).write_text(text)
-    files = ["model_data.c", *sources.RUNTIME, "native.c", "batch.c", "code.c", "main.c"]
+    files = ["model_data.c", *sources.RUNTIME, "native.c", "batch.c", "straight.c", "main.c"]
     flags = ["-g", "-O1", "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined"]
     command = [shutil.which("gcc") or "clang", *flags, "-fno-sanitize-recover=undefined", "-o", "driver", *files, "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
