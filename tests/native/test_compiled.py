@@ -16,6 +16,7 @@ from modelica_like.fmi import sources
 from modelica_like.fmi.interface import interface
 from modelica_like.fmi.model_file import generate
 from modelica_like.fmi.tables import make_tables
+from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, param, var
 from modelica_like.native import code, model
 from modelica_like.native.straight import straight
 
@@ -106,6 +107,27 @@ def test_a_handle_with_inputs_that_move_and_change(cache):
         found.append((np.array(values), slope, times, after, handle.states))
     for one, other in zip(*found, strict=True):
         assert np.array_equal(one, other)
+
+
+class Blink(Component):
+    """Nothing is integrated."""
+
+    y: Variable = var("1", "light")
+    lamp = Mode("dark", "bright")
+    at: Parameter = param("s", "when", default=1 / 3)
+
+    def equations(self) -> Equations:
+        yield self.y == self.lamp.choose(dark=0, bright=1)
+
+    def events(self) -> Events:
+        yield self.lamp.go("dark", "bright", when=self.time > self.at)
+
+
+def test_without_states(cache):
+    drive = build(Blink())
+    runs = [simulate(drive, 1.0, solver="native", compiled=compiled) for compiled in (False, True)]
+    same(*runs)
+    assert [one.time for one in runs[1].events] == pytest.approx([1 / 3], abs=1e-9)
 
 
 def test_fixed_steps(cache):
