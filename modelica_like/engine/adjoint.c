@@ -63,7 +63,7 @@ static int prepare_step(Instance *c, double begin, double h) {
         for (int k = 0; k < m->n_jacobian; k++)
             g->matrices[(size_t)node * nonzeros + m->jacobian_to_step[k]] = c->jacobian[k];
     }
-    return factor_step(c, step_diagonal(h));
+    return factor_by_pattern(c, step_diagonal(h));
 }
 
 /* A vector over a step: `x` holds bars of states behind it, and becomes those of states and implicit unknowns before;
@@ -108,7 +108,7 @@ static void rates_back(Instance *c, double begin, double h, const double *rates)
     size_t n = (size_t)m->n_unknowns;
     for (int node = 0; node < N_NODES; node++) {
         double t = begin + RODAS_TIME[node] * h, *point = g->points + (size_t)node * n;
-        const Tape *ran = evaluate_special(c, &m->tapes.rates, t, point, c->rhs);
+        const Tape *ran = evaluate_on_tape(c, &m->tapes.rates, t, point, c->rhs);
         for (int v = 0; v < g->n_vectors; v++) {
             memset(c->dots, 0, (size_t)m->slot_results * sizeof(double));
             tape_adjoint(ran, c->slots, c->dots, rates + ((size_t)v * N_NODES + (size_t)node) * n);

@@ -36,7 +36,7 @@ void run_slopes(Instance *c, double *rates, double *slopes) {
     const double *known;
     const Code *code = code_of(c, tape, &known);
     if (code != NULL) code->slopes(c->slots, known, c->dots, rates, slopes);
-    else tape_tangent(run_special(c, tape, rates), c->slots, c->dots, slopes);
+    else tape_tangent(run_on_tape(c, tape, rates), c->slots, c->dots, slopes);
 }
 
 /* As `evaluate`, for values alone: slots of operations may keep other values. */

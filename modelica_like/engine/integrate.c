@@ -37,10 +37,11 @@ static void linearize(Instance *c, double t, const double *y, double *slope) {
     run_special(c, &m->tapes.jacobian, c->jacobian);
 }
 
-/* M * diagonal - J, factorised. */
-int factor_step(Instance *c, double diagonal) {
+/* M * diagonal - J, factorised; compiled code keeps its factors as it wants them. */
+int factor_step(Instance *c, double diagonal) { return factor_by_code(c, diagonal) || factor_by_pattern(c, diagonal); }
+
+int factor_by_pattern(Instance *c, double diagonal) {
     const Model *m = c->model;
-    if (factor_by_code(c, diagonal)) return 1;
     memset(c->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
     for (int k = 0; k < m->n_jacobian; k++) c->matrix[m->jacobian_to_step[k]] = -c->jacobian[k];
     for (int k = 0; k < m->n_x; k++) c->matrix[m->step_diagonal[k]] += diagonal;

@@ -191,11 +191,10 @@ static void write_special(Instance *c, Special *s, const Tape *tape) {
     }
 }
 
-/* Runs a tape with the slots as they are loaded. Of outputs that are not wanted, any value may come. Returns
- * the tape that has run. */
-const Tape *run_special(Instance *c, const Tape *tape, double *outputs) {
+/* Runs a tape with the slots as they are loaded. Of outputs that are not wanted, any value may come. Returns the tape
+ * that has run, whose results stand in the slots. */
+const Tape *run_on_tape(Instance *c, const Tape *tape, double *outputs) {
     Special *s = special_of(c, tape);
-    if (run_code(c, tape, active_guards(c), outputs)) return tape;
     if (s->belongs_to != c->decided_by) s->uses = 0;
     s->belongs_to = c->decided_by;
     int special = s->uses > WORTH_IT && !c->bounded; /* where the work is bounded: working out costs more than a step */
@@ -206,6 +205,11 @@ const Tape *run_special(Instance *c, const Tape *tape, double *outputs) {
     mark_needed(c, tape);
     write_special(c, s, tape);
     return tape;
+}
+
+/* The same for outputs alone, by compiled code where there is some. */
+void run_special(Instance *c, const Tape *tape, double *outputs) {
+    if (!run_code(c, tape, active_guards(c), outputs)) run_on_tape(c, tape, outputs);
 }
 
 /* What is left of a tape for the present modes where of every `period` outputs only the marked ones are wanted: of many
@@ -254,9 +258,14 @@ void evaluate_part(Instance *c, double t, const double *point, double *outputs) 
     run_wanted(&c->special[N_SPECIALS], c->slots, outputs);
 }
 
-const Tape *evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
+void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
     load(c, t, point);
-    return run_special(c, tape, outputs);
+    run_special(c, tape, outputs);
+}
+
+const Tape *evaluate_on_tape(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
+    load(c, t, point);
+    return run_on_tape(c, tape, outputs);
 }
 
 void ask_for(Instance *c, int node) {

@@ -6,11 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.fmi.elimination import SURE, doubts_of, lu_pattern
 from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.fmi.tape import ARGUMENTS, Slots, Tape, write_tapes
+from modelica_like.solve.initialize import Point
+from modelica_like.solve.initialize.singular import implicit_singular
 
 Pattern = dict[str, tuple[int, ...]]
 """A square matrix by columns, with orderings and patterns of a QR factorization, by their names in model.h.
@@ -67,12 +70,15 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.
         LanguageError: a function has no counterpart in C.
+        SingularAtStart: some implicit equations have no unique solution anywhere.
     """
     start = start or start_tables(model)
     functions, jacobian, start_pattern = _functions(model, start)
     states = len(model.states)
     diagonal = ca.Sparsity.triplet(*jacobian.shape, range(states), range(states))
     step = jacobian + diagonal
+    if ca.sprank(ca.DM(step)) < step.size1():  # whatever the point
+        raise implicit_singular(model, Point(0.0, *map(np.zeros, (states, len(model.implicit), model.discrete_size))))
     sizes = {name: model.equations.ode.size1_in(name) for name in ARGUMENTS[:-1]} | {
         "y": start.plan.system.function.size1_out(0)
     }

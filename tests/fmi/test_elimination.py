@@ -5,6 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from components import Gearbox
+from modelica_like import Assembly, simulate
+from modelica_like.errors import SingularAtStart
 from modelica_like.fmi.elimination import BY_MODES, BY_POINT, SURE, lu_pattern
 
 
@@ -69,3 +72,11 @@ def test_a_chain_fills_in_nothing():
     entries = [(row, column) for column in range(size) for row in range(size) if abs(row - column) <= 1]
     tables = lu_pattern(entries, [SURE] * len(entries), size)
     assert [sum(map(len, factor)) for factor in factors(tables)] == [size - 1, size - 1]
+
+
+def test_equations_that_are_singular_anywhere_are_refused():
+    """A gearbox with both shafts on its housing: its torques stand in fewer equations than there are of them."""
+    box = Gearbox(ratio=3.0, loss_table=((0.0, 0.96, 0.95, 0.0, 0.0),), c=1e5, d=200.0, b=0.002)
+    drive = Assembly("drive", parts={"box": box}, connect={"a": ["box.support", "box.flange_b", "box.flange_a"]})
+    with pytest.raises(SingularAtStart, match=r"The Jacobian is singular .*box\.flange_a\.tau"):
+        simulate(drive, 0.05, start="rest")
