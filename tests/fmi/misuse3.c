@@ -43,6 +43,13 @@ static fmi3ValueReference first_of(Kind kind) {
     return 0;
 }
 
+static fmi3ValueReference first_mode(void) {
+    for (int k = 0; k < model->n_variables; k++)
+        if (model->variables[k].kind == KIND_DISCRETE && model->variables[k].type == TYPE_ENUMERATION)
+            return model->variables[k].reference;
+    return 0;
+}
+
 static fmi3Instance made(int co_simulation, int events) {
     fmi3Instance c = co_simulation ? fmi3InstantiateCoSimulation("driver", model->token, NULL, 0, 0, events, events,
                                          NULL, 0, NULL, logger, NULL)
@@ -71,7 +78,7 @@ static fmi3Status update(fmi3Instance c) {
 }
 
 static void refuses_wrong_values(fmi3Instance c) {
-    fmi3ValueReference unknown = 4000000000u, state = first_of(KIND_STATE), mode = first_of(KIND_DISCRETE);
+    fmi3ValueReference unknown = 4000000000u, state = first_of(KIND_STATE), mode = first_mode();
     fmi3ValueReference parameter = first_of(KIND_PARAMETER), rate = first_of(KIND_DERIVATIVE);
     size_t count;
     double value = 0, nan_value = NAN, two[2];
