@@ -164,8 +164,7 @@ def simulate(
     if parameters:
         model = model.with_parameters(dict(parameters))
     given: dict[str, Any] = {"rtol": rtol, "atol": atol, "points": points, "on_chattering": on_chattering}
-    given["compiled"] = compiled
-    end, chosen = plan(model, until, t0=t0, options=options, **given)
+    end, chosen = plan(model, until, t0=t0, options=options, compiled=compiled, **given)
     chosen.check_memory(len(model.states) + len(model.implicit))
     begin = time.perf_counter()
     kind: StartKind = start or model.settings.get("start", "given")
@@ -175,10 +174,9 @@ def simulate(
     try:
         return conserving(run(chosen), run)
     except StepFailed as error:
-        solution = run.by_run_time(chosen, error) if solver is None else None
-        if solution is None:
-            raise
-        return solution
+        if solver is None and (solution := run.by_run_time(chosen, error)) is not None:
+            return solution
+        raise
 
 
 @dataclass(frozen=True)

@@ -92,16 +92,12 @@ def shaft_fatigue(
         )
     )
     tensile, limit = technological_size * material.tensile_strength, technological_size * material.yield_strength
-    bends, twists = (
-        maximum(minimum(endured - endured / (2 * tensile - endured) * equivalent, limit / share - equivalent), 0.0)
-        for endured, equivalent, share in ((bends, sqrt(3) * mean, 1.0), (twists, mean, sqrt(3)))
-    )
-    smallest = _SMOOTH * limit
-    used = sqrt((normal / maximum(bends, smallest)) ** 2 + (swing / maximum(twists, smallest)) ** 2)
+    bends = _under_mean(bends, sqrt(3) * mean, limit - sqrt(3) * mean, tensile)
+    twists = _under_mean(twists, mean, limit / sqrt(3) - mean, tensile)
+    used = sqrt((normal / maximum(bends, _SMOOTH * limit)) ** 2 + (swing / maximum(twists, _SMOOTH * limit)) ** 2)
     safety = where(minimum(bends, twists) > 0, 1 / maximum(used, _SMOOTH), 0.0)
-    return ShaftFatigue(
-        bending, normal, mean, swing, *notches, size, rough, bends, twists, safety, required_safety
-    )  # fmt: skip
+    strengths = *notches, size, rough, bends, twists
+    return ShaftFatigue(bending, normal, mean, swing, *strengths, safety, required_safety)
 
 
 def support_numbers(small: Length, large: Length, fillet: Length, yield_strength: Stress) -> tuple[Ratio, Ratio]:
@@ -123,3 +119,8 @@ def support_numbers(small: Length, large: Length, fillet: Length, yield_strength
     notched = 1.0 * (fillet > 0)
     bending, torsion = (1 + notched * sqrt(slope / radius) * exponent for slope in (2.3 * (1 + shallow), 1.15))
     return bending, torsion
+
+
+def _under_mean(endured: Stress, mean: Stress, room: Stress, tensile: Stress) -> Stress:
+    """Return the amplitude that is endured with a mean stress, which leaves so much room below the yield strength."""
+    return maximum(minimum(endured - endured / (2 * tensile - endured) * mean, room), 0.0)

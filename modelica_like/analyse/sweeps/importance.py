@@ -101,20 +101,23 @@ def importance(
     results = sweep(drive, ranges, outputs, sampling=Samples(cube), **settings)
     columns = [results[name].to_numpy() for name in outputs]
     for name, column in zip(outputs, columns, strict=True):
-        failures = [str(text) for text in results["failure"].to_numpy()]
-        bad = int(np.sum(~np.isfinite(column)))
-        if bad:
-            why = next((failure.splitlines()[0] for failure in failures if failure), "it does not happen there")
-            raise ValueOutOfRange(
-                f"{name} has no value in {bad} of {len(column)} runs: {why}",
-                advice="Narrow the ranges until all runs succeed.",
-            )
+        _check_numbers(name, column, [str(text) for text in results["failure"].to_numpy()])
     measures: dict[str, list[Any]] = {}
     for column in columns:
         for key, values in _measures(method, analyse, problem, cube, column, seed).items():
             measures.setdefault(key, []).append(values)
     arrays = {key: np.array(rows) for key, rows in measures.items()}
     return Importance(method, tuple(ranges), tuple(outputs), arrays, len(cube), results.attrs["notice"])
+
+
+def _check_numbers(name: str, column: Any, failures: Sequence[str]) -> None:
+    bad = int(np.sum(~np.isfinite(column)))
+    if bad:
+        why = next((failure.splitlines()[0] for failure in failures if failure), "it does not happen there")
+        raise ValueOutOfRange(
+            f"{name} has no value in {bad} of {len(column)} runs: {why}",
+            advice="Narrow the ranges until all runs succeed.",
+        )
 
 
 def _measures(method: Kind, analyse: Any, problem: dict[str, Any], cube: Any, column: Any, seed: int) -> dict[str, Any]:
