@@ -62,6 +62,13 @@ def test_a_row_of_a_table_that_is_reached_when_it_is_read() -> None:
     np.testing.assert_allclose(found.derivatives[:, 0], [4.9, -3.06, 1.25], rtol=1e-8)
 
 
+@pytest.mark.parametrize("other", [0.1, 0.25, 0.375, 0.4375, 0.46875, 0.484375, 0.4921875, 0.49609375])
+def test_a_kink_that_a_step_ends_at_but_for_rounding(other: float) -> None:
+    """The step there has no slope of what follows, however its end is rounded."""
+    found = sensitivities(loads(TABLE), [f"at(tab.y, {other} s)", "at(wheel.w, 0.5 s)"], "m.w_fixed")
+    np.testing.assert_allclose(found.derivatives[:, 0], [10.0 * other, 1.25], rtol=1e-8)
+
+
 @pytest.mark.parametrize(
     ("parameters", "slope"), [({"hold.start_time": 0.1}, -5.0), ({"hold.start_time": -0.05}, 0.0), ({"signal.k": 0}, 0)]
 )

@@ -72,12 +72,13 @@ class Kinks:
         return slopes(self.model, at, self._key, [number], lambda: self._function)
 
     def passed(self, before: Vector, after: Vector) -> Any:
-        """Which kinks lie between two points (or rows of points), but not at the first of them.
+        """Which kinks lie between two points (or rows of points) or at the second, but not at the first of them.
 
         An event may follow so closely that its point is at the kink but for rounding: slopes there are those behind it.
+        At a kink itself slopes may be those behind it, too: the last stage of a step must not be there.
         """
         zero = self._zero if before.ndim == 1 else self._zero[:, None]
-        return (before * after < 0.0) & (np.abs(before) > zero)
+        return (before * after <= 0.0) & (np.abs(before) > zero)
 
     def seen(self) -> Vector:
         """Times of the first results of the run behind each kink, in s."""
