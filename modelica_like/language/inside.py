@@ -149,6 +149,7 @@ class InsideAssembly(InsideComponent):
         display: units of pictures and tables.
         origin: path of its file.
         sizing: path of its sizing file.
+        optimize: what is optimised, as written in the netlist.
         places: in the netlist, by section and name.
         made: the call that created it.
     """
@@ -162,6 +163,7 @@ class InsideAssembly(InsideComponent):
     display: dict[str, str] = field(default_factory=_empty)
     origin: str = ""
     sizing: str = ""
+    optimize: dict[str, Any] = field(default_factory=_empty)
     places: dict[str, Source] = field(default_factory=_empty)
     made: Source = NOWHERE
 

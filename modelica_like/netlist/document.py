@@ -21,6 +21,7 @@ from modelica_like.errors import (
 )
 from modelica_like.language.units import parse_unit, to_si
 from modelica_like.netlist.locate import Lines, locate
+from modelica_like.netlist.optimization import OPTIMIZE
 
 _ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
@@ -47,6 +48,7 @@ class Document:
         simulate: options of a run, as written.
         display: units in which results are shown, by path, pattern or quantity.
         sizing: path of a sizing file, whose checks stand in reports.
+        optimize: what is optimised, as written.
     """
 
     lines: Lines
@@ -63,6 +65,7 @@ class Document:
     simulate: dict[str, Any] = field(default_factory=dict)
     display: dict[str, str] = field(default_factory=dict)
     sizing: str = ""
+    optimize: dict[str, Any] = field(default_factory=dict)
 
 
 def read_text(path: Path) -> str:
@@ -289,13 +292,13 @@ def check_part(key: str, value: Any) -> Any:
 
 
 def options(checks: Mapping[str, Check]) -> Reader:
-    """Return the reader of [simulate], whose entries differ in form."""
+    """Return the reader of a section whose entries differ in form, such as [simulate]."""
 
     def check(key: str, value: Any) -> Any:
-        name = key.rpartition(".")[2]
+        section, _, name = key.partition(".")
         if name not in checks:
             hint = did_you_mean(name, checks) or "."
-            raise UnknownName(f"[simulate] has no '{name}'{hint} It has {', '.join(checks)}.")
+            raise UnknownName(f"[{section}] has no '{name}'{hint} It has {', '.join(checks)}.")
         return checks[name](key, value)
 
     return each(check)
@@ -366,4 +369,5 @@ _READERS: Mapping[str, Reader] = {
     "simulate": options(_OPTIONS),
     "display": each(_unit_text, flat=True),
     "sizing": whole(as_text),
+    "optimize": options(OPTIMIZE),
 }

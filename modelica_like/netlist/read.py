@@ -119,6 +119,9 @@ class _Loader:
         record.origin, record.simulate, record.display = str(chain[-1]), document.simulate, document.display
         if document.sizing:
             record.sizing = str(chain[-1].parent / document.sizing)
+        record.optimize = document.optimize
+        for key in document.optimize:
+            Assembly.place(assembly, f"optimize.{key}", document.lines.source("optimize", key))
         task = _Task(document, assembly, chain, self)
         task.run()
         if task.errors:

@@ -66,6 +66,7 @@ class _Writer:
             "guess": self.guess,
             "simulate": inside(assembly).simulate,
             "display": inside(assembly).display,
+            "optimize": _as_written(inside(assembly).optimize),
         }
         top: dict[str, Any] = {"name": inside(assembly).name}
         if inside(assembly).description:
@@ -169,6 +170,13 @@ def plain(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return value.tolist()
     raise NetlistError(f"{value!r} cannot be written to a netlist.")
+
+
+def _as_written(value: Any) -> Any:
+    """Return the values of [optimize] as TOML has them."""
+    if isinstance(value, dict):
+        return {key: _as_written(entry) for key, entry in value.items()}
+    return [_as_written(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
 def _lines(entries: Mapping[str, Any]) -> str:

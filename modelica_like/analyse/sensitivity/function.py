@@ -30,7 +30,7 @@ _FINER = 1e-2
 """Tolerance of a run relative to that of its replay, so that both agree."""
 
 
-class _Callback(ca.Callback):
+class NamedCallback(ca.Callback):
     """A function of Python whose arguments and results have names and patterns."""
 
     def declare(self, name: str, arguments: dict[str, Any], results: dict[str, Any], **options: Any) -> None:
@@ -56,7 +56,7 @@ class _Callback(ca.Callback):
         return self._results[i][1]
 
 
-class SimulationFunction(_Callback):
+class SimulationFunction(NamedCallback):
     """y = f(p): simulates with all events; its Jacobian is that of the replay, exact through the events.
 
     Second derivatives are central differences of the exact Jacobian. The object must live as long as anything built
@@ -169,7 +169,7 @@ class SimulationFunction(_Callback):
         return self._jacobian
 
 
-class _Jacobian(_Callback):
+class _Jacobian(NamedCallback):
     """dy/dp of a simulation."""
 
     def __init__(self, simulation: SimulationFunction) -> None:
@@ -193,7 +193,7 @@ class _Jacobian(_Callback):
         return [ca.DM(np.full(self._size, np.nan) if values is None else values.derivatives)]
 
 
-class _Second(_Callback):
+class _Second(NamedCallback):
     """d²y/dp² of a simulation: CasADi's own differences have a step of 1e-8, in which a parameter of 1e4 drowns."""
 
     def __init__(self, simulation: SimulationFunction, size: tuple[int, int]) -> None:

@@ -1,0 +1,97 @@
+"""What is chosen from few: whole numbers, words, rows of a table."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from modelica_like.errors import NetlistError, Source, ValueOutOfRange
+from modelica_like.language import Component
+from modelica_like.language.inside import inside
+
+MOST = 200
+"""Combinations: each is an optimisation of its own."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One combination: what was chosen by path, as shown, and the values of the drive that it means."""
+
+    labels: Mapping[str, Any]
+    values: Mapping[str, Any]
+
+
+def combinations(drive: Component, choose: Mapping[str, Any]) -> list[Choice]:
+    """Return all combinations of choices.
+
+    Args:
+        drive: a component; tables are looked for beside its netlist.
+        choose: values by path of a parameter, or by name of a part the file of a table: a row for each kind, a column
+            for each parameter of the part, and `name`.
+
+    Raises:
+        NetlistError: a table cannot be read.
+        ValueOutOfRange: there are too many.
+    """
+    origin = inside(drive).origin if hasattr(inside(drive), "origin") else ""
+    folder = Path(origin).parent if origin else Path()
+    options = [
+        _rows(path, folder / given) if isinstance(given, str) else [Choice({path: v}, {path: v}) for v in given]
+        for path, given in choose.items()
+    ]
+    count = math.prod(map(len, options))
+    if count > MOST:
+        raise ValueOutOfRange(
+            f"There are {count} combinations of what is chosen, more than {MOST}.",
+            advice="Choose among fewer, in several steps.",
+        )
+    return [
+        Choice(
+            {path: label for choice in several for path, label in choice.labels.items()},
+            {path: value for choice in several for path, value in choice.values.items()},
+        )
+        for several in itertools.product(*options)
+    ]
+
+
+def _rows(path: str, file: Path) -> list[Choice]:
+    if not file.is_file():
+        raise NetlistError(
+            f"choose: the table '{file.name}' for {path} does not exist.",
+            advice="Its place is beside the netlist; write a list for values of one parameter.",
+        )
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as stream:
+            head, *rows = [row for row in csv.reader(stream) if any(cell.strip() for cell in row)] or [[]]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise NetlistError(f"choose: '{file.name}' cannot be read: {error}.", where=Source(str(file))) from None
+    head = [name.strip() for name in head]
+    columns = [k for k, name in enumerate(head) if name != "name"]
+    if not rows or not columns:
+        raise NetlistError(
+            f"choose: '{file.name}' has no {'row' if columns else 'column of a parameter'}.", where=Source(str(file)),
+            advice=f"Its first line names parameters of {path}, and each further line is a kind of it.",
+        )  # fmt: skip
+    return [_row(path, file, head, columns, number, row) for number, row in enumerate(rows, 2)]
+
+
+def _row(path: str, file: Path, head: Sequence[str], columns: Sequence[int], number: int, row: Sequence[str]) -> Choice:
+    if len(row) != len(head):
+        raise NetlistError(
+            f"choose: a line of '{file.name}' has {len(row)} cells, its first line {len(head)}.",
+            where=Source(str(file), number, ",".join(row)),
+        )
+    label = row[head.index("name")].strip() if "name" in head else f"row {number - 1}"
+    return Choice({path: label}, {f"{path}.{head[k]}": _cell(row[k].strip()) for k in columns})
+
+
+def _cell(text: str) -> Any:
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,275 @@
+"""The design that is best: least or largest outputs of a run, within bounds and limits, by exact gradients."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from modelica_like.analyse.optimize.choices import Choice, combinations
+from modelica_like.analyse.optimize.problem import Problem, Question, make_problem
+from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optimum
+from modelica_like.analyse.optimize.runs import Runs
+from modelica_like.analyse.optimize.solve import FEASIBLE, Outcome, Search
+from modelica_like.analyse.optimize.terms import Row
+from modelica_like.arguments import checked
+from modelica_like.compile.buffers import Vector
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import LanguageError, ModelicaLikeError, ValueOutOfRange
+from modelica_like.language import Assembly, Component
+from modelica_like.language.inside import inside
+from modelica_like.simulation import Model, loaded, simulate
+from modelica_like.solve.initialize import StartKind
+
+_POINTS = 20
+_DIFFERENCE = 1e-3
+"""Of an output of the design in a run by IDAS, relative: more is told."""
+
+
+@checked
+def optimize(
+    drive: Model, *, minimize: str | Sequence[str] = (), maximize: str | Sequence[str] = (),
+    free: Mapping[str, Any] | None = None, subject_to: str | Sequence[str] = (),
+    choose: Mapping[str, Any] | None = None, cases: Sequence[Mapping[str, Any]] = (),
+    until: float | str | None = None, parameters: Mapping[str, Any] | None = None, start: StartKind | None = None,
+    starts: int | None = None, points: int | None = None, seed: int = 0,
+) -> Optimum | Front:  # fmt: skip
+    """Find the best design of a drive.
+
+    What is not given is taken from the section [optimize] of the netlist, where `cases` is called `for`.
+
+    Args:
+        drive: a component, a netlist file or a compiled model.
+        minimize: an output of a run that is to be small, named as for `sensitivities`; of two, the Pareto front.
+        maximize: an output that is to be large.
+        free: lower and upper bound by path, numbers in SI units or quantities; of a table with two columns
+            `{"points": 12, "from": "0 N", "to": "9 kN", "rising": True}` (or `falling`) for its values.
+        subject_to: limits of outputs, `clutch.lock_time <= 0.4 s`, with <=, >= or ==.
+        choose: values by path, `{"clutch.plates": [2, 4, 6]}`, or for a part a CSV table beside the netlist with a
+            row for each kind, a column for each parameter, and `name`. All combinations are tried.
+        cases: load cases, tables of other parameter values with a `name`: limits hold in each, and the worst counts.
+        until: end time, as in `simulate`.
+        parameters: other values of parameters, in all cases.
+        start: kind of start, as in `simulate`.
+        starts: number of starts of the search, all but the first from a Latin hypercube between the bounds.
+        points: number of designs on a Pareto front; 20 by default.
+        seed: of the Latin hypercube.
+
+    Raises:
+        UnknownName, UnitError, ValueOutOfRange: something does not fit the drive; netlists tell file and line.
+        NoGradient: the drive as it is has no derivative.
+        ModelicaLikeError: the drive cannot be run as it is.
+    """
+    drive = loaded(drive)
+    written = inside(drive).optimize if isinstance(drive, Assembly) else {}
+    asked = {"minimize": _listed(minimize), "maximize": _listed(maximize)}
+    aims = asked if any(asked.values()) else {key: tuple(written.get(key, ())) for key in asked}
+    question = Question(
+        **aims, free=free if free is not None else written.get("free"),
+        subject_to=_listed(subject_to) or tuple(written.get("subject_to", ())),
+        cases=tuple(cases) or tuple(written.get("for", ())), parameters=parameters, until=until, start=start,
+    )  # fmt: skip
+    if len(question.minimize) + len(question.maximize) > 2:
+        raise ValueOutOfRange(
+            "There may be one objective, or two for a front.", advice="Limit the others by subject_to."
+        )
+    choices = choose if choose is not None else written.get("choose", {})
+    number = starts or written.get("starts", 1)
+    if not choices:
+        return _Study(drive, question, seed).best(number, points or written.get("points", _POINTS))
+    if not isinstance(drive, Component):
+        raise LanguageError("A compiled model has nothing to choose.", advice="Give the netlist or the component itself.")
+    with _placed(drive, "choose"):
+        options = combinations(drive, choices)
+    return _best_choice(drive, question, options, number, seed)
+
+
+def _listed(texts: str | Sequence[str]) -> tuple[str, ...]:
+    return (texts,) if isinstance(texts, str) else tuple(texts)
+
+
+@contextmanager
+def _placed(drive: Component | CompiledDae, key: str) -> Iterator[None]:
+    """Add the place in [optimize] to an error without one."""
+    try:
+        yield
+    except ModelicaLikeError as error:
+        source = drive.source_of(f"optimize.{key}") if isinstance(drive, Assembly) else None
+        error.where = error.where or ((source,) if source is not None and source.file else ())
+        raise
+
+
+class _Study:
+    """One optimisation of one drive."""
+
+    def __init__(self, drive: Component | CompiledDae, question: Question, seed: int) -> None:
+        self.drive, self.seed = drive, seed
+        self.problem = make_problem(drive, question, lambda key: _placed(drive, key))
+        self.runs = Runs(self.problem)
+
+    def best(self, starts: int, points: int) -> Optimum | Front:
+        """Return the optimum, or with two objectives their front."""
+        if len(self.problem.aims) == 1:
+            search = Search(self.problem, self.runs)
+            return self.optimum(search, self._search(search, starts))
+        return self._front(starts, points)
+
+    def _search(self, search: Search, starts: int) -> Outcome:
+        begins = [self.problem.begin]
+        if starts > 1:
+            from modelica_like.analyse.sweeps.plan import LatinHypercube
+
+            cube = LatinHypercube(starts - 1, self.seed).unit_cube(len(self.problem.free))
+            begins += [self.problem.low + self.problem.span * q for q in cube]
+        usable = [x for x in begins if self.runs.at(x) is not None]
+        return _better([search.from_design(x) for x in usable])
+
+    def _front(self, starts: int, points: int) -> Front:
+        if points < 2:
+            raise ValueOutOfRange(f"A front needs at least 2 points, not {points}.")
+        searches = [Search(self.problem, self.runs, aim) for aim in (0, 1)]
+        ends = [self._search(search, starts) for search in searches]
+        designs = [self.runs.at(end.x) for end in ends]
+        second = self.problem.aims[1]
+        places, signs, _ = searches[1].aim
+        values = [(signs * design.values[:, places]).max() for design in designs if design is not None]
+        found = [self.optimum(searches[0], ends[0])]
+        x = ends[0].x
+        for most in np.linspace(*values, points)[1:-1] if len(values) == 2 else ():
+            rows = tuple(Row(row.output, row.sign, float(most)) for row in second.rows())
+            search = Search(self.problem, self.runs, 0, rows)
+            outcome = search.from_design(x)
+            if outcome.excess <= FEASIBLE:
+                x = outcome.x
+                found.append(self.optimum(search, outcome))
+        found.append(self.optimum(searches[1], ends[1]))
+        return Front(_undominated(found), self.runs.count)
+
+    def optimum(self, search: Search, outcome: Outcome) -> Optimum:
+        """Return a result with its names, checked by IDAS."""
+        problem, x = self.problem, outcome.x
+        values = dict(zip((parameter.name for parameter in problem.free), map(float, x), strict=True))
+        before = self.runs.at(problem.begin)
+        after, notes = self._checked(values, self.runs.at(x))
+        first = before.values if before is not None else np.full(after.shape, np.nan)
+        history = [(design.x, design.values) for design in self.runs.designs]
+        return Optimum(
+            problem.model.with_parameters(dict(values)),
+            tuple(
+                Chosen(p.name, p.unit, p.low, p.high, p.value, value)
+                for p, value in zip(problem.free, values.values(), strict=True)
+            ),
+            {}, self._objectives(first, after), self._limits(search, outcome, first, after),
+            outcome.excess <= FEASIBLE, outcome.optimal, self.runs.count,
+            np.array([search.measures(numbers) for _, numbers in history]),
+            notes=(*notes, *self._remarks(outcome)), drive=self.drive if isinstance(self.drive, Component) else None,
+        )  # fmt: skip
+
+    def _checked(self, values: Mapping[str, float], design: Any) -> tuple[Vector, list[str]]:
+        """Return the outputs of a design in runs of their own, by IDAS, and what differs."""
+        problem, question = self.problem, self.problem.question
+        rows: list[list[float]] = []
+        for case in problem.cases:
+            given = {**case.values, **values}
+            run = simulate(problem.model, question.until, parameters=given, start=question.start, solver="idas")
+            rows.append([float(value) for value in run.read(*problem.outputs)])
+        after = np.array(rows)
+        if design is None:
+            return after, []
+        apart = np.abs(after - design.values) > _DIFFERENCE * (np.abs(after) + np.abs(design.values))
+        return after, [
+            f"IDAS has {problem.outputs[k]} = {after[c, k]:.6g} for this design, the search {design.values[c, k]:.6g}."
+            for c, k in np.argwhere(apart)
+        ]
+
+    def _objectives(self, first: Vector, after: Vector) -> tuple[Measured, ...]:
+        problem, measured = self.problem, list[Measured]()
+        for aim in problem.aims:
+            k = problem.outputs.index(aim.text)
+            order = np.argsort(-aim.sign * after[:, k], kind="stable")
+            measured += [
+                Measured(aim.text, aim.text, aim.output.unit, problem.cases[c].name, first[c, k], after[c, k])
+                for c in order
+            ]
+        return tuple(measured)
+
+    def _limits(self, search: Search, outcome: Outcome, first: Vector, after: Vector) -> tuple[Measured, ...]:
+        problem, measured, row = self.problem, list[Measured](), 0
+        for limit in problem.limits:
+            count, k = len(limit.rows()), problem.outputs.index(limit.name)
+            for c, case in enumerate(problem.cases):
+                price = float(outcome.prices[c, row : row + count].sum()) if outcome.optimal else 0.0
+                size = search.sizes[k]
+                weight = abs(price) * size / search.aim_size
+                broken = limit.excess(after[c, k]) > 10 * FEASIBLE * size
+                measured.append(
+                    Measured(
+                        limit.text, limit.name, limit.output.unit, case.name, first[c, k], after[c, k], limit.value,
+                        bool(broken), price if weight > 1e-4 else 0.0,
+                    )
+                )  # fmt: skip
+            row += count
+        return tuple(measured)
+
+    def _remarks(self, outcome: Outcome) -> Iterator[str]:
+        if outcome.excess > FEASIBLE:
+            yield "The limits cannot all be met: this design exceeds them least, relative to their sizes."
+        elif not outcome.optimal:
+            yield f"The search stopped before an optimum was certain ({outcome.status}); this is the best design tried."
+        refused = len(self.runs.refusals)
+        if refused:
+            reason = self.runs.refusals[0][1].what
+            yield f"{refused} designs were left out, the first because: {reason}"
+
+
+def _better(outcomes: Sequence[Outcome]) -> Outcome:
+    return min(outcomes, key=lambda outcome: (max(outcome.excess, FEASIBLE), outcome.objective))
+
+
+def _undominated(points: Sequence[Optimum]) -> tuple[Optimum, ...]:
+    """Return the designs of which no other is as good in one objective and better in the other one."""
+    kept: list[Optimum] = []
+    for point in points:
+        if not any(np.allclose([*point.values.values()], [*other.values.values()], rtol=1e-9) for other in kept):
+            kept.append(point)
+    return tuple(kept)
+
+
+def _best_choice(
+    drive: Component, question: Question, options: Sequence[Choice], starts: int, seed: int
+) -> Optimum:  # fmt: skip
+    results: list[tuple[Choice, Optimum]] = []
+    failures: list[tuple[Choice, ModelicaLikeError]] = []
+    for choice in options:
+        variant = copy.deepcopy(drive)
+        with _placed(drive, "choose"):
+            for path, value in choice.values.items():
+                variant.set(path, value)
+        try:
+            study = _Study(variant, question, seed)
+            result = study.best(starts, _POINTS)
+        except ModelicaLikeError as error:
+            failures.append((choice, error))
+            continue
+        if isinstance(result, Front):
+            raise ValueOutOfRange("A choice needs one objective.", advice="Limit the other one by subject_to.")
+        results.append((choice, result))
+    if not results:
+        raise failures[0][1]
+    sign = 1.0 if question.minimize else -1.0
+    best = min(results, key=lambda pair: (not pair[1].feasible, sign * pair[1].objectives[0].value))
+    tried = [(c.labels, r.objectives[0].value if r.feasible else np.nan) for c, r in results]
+    tried += [(choice.labels, np.nan) for choice, _ in failures]
+    notes = [f"{_label(choice)} was left out: {error.what}" for choice, error in failures]
+    return replace(
+        best[1], chosen=best[0].labels, runs=sum(result.runs for _, result in results),
+        combinations=tuple(tried), notes=(*best[1].notes, *notes),
+    )  # fmt: skip
+
+
+def _label(choice: Choice) -> str:
+    return ", ".join(f"{path} = {label}" for path, label in choice.labels.items())

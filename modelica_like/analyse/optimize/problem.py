@@ -1,0 +1,187 @@
+"""An optimisation as one problem: the drive built so that what is free can change, its rows, and its load cases."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from modelica_like.analyse.optimize.terms import Aim, Case, Free, Limit, Row, read_aims, read_cases, read_free, read_limits
+from modelica_like.compile.buffers import Vector
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.language import Component
+from modelica_like.language.inside import declarations
+from modelica_like.language.units import parse_unit, to_si
+from modelica_like.simulation import Model, build, loaded
+
+_PROFILE = {"points", "from", "to", "rising", "falling"}
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked, as written.
+
+    Attributes:
+        minimize: outputs that are to be small.
+        maximize: outputs that are to be large.
+        free: bounds by parameter, or `points`, `from`, `to`, `rising`, `falling` of a table.
+        subject_to: limits.
+        cases: load cases, tables of parameter values with a `name`.
+        parameters: other values of parameters, in all cases.
+        until: end time.
+        start: kind of start.
+    """
+
+    minimize: tuple[str, ...] = ()
+    maximize: tuple[str, ...] = ()
+    free: Mapping[str, Any] | None = None
+    subject_to: tuple[str, ...] = ()
+    cases: tuple[Mapping[str, Any], ...] = ()
+    parameters: Mapping[str, Any] | None = None
+    until: float | str | None = None
+    start: Any = None
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A question about a compiled model.
+
+    Attributes:
+        model: with the values of `parameters`.
+        free: what may change.
+        aims: objectives.
+        limits: of outputs.
+        cases: load cases; all limits hold in each, and the worst counts.
+        ordered: pairs (k, l) of what is free: value k is at most value l.
+        outputs: names of all numbers that are read off a run.
+    """
+
+    question: Question
+    model: CompiledDae
+    free: tuple[Free, ...]
+    aims: tuple[Aim, ...]
+    limits: tuple[Limit, ...]
+    cases: tuple[Case, ...]
+    ordered: tuple[tuple[int, int], ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def low(self) -> Vector:
+        """Lower bounds, shape (free,)."""
+        return np.array([parameter.low for parameter in self.free])
+
+    @property
+    def span(self) -> Vector:
+        """Distances of the bounds, shape (free,)."""
+        return np.array([parameter.high - parameter.low for parameter in self.free])
+
+    @property
+    def begin(self) -> Vector:
+        """Values of the drive, shape (free,)."""
+        return np.array([parameter.value for parameter in self.free])
+
+    def numbers(self, rows: Sequence[Row]) -> tuple[Vector, Vector, Vector]:
+        """Return positions of the outputs of rows, their signs and limits."""
+        places = np.array([self.outputs.index(row.output) for row in rows], int)
+        return places, np.array([row.sign for row in rows]), np.array([row.most for row in rows])
+
+
+def make_problem(
+    drive: Model, question: Question, placed: Callable[[str], AbstractContextManager[None]] = lambda key: nullcontext()
+) -> Problem:
+    """Build a drive for a question.
+
+    Args:
+        drive: the drive.
+        question: what is asked.
+        placed: gives errors their place by the key of [optimize].
+
+    Raises:
+        UnknownName, ValueOutOfRange, UnitError: something in the question does not fit the drive.
+        LanguageError: a table of a compiled model is to be free.
+        ModelicaLikeError: the drive has an error.
+    """
+    profiles = {path: given for path, given in (question.free or {}).items() if isinstance(given, Mapping)}
+    plain = {path: given for path, given in (question.free or {}).items() if path not in profiles}
+    with placed("free"):
+        drive, cells, ordered = _with_profiles(loaded(drive), profiles)
+        model = build(drive, free=plain, tables=[path.replace("[", "[[]") for path in profiles])
+        model = model.with_parameters(dict(question.parameters or {}))
+        free = read_free(model, plain | cells)
+    with placed("minimize" if question.minimize else "maximize"):
+        aims = read_aims(model, question.minimize, question.maximize)
+    with placed("subject_to"):
+        limits = read_limits(model, question.subject_to)
+    with placed("for"):
+        cases = read_cases(model, question.cases, free)
+    names = [parameter.name for parameter in free]
+    rows = [row for term in (*aims, *limits) for row in term.rows()]
+    asked = [*(aim.text for aim in aims), *(limit.name for limit in limits)]
+    outputs = tuple(dict.fromkeys([*(row.output for row in rows), *asked]))
+    order = tuple((names.index(low), names.index(high)) for low, high in ordered)
+    return Problem(question, model, free, aims, limits, cases, order, outputs)
+
+
+def _with_profiles(
+    drive: Component | CompiledDae, profiles: Mapping[str, Mapping[str, Any]]
+) -> tuple[Component | CompiledDae, dict[str, Any], list[tuple[str, str]]]:
+    """Return a drive with the tables as they are to be, bounds by path of their cells, and which follow each other."""
+    cells: dict[str, Any] = {}
+    ordered: list[tuple[str, str]] = []
+    if not profiles:
+        return drive, cells, ordered
+    if not isinstance(drive, Component):
+        raise LanguageError(
+            "Tables of a compiled model cannot be free.", advice="Give the netlist or the component itself."
+        )
+    drive = copy.deepcopy(drive)
+    for path, given in profiles.items():
+        bounds, order = _profile(drive, path, given)
+        cells |= bounds
+        ordered += order
+    return drive, cells, ordered
+
+
+def _profile(drive: Component, path: str, given: Mapping[str, Any]) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    """Make the values of a table free; return bounds by path of the cells, and which follow each other.
+
+    The first column stays as it is, or is divided evenly for `points`.
+    """
+    owner, name = _table(drive, path)
+    unknown = given.keys() - _PROFILE
+    if unknown or "from" not in given or "to" not in given:
+        what = f"has no '{sorted(unknown)[0]}'" if unknown else "needs `from` and `to`"
+        raise ValueOutOfRange(
+            f"free: {path} {what}.", advice='Write { points = 12, from = "0 N", to = "9 kN", rising = true }.'
+        )
+    rows, columns = np.array(getattr(owner, name), float), declarations(owner).tables[name].columns
+    if rows.ndim != 2 or rows.shape[1] != 2:
+        raise ValueOutOfRange(f"free: {path} must be a table of two columns.", advice="Free single parameters instead.")
+    if "points" in given:
+        points = given["points"]
+        if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= 100:
+            raise ValueOutOfRange(f"free: {path}: points = {points!r} must be a whole number from 2 to 100.")
+        at = np.linspace(rows[0, 0], rows[-1, 0], points)
+        rows = np.column_stack([at, np.interp(at, rows[:, 0], rows[:, 1])])
+        drive.set(path, rows.tolist())
+    column = columns[min(1, len(columns) - 1)]
+    unit = parse_unit("1" if column.scale else column.unit)
+    bounds = tuple(to_si(given[key], unit, f"free: {path}") for key in ("from", "to"))
+    cells = [f"{path}[{row},2]" for row in range(1, len(rows) + 1)]
+    pairs = list(zip(cells, cells[1:], strict=False))
+    order = pairs if given.get("rising") else [(b, a) for a, b in pairs] if given.get("falling") else []
+    return dict.fromkeys(cells, bounds), order
+
+
+def _table(drive: Component, path: str) -> tuple[Component, str]:
+    tables = {
+        f"{part.path}.{name}".lstrip("."): (part, name) for part in drive.walk() for name in declarations(part).tables
+    }
+    if path not in tables:
+        raise UnknownName(f"{drive.label} has no table '{path}'{did_you_mean(path, tables) or '.'}")
+    return tables[path]

@@ -1,0 +1,212 @@
+"""Results of optimisations: the design, what limits it, and what a limit costs."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modelica_like.compile.buffers import Vector
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import LanguageError, UnknownName, did_you_mean
+from modelica_like.language import Assembly, Component
+from modelica_like.language.units import Unit
+from modelica_like.upper import Shown
+
+_AT_BOUND = 1e-6
+"""Distance from a bound, relative to that of both: at it."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A free parameter with its bounds, its value before and the best one, in SI units."""
+
+    name: str
+    unit: Unit
+    low: float
+    high: float
+    before: float
+    value: float
+
+    @property
+    def at_bound(self) -> str:
+        """Which bound it stopped at: `lower`, `upper` or nothing."""
+        near = _AT_BOUND * (self.high - self.low)
+        return "lower" if self.value - self.low <= near else "upper" if self.high - self.value <= near else ""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """An objective or a limited output in a load case, in SI units.
+
+    Attributes:
+        text: as written.
+        name: of the output.
+        unit: its unit.
+        case: load case.
+        before: value of the drive as it was.
+        value: of the best design.
+        limit: nan of an objective.
+        broken: whether the limit is exceeded.
+        price: derivative of the objective by the limit; 0 where it does not matter.
+    """
+
+    text: str
+    name: str
+    unit: Unit
+    case: str
+    before: float
+    value: float
+    limit: float = np.nan
+    broken: bool = False
+    price: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum(Shown):
+    """The best design.
+
+    Attributes:
+        model: compiled, with the best values.
+        parameters: what is free.
+        chosen: what was chosen, by path.
+        objectives: in each load case.
+        limits: in each load case.
+        feasible: whether all limits hold; if not, the design breaks them least.
+        optimal: whether the conditions of an optimum hold there.
+        runs: number of simulations.
+        history: objective and largest relative excess of a limit of all designs tried, shape (designs, 2).
+        combinations: objective of each combination of choices; nan where limits cannot be met.
+        notes: sentences about the search.
+    """
+
+    model: CompiledDae
+    parameters: tuple[Chosen, ...]
+    chosen: Mapping[str, Any]
+    objectives: tuple[Measured, ...]
+    limits: tuple[Measured, ...]
+    feasible: bool
+    optimal: bool
+    runs: int
+    history: Vector = field(repr=False)
+    combinations: tuple[tuple[Mapping[str, Any], float], ...] = field(default=(), repr=False)
+    notes: tuple[str, ...] = ()
+    drive: Component | None = field(default=None, repr=False)
+
+    def __getitem__(self, name: str) -> float:
+        """Return a value of the best design: a free parameter, or the worst of an objective or limited output.
+
+        Raises:
+            UnknownName: it is none of these.
+        """
+        values = {parameter.name: parameter.value for parameter in self.parameters}
+        for measured in reversed((*self.objectives, *self.limits)):
+            values.setdefault(measured.name, measured.value)
+        if name not in values:
+            raise UnknownName(f"The optimum has no '{name}'{did_you_mean(name, values) or '.'}")
+        return values[name]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Best values in SI units by path, as `parameters` of a run."""
+        return {parameter.name: parameter.value for parameter in self.parameters}
+
+    def save(self, path: str | Path) -> None:
+        """Write the drive with the best values as a netlist.
+
+        Raises:
+            LanguageError: the drive is no netlist.
+        """
+        from modelica_like.netlist import save
+
+        if not isinstance(self.drive, Assembly):
+            raise LanguageError(
+                "Only a drive of a netlist can be saved as one.", advice="The values are in `values`, the model in `model`."
+            )
+        drive = copy.deepcopy(self.drive)
+        tables: dict[str, Any] = {}
+        for parameter in self.parameters:
+            table, bracket, place = parameter.name.rpartition("[")
+            if bracket and "," in place:
+                rows = tables.setdefault(table, [list(row) for row in _table(drive, table)])
+                row, column = map(int, place.rstrip("]").split(","))
+                rows[row - 1][column - 1] = parameter.value
+            else:
+                drive.set(parameter.name, parameter.value)
+        for table, rows in tables.items():
+            drive.set(table, rows)
+        save(drive, path)
+
+    def sentences(self) -> list[str]:
+        """Return what holds the design back, what that costs, and notes."""
+        told: list[str] = []
+        objective = self.objectives[0]
+        for limit in self.limits:
+            if limit.price and not limit.broken:
+                where = f" in the load case '{limit.case}'" if limit.case else ""
+                change, unit = abs(limit.price), str(objective.unit)
+                of = str(limit.unit)
+                told.append(
+                    f"'{limit.text}' is active{where}: 1 {of} more changes {objective.name} by "
+                    f"{limit.price:+.4g} {unit}." if change else ""
+                )
+        for parameter in self.parameters:
+            if parameter.at_bound:
+                told.append(f"{parameter.name} is at its {parameter.at_bound} bound.")
+        return [*told, *self.notes]
+
+    def __str__(self) -> str:
+        width = max(len(row.name) for row in (*self.parameters, *self.objectives, *self.limits))
+        lines = [f"{self.model.name}: {self.runs} runs"]
+        lines += [f"  {path:{width}}  {label}" for path, label in self.chosen.items()]
+        for parameter in self.parameters:
+            lines.append(f"  {parameter.name:{width}}  {parameter.before:12.6g} → {parameter.value:12.6g} {parameter.unit}")
+        for row in (*self.objectives, *self.limits):
+            limit = "" if np.isnan(row.limit) else f"  ({row.text})"
+            case = f"  [{row.case}]" if row.case else ""
+            lines.append(f"  {row.name:{width}}  {row.before:12.6g} → {row.value:12.6g} {row.unit}{limit}{case}")
+        return "\n".join([*lines, *self.sentences()])
+
+
+@dataclass(frozen=True, eq=False)
+class Front(Shown):
+    """Designs of which none is better in both objectives.
+
+    Attributes:
+        points: from the best in the first objective to the best in the second one.
+        runs: number of simulations of all.
+        notes: sentences about the search.
+    """
+
+    points: tuple[Optimum, ...]
+    runs: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the objectives."""
+        return tuple(dict.fromkeys(row.name for row in self.points[0].objectives))
+
+    @property
+    def values(self) -> Vector:
+        """Objectives, the worst of all load cases, in SI units, shape (points, 2)."""
+        return np.array([[point[name] for name in self.names] for point in self.points])
+
+    def __str__(self) -> str:
+        free = [parameter.name for parameter in self.points[0].parameters]
+        head = "  ".join(f"{name:>16}" for name in (*self.names, *free))
+        rows = [
+            "  ".join(f"{value:16.6g}" for value in (*values, *point.values.values()))
+            for values, point in zip(self.values, self.points, strict=True)
+        ]
+        return "\n".join([f"Front of {len(rows)} designs, {self.runs} runs", head, *rows, *self.notes])
+
+
+def _table(drive: Component, path: str) -> Any:
+    owner, _, name = path.rpartition(".")
+    parts = {part.path: part for part in drive.walk()}
+    return getattr(parts[owner], name)

@@ -1,0 +1,246 @@
+"""Finds the best design of a problem by IPOPT (A. Waechter, L. T. Biegler, 2006) with exact gradients.
+
+What is free is scaled by its bounds, outputs by their sizes at the beginning. The largest of several numbers (load
+cases, both signs of a peak) has no derivative where another one overtakes: a bound of all is minimised instead. A run
+that is refused, or has no derivative, is not a number for IPOPT, which then takes a shorter step. Where it stops
+without an optimum, because a peak over time jumps from one instant to another, COBYQA (T. M. Ragonneau, 2022) goes on
+from the best design so far, without derivatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.analyse.optimize.problem import Problem
+from modelica_like.analyse.optimize.runs import Runs
+from modelica_like.analyse.optimize.terms import Row
+from modelica_like.analyse.sensitivity.function import NamedCallback
+from modelica_like.compile.buffers import Vector
+from modelica_like.errors import extra_module
+
+FEASIBLE = 1e-6
+"""Excess of a limit, relative to the size of its output, that counts as none: ten times the precision of gradients."""
+_OPTIONS = {
+    "print_level": 0, "sb": "yes", "hessian_approximation": "limited-memory", "mu_init": 1e-3, "max_iter": 80,
+    # Relative to sizes: gradients are known to 1e-7.
+    "tol": 1e-7, "acceptable_tol": 1e-6, "acceptable_iter": 4,
+    # Bounds are those of parameters, which may not be left.
+    "bound_relax_factor": 0.0,
+}  # fmt: skip
+_SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+_FIRST, _LAST = 1e-2, 1e-7
+"""Radii of COBYQA's trust region, relative to the bounds."""
+_TRIALS = 40
+"""Its runs per free parameter."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Where a search ended.
+
+    Attributes:
+        x: values of what is free, in SI units.
+        objective: the worst of all load cases, times its sign and over its size.
+        excess: the largest excess of a limit over its size.
+        prices: how much the objective changes by a limit's value, in SI units of both; shape (cases, limit rows).
+        optimal: whether the conditions of an optimum hold.
+        status: of the solver.
+    """
+
+    x: Vector
+    objective: float
+    excess: float
+    prices: Vector
+    optimal: bool
+    status: str
+
+
+class Search:
+    """The search for one objective, from one design.
+
+    Args:
+        problem: the problem.
+        runs: of its load cases.
+        aim: position of the objective.
+        more: further limits, those of a point on a Pareto front.
+    """
+
+    def __init__(self, problem: Problem, runs: Runs, aim: int = 0, more: tuple[Row, ...] = ()) -> None:
+        self.problem, self.runs = problem, runs
+        self.aim_rows = problem.aims[aim].rows()
+        self.rows = (*(row for limit in problem.limits for row in limit.rows()), *more)
+        self.aim, self.limits = problem.numbers(self.aim_rows), problem.numbers(self.rows)
+        begin = runs.at(problem.begin)
+        values = np.abs(begin.values).max(axis=0) if begin is not None else np.zeros(len(problem.outputs))
+        sizes = np.where(values > 0, values, 1.0)
+        places, _, most = self.limits
+        np.maximum.at(sizes, places, np.abs(most))
+        self.sizes = sizes
+        self.aim_size = float(sizes[self.aim[0]].max())
+
+    def measures(self, values: Vector) -> tuple[float, float]:
+        """Return the objective and the largest excess of values, shape (cases, outputs), both over their sizes."""
+        places, signs, _ = self.aim
+        objective = (signs * values[:, places]).max() / self.aim_size
+        return float(objective), float(max(0.0, self._excess(values).max(initial=0.0)))
+
+    def _excess(self, values: Vector) -> Vector:
+        places, signs, most = self.limits
+        return (signs * values[:, places] - most) / self.sizes[places]
+
+    def from_design(self, x: Vector) -> Outcome:
+        """Search from a design."""
+        outcome = self._ipopt(x, elastic=False)
+        if outcome.optimal and outcome.excess <= FEASIBLE:
+            return outcome
+        if outcome.excess > FEASIBLE:
+            least = self._ipopt(outcome.x, elastic=True)
+            if least.excess > FEASIBLE:
+                return least
+            outcome = self._ipopt(least.x, elastic=False)
+        return outcome if outcome.optimal else self._polished(outcome)
+
+    def _ipopt(self, x: Vector, *, elastic: bool) -> Outcome:
+        problem, callback = self.problem, _Values(self)
+        n, cases = len(x), len(problem.cases)
+        q, bound = ca.MX.sym("q", n), ca.MX.sym("bound")
+        y = ca.reshape(callback(q), len(problem.outputs), cases)
+        places, signs, most = self.limits
+        excess = ca.vec(signs * y[places.tolist(), :] - most / self.sizes[places]) if places.size else ca.MX(0, 1)
+        aims = ca.vec(self.aim[1] * self.sizes[self.aim[0]] / self.aim_size * y[self.aim[0].tolist(), :])
+        bounded = elastic or aims.numel() > 1
+        if elastic:
+            objective, excess = bound, excess - bound
+        else:
+            objective = bound if bounded else aims
+        above = aims - bound if bounded and not elastic else ca.MX(0, 1)
+        apart = [(q[low] * s - q[high] * t + shift) for low, high, s, t, shift in self._order()]
+        g = ca.vertcat(excess, above, *apart)
+        unknowns = ca.vertcat(q, bound) if bounded else q
+        begin = (x - problem.low) / problem.span
+        first = self.measures(self._values(x))[1 if elastic else 0]
+        nlp = {"x": unknowns, "f": objective, "g": g}
+        solver = ca.nlpsol("design", "ipopt", nlp, {"ipopt": _OPTIONS, "print_time": False})
+        free_bound = [-np.inf if not elastic else 0.0] if bounded else []
+        solved = solver(
+            x0=[*begin, *([first] if bounded else [])], lbx=[0.0] * n + free_bound,
+            ubx=[1.0] * n + [np.inf] * bounded, lbg=-np.inf, ubg=0.0,
+        )  # fmt: skip
+        prices = np.array(solved["lam_g"]).ravel()[: excess.numel()]
+        status = str(solver.stats()["return_status"])
+        end = problem.low + problem.span * np.clip(np.array(solved["x"]).ravel()[:n], 0.0, 1.0)
+        return self._outcome(end, prices, status, elastic=elastic)
+
+    def _order(self) -> list[tuple[int, int, float, float, float]]:
+        low, span = self.problem.low, self.problem.span
+        return [
+            (k, m, span[k] / span[m], 1.0, (low[k] - low[m]) / span[m]) for k, m in self.problem.ordered
+        ]  # fmt: skip
+
+    def _values(self, x: Vector) -> Vector:
+        design = self.runs.at(x)
+        return design.values if design is not None else np.full((len(self.problem.cases), len(self.sizes)), np.inf)
+
+    def _outcome(self, end: Vector, prices: Vector, status: str, *, elastic: bool) -> Outcome:
+        """Return the better one of where the solver ended and the best design on its way."""
+        tried = [(design.x, design.values) for design in self.runs.designs]
+        design = self.runs.at(end)
+        if design is not None:
+            objective, excess = self.measures(design.values)
+            if status in _SOLVED and (elastic or excess <= FEASIBLE):
+                return Outcome(end, objective, excess, self._prices(prices), True, status)
+            tried.append((end, design.values))
+        ordered = [(x, *self.measures(values)) for x, values in tried if self._in_order(x)]
+        x, objective, excess = min(ordered, key=lambda item: (max(item[2], FEASIBLE), item[1]))
+        return Outcome(x, objective, excess, self._prices(prices), False, status)
+
+    def _in_order(self, x: Vector) -> bool:
+        return all(x[low] <= x[high] + FEASIBLE * self.problem.span[low] for low, high in self.problem.ordered)
+
+    def _prices(self, multipliers: Vector) -> Vector:
+        places, signs, _ = self.limits
+        of_aim = self.aim_size * self.aim[1][0]
+        per_row = multipliers.reshape(len(self.problem.cases), len(places)) if places.size else np.zeros((1, 0))
+        return -per_row * signs * of_aim / self.sizes[places]
+
+    def _polished(self, outcome: Outcome) -> Outcome:
+        """Go on without derivatives."""
+        optimize = extra_module("scipy.optimize", "analyse")
+        problem = self.problem
+        begin = (outcome.x - problem.low) / problem.span
+
+        def values(q: Vector) -> Vector:
+            known = self.runs.values_at(problem.low + problem.span * np.clip(q, 0.0, 1.0))
+            return np.full((len(problem.cases), len(self.sizes)), np.nan) if known is None else known
+
+        limits: list[Any] = []
+        if self.rows:
+            limits.append(optimize.NonlinearConstraint(lambda q: self._excess(values(q)).ravel(), -np.inf, 0.0))
+        for low, high, s, t, shift in self._order():
+            row = np.zeros(len(begin))
+            row[low], row[high] = s, -t
+            limits.append(optimize.LinearConstraint(row, -np.inf, -shift))
+        radius = {"initial_tr_radius": _FIRST, "final_tr_radius": _LAST, "maxfev": _TRIALS * (len(begin) + 1)}
+        result = optimize.minimize(
+            lambda q: self.measures(values(q))[0], begin, method="COBYQA", bounds=[(0.0, 1.0)] * len(begin),
+            constraints=limits, options=radius,
+        )  # fmt: skip
+        x = problem.low + problem.span * np.clip(result.x, 0.0, 1.0)
+        objective, excess = self.measures(values(result.x))
+        better = objective <= outcome.objective and excess <= max(outcome.excess, FEASIBLE)
+        if not better:
+            return outcome
+        return Outcome(x, objective, excess, outcome.prices, bool(result.success), "COBYQA")
+
+
+class _Values(NamedCallback):
+    """Outputs of all load cases over their sizes, as a function of what is free, scaled by its bounds."""
+
+    def __init__(self, search: Search) -> None:
+        super().__init__()
+        self._search = search
+        problem = search.problem
+        self._size = len(problem.cases) * len(problem.outputs), len(problem.free)
+        self._slopes = _Slopes(self, self._size)
+        dense = ca.Sparsity.dense
+        self.declare("design", {"q": dense(self._size[1])}, {"y": dense(self._size[0])})
+
+    def numbers(self, q: Any) -> tuple[Vector, Vector] | None:
+        """Return values and slopes, None where a run is refused."""
+        search = self._search
+        problem = search.problem
+        design = search.runs.at(problem.low + problem.span * np.clip(np.array(q, float).ravel(), 0.0, 1.0))
+        if design is None:
+            return None
+        values = (design.values / search.sizes).ravel()
+        slopes = design.slopes * problem.span / search.sizes[:, None]
+        return values, slopes.reshape(self._size)
+
+    def eval(self, arg: Any) -> list[Any]:
+        """Run."""
+        numbers = self.numbers(arg[0])
+        return [ca.DM(np.full(self._size[0], np.nan) if numbers is None else numbers[0])]
+
+    def has_jacobian(self) -> bool:
+        """Tell CasADi that the derivatives are known."""
+        return True
+
+    def get_jacobian(self, name: str, inames: Any, onames: Any, opts: Any) -> Any:
+        """Return the function of the derivatives."""
+        return self._slopes
+
+
+class _Slopes(NamedCallback):
+    def __init__(self, values: _Values, size: tuple[int, int]) -> None:
+        super().__init__()
+        self._values, self._size = values, size
+        arguments = {"q": ca.Sparsity.dense(size[1]), "out_y": ca.Sparsity(size[0], 1)}
+        self.declare("slopes", arguments, {"jac_y_q": ca.Sparsity.dense(*size)})
+
+    def eval(self, arg: Any) -> list[Any]:
+        numbers = self._values.numbers(arg[0])
+        return [ca.DM(np.full(self._size, np.nan) if numbers is None else numbers[1])]

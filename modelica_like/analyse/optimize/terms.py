@@ -1,0 +1,219 @@
+"""The terms of an optimisation: what is free, what is to be small, what is limited; read from texts and checked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import UnitError, ValueOutOfRange
+from modelica_like.language.units import ONE, Unit, read_quantity, to_si
+from modelica_like.runs.calls import call_of
+from modelica_like.runs.readings import Output, read_number
+
+Sense = Literal["<=", ">=", "=="]
+_LIMIT = re.compile(r"(?P<left>.+?)(?P<sense><=|>=|==|<|>|=)(?P<right>.+)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter that is free between two bounds, in SI units; `value` is that of the drive."""
+
+    name: str
+    unit: Unit
+    low: float
+    high: float
+    value: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """A number of a run, times a sign: of an objective to be small, of a limit to be at most `most`, in SI units."""
+
+    output: str
+    sign: float
+    most: float = 0.0
+
+
+@dataclass(frozen=True)
+class Aim:
+    """An objective.
+
+    Attributes:
+        text: as written.
+        output: of a run.
+        sign: 1 to minimise, -1 to maximise.
+    """
+
+    text: str
+    output: Output
+    sign: float
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return the numbers of which the largest is to be small: a peak is the larger of two amounts."""
+        called = call_of(self.text)
+        if called is not None and called[0] == "peak" and self.sign > 0:
+            return Row(f"max({called[1]})", 1.0), Row(f"min({called[1]})", -1.0)
+        return (Row(self.text, self.sign),)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A limit of an output, in SI units.
+
+    Attributes:
+        text: as written.
+        name: of the output.
+        output: of a run.
+        sense: the relation.
+        value: the limit.
+    """
+
+    text: str
+    name: str
+    output: Output
+    sense: Sense
+    value: float
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return the numbers that must not be above theirs; both sides of an equation."""
+        called = call_of(self.name)
+        if called is not None and called[0] == "peak" and self.sense == "<=":
+            return Row(f"max({called[1]})", 1.0, self.value), Row(f"min({called[1]})", -1.0, self.value)
+        signs = {"<=": (1.0,), ">=": (-1.0,), "==": (1.0, -1.0)}[self.sense]
+        return tuple(Row(self.name, sign, sign * self.value) for sign in signs)
+
+    def excess(self, value: float) -> float:
+        """Return by how much a value of the output breaks the limit; at most 0 where it does not."""
+        over = value - self.value
+        return {"<=": over, ">=": -over, "==": abs(over)}[self.sense]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A load case: other values of parameters."""
+
+    name: str
+    values: Mapping[str, Any]
+
+
+def read_free(model: CompiledDae, given: Mapping[str, Any]) -> tuple[Free, ...]:
+    """Return the free parameters with their bounds.
+
+    Args:
+        model: compiled, with these parameters decoupled from formulas.
+        given: lower and upper bound by path, numbers in SI units or quantities.
+
+    Raises:
+        UnknownName: there is no such parameter.
+        ValueOutOfRange: there are no two bounds in order, or the drive's own value is not between them.
+        UnitError: a bound has another unit.
+    """
+    if not given:
+        raise ValueOutOfRange(
+            "An optimisation needs something that is free.",
+            advice='Give a parameter and its bounds: free = { "clutch.capacity" = ["20 N.m", "120 N.m"] }.',
+        )
+    return tuple(_free(model, name, bounds) for name, bounds in given.items())
+
+
+def _free(model: CompiledDae, name: str, bounds: Any) -> Free:
+    if isinstance(bounds, str) or not isinstance(bounds, Sequence) or len(bounds) != 2:
+        raise ValueOutOfRange(
+            f"{name}: the bounds must be two values, not {bounds!r}.", advice='Write ["20 N.m", "120 N.m"].'
+        )
+    if name not in model.fixed_position:
+        model.with_parameters({name: 0.0})  # says why not
+    unit, value = model.units[name], model_value(model, name)
+    low, high = (to_si(bound, unit, name) for bound in bounds)
+    if not low < high:
+        raise ValueOutOfRange(f"{name}: the lower bound {low:g} is not below the upper bound {high:g}.")
+    if not low <= value <= high:
+        raise ValueOutOfRange(
+            f"{name} = {value:g} {_text(unit)}".rstrip() + f" is not between its bounds {low:g} and {high:g}.",
+            why="An optimisation begins with the drive as it is.",
+            advice="Widen the bounds, or give the drive a value between them.",
+        )
+    for bound in (low, high):
+        model.with_parameters({name: bound})
+    return Free(name, unit, low, high, value)
+
+
+def model_value(model: CompiledDae, name: str) -> float:
+    """Return the value of a parameter or input in SI units."""
+    return float(np.concatenate([model.p, model.u])[model.fixed_position[name]])
+
+
+def read_aims(model: CompiledDae, minimize: Sequence[str], maximize: Sequence[str]) -> tuple[Aim, ...]:
+    """Return the objectives.
+
+    Raises:
+        UnknownName: the model has no such output.
+        ValueOutOfRange: there is none, or it is a trajectory.
+    """
+    if not minimize and not maximize:
+        raise ValueOutOfRange(
+            "An optimisation needs an objective.", advice='Say what is to be small: minimize = "peak(shaft.tau)".'
+        )
+    signs = [*((text, 1.0) for text in minimize), *((text, -1.0) for text in maximize)]
+    return tuple(Aim(text.strip(), read_number(model, text), sign) for text, sign in signs)
+
+
+def read_limits(model: CompiledDae, texts: Sequence[str]) -> tuple[Limit, ...]:
+    """Return the limits.
+
+    Raises:
+        ValueOutOfRange: a text is no relation.
+        UnknownName: the model has no such output.
+        UnitError: the sides have different units.
+    """
+    return tuple(_limit(model, text) for text in texts)
+
+
+def _limit(model: CompiledDae, text: str) -> Limit:
+    sides = _LIMIT.fullmatch(text.strip())
+    if sides is None or sides["sense"] == "=":
+        raise ValueOutOfRange(
+            f"'{text}' is no limit: it compares nothing.", advice='Write "clutch.lock_time <= 0.4 s", with <=, >= or ==.'
+        )
+    left, right = sides["left"].strip(), sides["right"].strip()
+    sense = cast("Sense", {"<": "<=", ">": ">="}.get(sides["sense"], sides["sense"]))
+    output = read_number(model, left)
+    number = read_quantity(right)
+    if number is None:
+        name = f"{left} - ({right})"
+        return Limit(text, name, read_number(model, name), sense, 0.0)
+    if number[1] == ONE and str(output.unit) not in ("1", "*"):
+        raise UnitError(
+            f"'{text}' compares a value in {output.unit} with a number without a unit.",
+            advice=f'Write "{left} {sides["sense"]} {right} {output.unit}".',
+        )
+    return Limit(text, left, output, sense, to_si(right, output.unit, left))
+
+
+def read_cases(model: CompiledDae, given: Sequence[Mapping[str, Any]], free: Sequence[Free]) -> tuple[Case, ...]:
+    """Return the load cases; one without other values if there are none.
+
+    Raises:
+        UnknownName: there is no such parameter.
+        ValueOutOfRange: a value is out of range, or what is free has a value.
+    """
+    cases: list[Case] = []
+    for number, table in enumerate(given, 1):
+        values = dict(table)
+        name = str(values.pop("name", f"case {number}"))
+        for path in values.keys() & {parameter.name for parameter in free}:
+            raise ValueOutOfRange(
+                f"{path} is free, and has a value in the load case '{name}'.", advice="Leave out one of the two."
+            )
+        model.with_parameters(values)
+        cases.append(Case(name, values))
+    return tuple(cases) or (Case("", {}),)
+
+
+def _text(unit: Unit) -> str:
+    return "" if unit == ONE else str(unit)
