@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from modelica_like.analyse.linear.loop import open_loop as open_loop
     from modelica_like.analyse.operating.curves import characteristic as characteristic
     from modelica_like.analyse.operating.steady import steady as steady
+    from modelica_like.analyse.optimize.optimize import optimize as optimize
     from modelica_like.analyse.sensitivity.derivatives import sensitivities as sensitivities
     from modelica_like.analyse.sensitivity.function import simulation_function as simulation_function
     from modelica_like.analyse.sweeps.importance import importance as importance
@@ -83,6 +84,7 @@ _HOME = {
     "load": "modelica_like.netlist",
     "load_spectrum": "modelica_like.analyse.after.spectra",
     "open_loop": "modelica_like.analyse.linear.loop",
+    "optimize": "modelica_like.analyse.optimize.optimize",
     "order_map": "modelica_like.analyse.after.orders",
     "order_response": "modelica_like.analyse.after.orders",
     "overlay": "modelica_like.show.report.overlay",

@@ -18,7 +18,8 @@ TASKS = {
         "demo": "validation",
     },
     "Analyse and size it": {
-        "modes": "analysis", "steady": "analysis", "sweep": "analysis", "sensitivity": "analysis", "size": "validation",
+        "modes": "analysis", "steady": "analysis", "sweep": "analysis", "sensitivity": "analysis",
+        "optimize": "analysis", "size": "validation",
     },
     "Give it to other tools": {
         "export": "export", "runtimes": "export", "validate": "validation", "split": "cosimulation",

@@ -1,4 +1,4 @@
-"""Commands that analyse drives: small motions, operating points, sweeps, exact derivatives."""
+"""Commands that analyse drives: small motions, operating points, sweeps, exact derivatives, best designs."""
 
 from __future__ import annotations
 
@@ -155,3 +155,50 @@ def sensitivity(
         page.print(sensitivity_report(result))
         if tornado:
             save_plot(result.tornado(of[0]), tornado)
+
+
+def optimize(
+    netlist: Netlist, assignments: Assignments = None, *,
+    minimize: Annotated[
+        list[str] | None, Option(metavar="OUTPUT", help="What is to be small, e.g. 'peak(shaft.tau)'; of two, a front.")
+    ] = None,
+    maximize: Annotated[list[str] | None, Option(metavar="OUTPUT", help="What is to be large.")] = None,
+    free: Annotated[
+        list[str] | None, Option(metavar="NAME=LOW:HIGH", help="What may change, e.g. 'clutch.capacity=20:120'.")
+    ] = None,
+    subject_to: Annotated[
+        list[str] | None, Option(metavar="LIMIT", help="Limit of an output, e.g. 'clutch.lock_time <= 0.4 s'.")
+    ] = None,
+    until: Until = None, start: Start = None,
+    starts: Annotated[int | None, Option(metavar="N", help="Starts of the search.")] = None,
+    points: Annotated[int | None, Option(metavar="N", help="Designs of a front; default: 20.")] = None,
+    output: Annotated[
+        Path | None, Option("--output", "-o", metavar="FILE", help="Write the netlist with the best values.")
+    ] = None,
+    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the front, or the way to the optimum.")] = None,
+    json: Json = False, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Find the best design: what [optimize] of the netlist asks for, or these options."""
+    with told(debug, json=json, pictures=[plot], files=[output]) as page:
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.analyse.optimize.optimize import optimize as find
+        from modelica_like.analyse.optimize.result import Optimum
+        from modelica_like.analyse.sweeps.ranges import by_name, read_bounds
+        from modelica_like.errors import ValueOutOfRange
+        from modelica_like.show.plot import save_plot
+        from modelica_like.show.report.analysis import optimum_report
+
+        bounds = by_name(map(read_bounds, free), "--free") if free else None
+        result = find(
+            assembly, minimize=minimize or (), maximize=maximize or (), free=bounds, subject_to=subject_to or (),
+            until=until, start=start, starts=starts, points=points,
+        )  # fmt: skip
+        page.print(optimum_report(result))
+        if plot:
+            save_plot(result.plot(), plot)
+        if output and not isinstance(result, Optimum):
+            raise ValueOutOfRange(
+                "A front is no single design to write.", advice="Limit one of the objectives by --subject-to."
+            )
+        if output and isinstance(result, Optimum):
+            result.save(output)

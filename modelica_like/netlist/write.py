@@ -66,7 +66,7 @@ class _Writer:
             "guess": self.guess,
             "simulate": inside(assembly).simulate,
             "display": inside(assembly).display,
-            "optimize": _as_written(inside(assembly).optimize),
+            "optimize": {key: _inline(_as_written(entry)) for key, entry in inside(assembly).optimize.items()},
         }
         top: dict[str, Any] = {"name": inside(assembly).name}
         if inside(assembly).description:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like.errors import NetlistError, Source, ValueOutOfRange
-from modelica_like.language import Component
+from modelica_like.language import Assembly, Component
 from modelica_like.language.inside import inside
 
 MOST = 200
@@ -38,8 +38,7 @@ def combinations(drive: Component, choose: Mapping[str, Any]) -> list[Choice]:
         NetlistError: a table cannot be read.
         ValueOutOfRange: there are too many.
     """
-    origin = inside(drive).origin if hasattr(inside(drive), "origin") else ""
-    folder = Path(origin).parent if origin else Path()
+    folder = Path(inside(drive).origin).parent if isinstance(drive, Assembly) else Path()
     options = [
         _rows(path, folder / given) if isinstance(given, str) else [Choice({path: v}, {path: v}) for v in given]
         for path, given in choose.items()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.optimize.choices import Choice, combinations
-from modelica_like.analyse.optimize.problem import Problem, Question, make_problem
+from modelica_like.analyse.optimize.problem import Question, make_problem
 from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optimum
 from modelica_like.analyse.optimize.runs import Runs
 from modelica_like.analyse.optimize.solve import FEASIBLE, Outcome, Search
@@ -45,9 +45,11 @@ def optimize(
     Args:
         drive: a component, a netlist file or a compiled model.
         minimize: an output of a run that is to be small, named as for `sensitivities`; of two, the Pareto front.
+            `max(peak(a.tau), peak(b.tau))` is the largest of several.
         maximize: an output that is to be large.
         free: lower and upper bound by path, numbers in SI units or quantities; of a table with two columns
-            `{"points": 12, "from": "0 N", "to": "9 kN", "rising": True}` (or `falling`) for its values.
+            `{"points": 12, "from": "0 N", "to": "9 kN", "rising": True}` (or `falling`) for its values, or `rows` for
+            some of those it has.
         subject_to: limits of outputs, `clutch.lock_time <= 0.4 s`, with <=, >= or ==.
         choose: values by path, `{"clutch.plates": [2, 4, 6]}`, or for a part a CSV table beside the netlist with a
             row for each kind, a column for each parameter, and `name`. All combinations are tried.
@@ -82,7 +84,9 @@ def optimize(
     if not choices:
         return _Study(drive, question, seed).best(number, points or written.get("points", _POINTS))
     if not isinstance(drive, Component):
-        raise LanguageError("A compiled model has nothing to choose.", advice="Give the netlist or the component itself.")
+        raise LanguageError(
+            "A compiled model has nothing to choose.", advice="Give the netlist or the component itself."
+        )
     with _placed(drive, "choose"):
         options = combinations(drive, choices)
     return _best_choice(drive, question, options, number, seed)
@@ -133,21 +137,20 @@ class _Study:
             raise ValueOutOfRange(f"A front needs at least 2 points, not {points}.")
         searches = [Search(self.problem, self.runs, aim) for aim in (0, 1)]
         ends = [self._search(search, starts) for search in searches]
-        designs = [self.runs.at(end.x) for end in ends]
-        second = self.problem.aims[1]
         places, signs, _ = searches[1].aim
-        values = [(signs * design.values[:, places]).max() for design in designs if design is not None]
-        found = [self.optimum(searches[0], ends[0])]
+        designs = [design for end in ends if (design := self.runs.at(end.x)) is not None]
+        values = [float((signs * design.values[:, places]).max()) for design in designs]
+        results = [self.optimum(searches[0], ends[0])]
         x = ends[0].x
-        for most in np.linspace(*values, points)[1:-1] if len(values) == 2 else ():
-            rows = tuple(Row(row.output, row.sign, float(most)) for row in second.rows())
+        for most in np.linspace(values[0], values[-1], points)[1:-1]:
+            rows = tuple(Row(row.output, row.sign, float(most)) for row in self.problem.aims[1].rows)
             search = Search(self.problem, self.runs, 0, rows)
             outcome = search.from_design(x)
             if outcome.excess <= FEASIBLE:
                 x = outcome.x
-                found.append(self.optimum(search, outcome))
-        found.append(self.optimum(searches[1], ends[1]))
-        return Front(_undominated(found), self.runs.count)
+                results.append(self.optimum(search, outcome))
+        results.append(self.optimum(searches[1], ends[1]))
+        return Front(_different(results), self.runs.count)
 
     def optimum(self, search: Search, outcome: Outcome) -> Optimum:
         """Return a result with its names, checked by IDAS."""
@@ -189,11 +192,11 @@ class _Study:
     def _objectives(self, first: Vector, after: Vector) -> tuple[Measured, ...]:
         problem, measured = self.problem, list[Measured]()
         for aim in problem.aims:
-            k = problem.outputs.index(aim.text)
-            order = np.argsort(-aim.sign * after[:, k], kind="stable")
+            places, _, _ = problem.numbers(aim.rows)
+            before, values = ([aim.value(row) for row in numbers[:, places]] for numbers in (first, after))
+            worst_first = sorted(range(len(values)), key=lambda c: -aim.sign * values[c])
             measured += [
-                Measured(aim.text, aim.text, aim.output.unit, problem.cases[c].name, first[c, k], after[c, k])
-                for c in order
+                Measured(aim.text, aim.text, aim.unit, problem.cases[c].name, before[c], values[c]) for c in worst_first
             ]
         return tuple(measured)
 
@@ -230,8 +233,8 @@ def _better(outcomes: Sequence[Outcome]) -> Outcome:
     return min(outcomes, key=lambda outcome: (max(outcome.excess, FEASIBLE), outcome.objective))
 
 
-def _undominated(points: Sequence[Optimum]) -> tuple[Optimum, ...]:
-    """Return the designs of which no other is as good in one objective and better in the other one."""
+def _different(points: Sequence[Optimum]) -> tuple[Optimum, ...]:
+    """Return designs without those that are the same as one before."""
     kept: list[Optimum] = []
     for point in points:
         if not any(np.allclose([*point.values.values()], [*other.values.values()], rtol=1e-9) for other in kept):

@@ -6,11 +6,22 @@ import copy
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.optimize.terms import Aim, Case, Free, Limit, Row, read_aims, read_cases, read_free, read_limits
+from modelica_like.analyse.optimize.terms import (
+    Aim,
+    Case,
+    Free,
+    Limit,
+    Row,
+    read_aims,
+    read_cases,
+    read_free,
+    read_limits,
+)
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean
@@ -19,7 +30,7 @@ from modelica_like.language.inside import declarations
 from modelica_like.language.units import parse_unit, to_si
 from modelica_like.simulation import Model, build, loaded
 
-_PROFILE = {"points", "from", "to", "rising", "falling"}
+_PROFILE = {"points", "rows", "from", "to", "rising", "falling"}
 
 
 @dataclass(frozen=True)
@@ -29,7 +40,7 @@ class Question:
     Attributes:
         minimize: outputs that are to be small.
         maximize: outputs that are to be large.
-        free: bounds by parameter, or `points`, `from`, `to`, `rising`, `falling` of a table.
+        free: bounds by parameter, or `points` or `rows`, `from`, `to`, `rising`, `falling` of a table.
         subject_to: limits.
         cases: load cases, tables of parameter values with a `name`.
         parameters: other values of parameters, in all cases.
@@ -85,9 +96,9 @@ class Problem:
         """Values of the drive, shape (free,)."""
         return np.array([parameter.value for parameter in self.free])
 
-    def numbers(self, rows: Sequence[Row]) -> tuple[Vector, Vector, Vector]:
+    def numbers(self, rows: Sequence[Row]) -> tuple[list[int], Vector, Vector]:
         """Return positions of the outputs of rows, their signs and limits."""
-        places = np.array([self.outputs.index(row.output) for row in rows], int)
+        places = [self.outputs.index(row.output) for row in rows]
         return places, np.array([row.sign for row in rows]), np.array([row.most for row in rows])
 
 
@@ -120,9 +131,8 @@ def make_problem(
     with placed("for"):
         cases = read_cases(model, question.cases, free)
     names = [parameter.name for parameter in free]
-    rows = [row for term in (*aims, *limits) for row in term.rows()]
-    asked = [*(aim.text for aim in aims), *(limit.name for limit in limits)]
-    outputs = tuple(dict.fromkeys([*(row.output for row in rows), *asked]))
+    rows = [*(row for aim in aims for row in aim.rows), *(row for limit in limits for row in limit.rows())]
+    outputs = tuple(dict.fromkeys([*(row.output for row in rows), *(limit.name for limit in limits)]))
     order = tuple((names.index(low), names.index(high)) for low, high in ordered)
     return Problem(question, model, free, aims, limits, cases, order, outputs)
 
@@ -172,8 +182,8 @@ def _profile(drive: Component, path: str, given: Mapping[str, Any]) -> tuple[dic
     column = columns[min(1, len(columns) - 1)]
     unit = parse_unit("1" if column.scale else column.unit)
     bounds = tuple(to_si(given[key], unit, f"free: {path}") for key in ("from", "to"))
-    cells = [f"{path}[{row},2]" for row in range(1, len(rows) + 1)]
-    pairs = list(zip(cells, cells[1:], strict=False))
+    cells = [f"{path}[{row},2]" for row in _chosen_rows(path, given.get("rows"), len(rows))]
+    pairs = list(pairwise(cells))
     order = pairs if given.get("rising") else [(b, a) for a, b in pairs] if given.get("falling") else []
     return dict.fromkeys(cells, bounds), order
 
@@ -185,3 +195,13 @@ def _table(drive: Component, path: str) -> tuple[Component, str]:
     if path not in tables:
         raise UnknownName(f"{drive.label} has no table '{path}'{did_you_mean(path, tables) or '.'}")
     return tables[path]
+
+
+def _chosen_rows(path: str, given: Any, count: int) -> list[int]:
+    """Return the rows of a table that are free, counted from 1; all if none are named."""
+    if given is None:
+        return [*range(1, count + 1)]
+    rows = given if isinstance(given, list | tuple) else []
+    if not rows or not all(type(row) is int and 1 <= row <= count for row in rows) or len({*rows}) < len(rows):
+        raise ValueOutOfRange(f"free: {path}: rows = {given!r} must be a list of row numbers from 1 to {count}.")
+    return sorted(rows)

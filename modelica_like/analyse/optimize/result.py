@@ -6,7 +6,7 @@ import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,8 +15,14 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, did_you_mean
 from modelica_like.language import Assembly, Component
 from modelica_like.language.units import Unit
+from modelica_like.style import COLOURS, picture
 from modelica_like.upper import Shown
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WITHIN = 1e-6
+"""Excess of a limit over its size that counts as none."""
 _AT_BOUND = 1e-6
 """Distance from a bound, relative to that of both: at it."""
 
@@ -64,6 +70,11 @@ class Measured:
     limit: float = np.nan
     broken: bool = False
     price: float = 0.0
+
+    @property
+    def within(self) -> str:
+        """Its load case, for sentences."""
+        return f" in the load case '{self.case}'" if self.case else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +136,8 @@ class Optimum(Shown):
 
         if not isinstance(self.drive, Assembly):
             raise LanguageError(
-                "Only a drive of a netlist can be saved as one.", advice="The values are in `values`, the model in `model`."
+                "Only a drive of a netlist can be saved as one.",
+                advice="The values are in `values`, the model in `model`.",
             )
         drive = copy.deepcopy(self.drive)
         tables: dict[str, Any] = {}
@@ -143,28 +155,39 @@ class Optimum(Shown):
 
     def sentences(self) -> list[str]:
         """Return what holds the design back, what that costs, and notes."""
-        told: list[str] = []
         objective = self.objectives[0]
-        for limit in self.limits:
-            if limit.price and not limit.broken:
-                where = f" in the load case '{limit.case}'" if limit.case else ""
-                change, unit = abs(limit.price), str(objective.unit)
-                of = str(limit.unit)
-                told.append(
-                    f"'{limit.text}' is active{where}: 1 {of} more changes {objective.name} by "
-                    f"{limit.price:+.4g} {unit}." if change else ""
-                )
-        for parameter in self.parameters:
-            if parameter.at_bound:
-                told.append(f"{parameter.name} is at its {parameter.at_bound} bound.")
-        return [*told, *self.notes]
+        sentences = [
+            f"'{limit.text}' is active{limit.within}: with 1 {limit.unit} more, {objective.name} changes by "
+            f"{limit.price:+.4g} {objective.unit}."
+            for limit in self.limits
+            if limit.price and not limit.broken
+        ]
+        ends = {end: [p.name for p in self.parameters if p.at_bound == end] for end in ("lower", "upper")}
+        sentences += [f"At the {end} bound: {', '.join(names)}." for end, names in ends.items() if names]
+        return [*sentences, *self.notes]
+
+    def plot(self) -> Figure:
+        """Draw the objective of all designs tried, those that exceed a limit apart."""
+        objective = self.objectives[0]
+        values, within = self.history[:, 0], self.history[:, 1] <= _WITHIN
+        with picture(f"{self.model.name}: {objective.name}", 1, 3.2) as (figure, (axes,)):
+            tried = np.arange(1, len(values) + 1)
+            axes.plot(tried, values, color="#bbbbbb", linewidth=0.8)
+            axes.plot(tried[within], values[within], "o", markersize=4, color=COLOURS[0], label="within all limits")
+            axes.plot(tried[~within], values[~within], "x", markersize=5, color=COLOURS[1], label="exceeds a limit")
+            axes.set_xlabel("design")
+            axes.set_ylabel(" ".join(filter(None, [objective.name, f"in {objective.unit}"])))
+            axes.legend(loc="best")
+        return figure
 
     def __str__(self) -> str:
         width = max(len(row.name) for row in (*self.parameters, *self.objectives, *self.limits))
         lines = [f"{self.model.name}: {self.runs} runs"]
         lines += [f"  {path:{width}}  {label}" for path, label in self.chosen.items()]
         for parameter in self.parameters:
-            lines.append(f"  {parameter.name:{width}}  {parameter.before:12.6g} → {parameter.value:12.6g} {parameter.unit}")
+            lines.append(
+                f"  {parameter.name:{width}}  {parameter.before:12.6g} → {parameter.value:12.6g} {parameter.unit}"
+            )
         for row in (*self.objectives, *self.limits):
             limit = "" if np.isnan(row.limit) else f"  ({row.text})"
             case = f"  [{row.case}]" if row.case else ""
@@ -195,6 +218,16 @@ class Front(Shown):
     def values(self) -> Vector:
         """Objectives, the worst of all load cases, in SI units, shape (points, 2)."""
         return np.array([[point[name] for name in self.names] for point in self.points])
+
+    def plot(self) -> Figure:
+        """Draw the front."""
+        units = {row.name: str(row.unit) for row in self.points[0].objectives}
+        title = f"{self.points[0].model.name}: front of {len(self.points)} designs"
+        with picture(title, 1, 4.2) as (figure, (axes,)):
+            axes.plot(*self.values.T, "o-", markersize=4, color=COLOURS[0])
+            for name, label in zip(self.names, (axes.set_xlabel, axes.set_ylabel), strict=True):
+                label(f"{name} in {units[name]}")
+        return figure
 
     def __str__(self) -> str:
         free = [parameter.name for parameter in self.points[0].parameters]

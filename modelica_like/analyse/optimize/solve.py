@@ -18,7 +18,7 @@ import numpy as np
 from modelica_like.analyse.optimize.problem import Problem
 from modelica_like.analyse.optimize.runs import Runs
 from modelica_like.analyse.optimize.terms import Row
-from modelica_like.analyse.sensitivity.function import NamedCallback
+from modelica_like.analyse.sensitivity.callback import NamedCallback
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import extra_module
 
@@ -71,7 +71,7 @@ class Search:
 
     def __init__(self, problem: Problem, runs: Runs, aim: int = 0, more: tuple[Row, ...] = ()) -> None:
         self.problem, self.runs = problem, runs
-        self.aim_rows = problem.aims[aim].rows()
+        self.aim_rows = problem.aims[aim].rows
         self.rows = (*(row for limit in problem.limits for row in limit.rows()), *more)
         self.aim, self.limits = problem.numbers(self.aim_rows), problem.numbers(self.rows)
         begin = runs.at(problem.begin)
@@ -110,8 +110,8 @@ class Search:
         q, bound = ca.MX.sym("q", n), ca.MX.sym("bound")
         y = ca.reshape(callback(q), len(problem.outputs), cases)
         places, signs, most = self.limits
-        excess = ca.vec(signs * y[places.tolist(), :] - most / self.sizes[places]) if places.size else ca.MX(0, 1)
-        aims = ca.vec(self.aim[1] * self.sizes[self.aim[0]] / self.aim_size * y[self.aim[0].tolist(), :])
+        excess = ca.vec(signs * y[places, :] - most / self.sizes[places]) if places else ca.MX(0, 1)
+        aims = ca.vec(self.aim[1] * self.sizes[self.aim[0]] / self.aim_size * y[self.aim[0], :])
         bounded = elastic or aims.numel() > 1
         if elastic:
             objective, excess = bound, excess - bound
@@ -164,7 +164,7 @@ class Search:
     def _prices(self, multipliers: Vector) -> Vector:
         places, signs, _ = self.limits
         of_aim = self.aim_size * self.aim[1][0]
-        per_row = multipliers.reshape(len(self.problem.cases), len(places)) if places.size else np.zeros((1, 0))
+        per_row = multipliers.reshape(len(self.problem.cases), len(places)) if places else np.zeros((1, 0))
         return -per_row * signs * of_aim / self.sizes[places]
 
     def _polished(self, outcome: Outcome) -> Outcome:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnitError, ValueOutOfRange
-from modelica_like.language.units import ONE, Unit, read_quantity, to_si
+from modelica_like.language.units import ONE, Unit, read_quantity, same_dimension, to_si
 from modelica_like.runs.calls import call_of
 from modelica_like.runs.readings import Output, read_number
 
@@ -45,20 +45,19 @@ class Aim:
 
     Attributes:
         text: as written.
-        output: of a run.
+        unit: its unit.
         sign: 1 to minimise, -1 to maximise.
+        rows: the numbers of which the largest is to be small.
     """
 
     text: str
-    output: Output
+    unit: Unit
     sign: float
+    rows: tuple[Row, ...]
 
-    def rows(self) -> tuple[Row, ...]:
-        """Return the numbers of which the largest is to be small: a peak is the larger of two amounts."""
-        called = call_of(self.text)
-        if called is not None and called[0] == "peak" and self.sign > 0:
-            return Row(f"max({called[1]})", 1.0), Row(f"min({called[1]})", -1.0)
-        return (Row(self.text, self.sign),)
+    def value(self, numbers: Sequence[float]) -> float:
+        """Return the objective from its numbers, by row."""
+        return self.sign * max(row.sign * number for row, number in zip(self.rows, numbers, strict=True))
 
 
 @dataclass(frozen=True)
@@ -81,10 +80,9 @@ class Limit:
 
     def rows(self) -> tuple[Row, ...]:
         """Return the numbers that must not be above theirs; both sides of an equation."""
-        called = call_of(self.name)
-        if called is not None and called[0] == "peak" and self.sense == "<=":
-            return Row(f"max({called[1]})", 1.0, self.value), Row(f"min({called[1]})", -1.0, self.value)
-        signs = {"<=": (1.0,), ">=": (-1.0,), "==": (1.0, -1.0)}[self.sense]
+        if self.sense == "<=":
+            return tuple(replace(row, most=self.value) for row in _rows(self.name, 1.0))
+        signs = {">=": (-1.0,), "==": (1.0, -1.0)}[self.sense]
         return tuple(Row(self.name, sign, sign * self.value) for sign in signs)
 
     def excess(self, value: float) -> float:
@@ -154,13 +152,43 @@ def read_aims(model: CompiledDae, minimize: Sequence[str], maximize: Sequence[st
     Raises:
         UnknownName: the model has no such output.
         ValueOutOfRange: there is none, or it is a trajectory.
+        UnitError: the largest of several outputs is asked for, and their units differ.
     """
     if not minimize and not maximize:
         raise ValueOutOfRange(
             "An optimisation needs an objective.", advice='Say what is to be small: minimize = "peak(shaft.tau)".'
         )
-    signs = [*((text, 1.0) for text in minimize), *((text, -1.0) for text in maximize)]
-    return tuple(Aim(text.strip(), read_number(model, text), sign) for text, sign in signs)
+    return (*(_aim(model, text, 1.0) for text in minimize), *(_aim(model, text, -1.0) for text in maximize))
+
+
+def _aim(model: CompiledDae, text: str, sign: float) -> Aim:
+    """Read an output, or the largest (to maximise, the least) of several, `max(peak(a.tau), peak(b.tau))`."""
+    called = call_of(text)
+    names = _split(called[1]) if called is not None and called[0] == ("max" if sign > 0 else "min") else [text]
+    if len(names) == 1:
+        names = [text.strip()]
+    outputs = [read_number(model, name) for name in names]
+    for output in outputs[1:]:
+        if not same_dimension(output.unit, outputs[0].unit):
+            raise UnitError(f"'{text}' compares {outputs[0].unit} with {output.unit}.")
+    return Aim(text.strip(), outputs[0].unit, sign, tuple(row for name in names for row in _rows(name, sign)))
+
+
+def _split(text: str) -> list[str]:
+    """Split at the commas that are in no brackets."""
+    parts, depth = [""], 0
+    for char in text:
+        depth += (char == "(") - (char == ")")
+        parts = [*parts, ""] if char == "," and depth == 0 else [*parts[:-1], parts[-1] + char]
+    return [part.strip() for part in parts]
+
+
+def _rows(name: str, sign: float) -> tuple[Row, ...]:
+    """Return the numbers of which the largest is to be small: a peak is the larger of two amounts."""
+    called = call_of(name)
+    if called is not None and called[0] == "peak" and sign > 0:
+        return Row(f"max({called[1]})", 1.0), Row(f"min({called[1]})", -1.0)
+    return (Row(name, sign),)
 
 
 def read_limits(model: CompiledDae, texts: Sequence[str]) -> tuple[Limit, ...]:
@@ -178,7 +206,8 @@ def _limit(model: CompiledDae, text: str) -> Limit:
     sides = _LIMIT.fullmatch(text.strip())
     if sides is None or sides["sense"] == "=":
         raise ValueOutOfRange(
-            f"'{text}' is no limit: it compares nothing.", advice='Write "clutch.lock_time <= 0.4 s", with <=, >= or ==.'
+            f"'{text}' is no limit: it compares nothing.",
+            advice='Write "clutch.lock_time <= 0.4 s", with <=, >= or ==.',
         )
     left, right = sides["left"].strip(), sides["right"].strip()
     sense = cast("Sense", {"<": "<=", ">": ">="}.get(sides["sense"], sides["sense"]))

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.sensitivity.callback import NamedCallback
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
 from modelica_like.analyse.sensitivity.formulas import free_formulas
 from modelica_like.arguments import checked
@@ -28,32 +29,6 @@ _CHANGE = 1e-3
 """Relative change of a parameter for second derivatives: the error of both, rounding and curvature, is about 1e-4."""
 _FINER = 1e-2
 """Tolerance of a run relative to that of its replay, so that both agree."""
-
-
-class NamedCallback(ca.Callback):
-    """A function of Python whose arguments and results have names and patterns."""
-
-    def declare(self, name: str, arguments: dict[str, Any], results: dict[str, Any], **options: Any) -> None:
-        self._arguments, self._results = list(arguments.items()), list(results.items())
-        self.construct(name, options)
-
-    def get_n_in(self) -> int:
-        return len(self._arguments)
-
-    def get_n_out(self) -> int:
-        return len(self._results)
-
-    def get_name_in(self, i: int) -> str:
-        return self._arguments[i][0]
-
-    def get_name_out(self, i: int) -> str:
-        return self._results[i][0]
-
-    def get_sparsity_in(self, i: int) -> Any:
-        return self._arguments[i][1]
-
-    def get_sparsity_out(self, i: int) -> Any:
-        return self._results[i][1]
 
 
 class SimulationFunction(NamedCallback):

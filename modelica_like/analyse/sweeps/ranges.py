@@ -71,3 +71,20 @@ def read_range(text: str) -> tuple[str, list[Any]]:
             advice="Write for example 'load=0:0.25:26 N.m' or 'load=0,0.1,0.2 N.m'.",
         ) from None
     return name, [f"{value!r} {unit}" if unit.strip() else value for value in given]
+
+
+def read_bounds(text: str) -> tuple[str, list[Any]]:
+    """Read `clutch.capacity=20:120 N.m`; the unit counts for both.
+
+    Raises:
+        ValueOutOfRange: it is no pair of numbers.
+    """
+    name, values = read_assignment(text)
+    numbers, _, unit = values.partition(" ")
+    try:
+        low, high = map(float, numbers.split(":"))
+    except ValueError:
+        raise ValueOutOfRange(
+            f"'{text}': '{values}' is not LOW:HIGH.", advice="Write for example 'clutch.capacity=20:120 N.m'."
+        ) from None
+    return name, [f"{bound!r} {unit}" if unit.strip() else bound for bound in (low, high)]

@@ -1,4 +1,4 @@
-"""Results of analyses as tables: operating points, modes, sensitivities and sweeps."""
+"""Results of analyses as tables: operating points, modes, sensitivities, sweeps, best designs."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.markup import escape
 
+from modelica_like.analyse.optimize.result import Optimum
 from modelica_like.analyse.sensitivity.result import COLUMNS, SHOWN
 from modelica_like.show.report.tables import Listed, Shown, table
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from modelica_like.analyse.linear.model import Mode, Modes
     from modelica_like.analyse.operating.curves import Curves
     from modelica_like.analyse.operating.steady import OperatingPoint
+    from modelica_like.analyse.optimize.result import Front
     from modelica_like.analyse.sensitivity.result import Sensitivities
 
 _FAILURES_TOLD = 3
@@ -146,3 +148,32 @@ def _where(dataset: xarray.Dataset, place: Mapping[Any, xarray.DataArray]) -> Sh
     point = dataset.isel({str(key): value.item() for key, value in place.items()})
     values = {str(name): point[name].item() for name in point.coords}
     return Shown(", ".join(f"{name} = {value:.6g}" for name, value in values.items()), values)
+
+
+def optimum_report(result: Optimum | Front) -> RenderableType:
+    """Return the best design: what is free before and after, objectives and limits, what a limit costs."""
+    if not isinstance(result, Optimum):
+        return _front(result)
+    free = [(p.name, p.before, p.value, str(p.unit), p.low, p.high) for p in result.parameters]
+    rows = [
+        (m.name, m.case, m.before, m.value, str(m.unit), "" if np.isnan(m.limit) else m.text, "broken" * m.broken)
+        for m in (*result.objectives, *result.limits)
+    ]
+    columns = "name", "before>.6g", "best>.6g", "unit", "from>.6g", "to>.6g"
+    parts: list[RenderableType] = [f"[bold]{escape(result.model.name)}[/]  {result.runs} runs", ""]
+    if result.chosen:
+        parts += [table("chosen", "name", "value", rows=[(k, str(v)) for k, v in result.chosen.items()]), ""]
+    outputs = table("outputs", "name", "case", "before>.6g", "best>.6g", "unit", "limit", "", rows=rows)
+    parts += [table("free", *columns, rows=free), "", outputs, ""]
+    parts += [escape(sentence) for sentence in result.sentences()]
+    return Group(*parts)
+
+
+def _front(front: Front) -> RenderableType:
+    first = front.points[0]
+    units = [str(first.objectives[[m.name for m in first.objectives].index(name)].unit) for name in front.names]
+    titles = [f"{name} in {unit}>.6g" for name, unit in zip(front.names, units, strict=True)]
+    titles += [f"{p.name} in {p.unit}>.6g" for p in first.parameters]
+    rows = [(*map(float, v), *point.values.values()) for v, point in zip(front.values, front.points, strict=True)]
+    head = f"[bold]{escape(first.model.name)}[/]  front of {len(rows)} designs, {front.runs} runs"
+    return Group(head, "", table("front", *titles, rows=rows), *map(escape, front.notes))

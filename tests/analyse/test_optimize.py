@@ -1,0 +1,166 @@
+"""Best designs against closed forms."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modelica_like import build, load, optimize
+from modelica_like.analyse.optimize.result import Front, Optimum
+from modelica_like.netlist import loads
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DIRECT = EXAMPLES / "machine_table_direct.toml"
+W, LOAD = 200.0 * math.pi, 15.0
+J = 0.004 + 0.016 + 500.0 * (0.015 / (2.0 * math.pi)) ** 2
+"""Speed, load and inertia of document 000: the clutch locks after J W / (M - LOAD)."""
+CAPACITY = {"clutch.capacity": ["40 N.m", "300 N.m"]}
+# A mass of 1 kg is moved by 1 m in 2 s, from rest to rest.
+MOVED = """
+[parts]
+profile = { is = "Table", table = [[0, 0], [2, 0]] }
+drive = { is = "Force" }
+mass = { is = "Mass", m = "1 kg", s = 0, v = 0 }
+[series]
+a = ["drive", "mass"]
+[connect]
+f = ["profile.y", "drive.f"]
+[simulate]
+until = "2 s"
+"""
+# The share of two signals that peak at different times.
+SHARED = """
+[parameters]
+share = 0.2
+[parts]
+early = { is = "Table", table = [[0, 0], [0.2, 1], [0.4, 0], [1, 0]], scale = "share" }
+late = { is = "Table", table = [[0, 0], [0.5, 0], [0.6, 2], [0.7, 0], [1, 0]], scale = "1 - share" }
+drive = { is = "Torque" }
+wheel = { is = "Inertia", J = 1, phi = 0, w = 0 }
+[series]
+a = ["drive", "wheel"]
+[connect]
+e = ["early.y", "drive.tau"]
+[simulate]
+until = "1 s"
+"""
+
+
+def optimum(*arguments: object, **more: object) -> Optimum:
+    result = optimize(*arguments, **more)  # type: ignore[arg-type]
+    assert isinstance(result, Optimum)
+    return result
+
+
+def capacity(time: float, load: float = LOAD) -> float:
+    """Return the torque that locks the clutch of document 000 in a time."""
+    return J * W / time + load
+
+
+def test_the_least_clutch_that_locks_in_time() -> None:
+    """M = J W / t + LOAD; a longer time t lowers it by J W / t²."""
+    best = optimum(DIRECT, minimize="clutch.capacity", free=CAPACITY, subject_to="clutch.lock_time <= 0.25 s")
+    assert best.feasible
+    assert best.optimal
+    assert best["clutch.capacity"] == pytest.approx(capacity(0.25), rel=1e-6)
+    (limit,) = best.limits
+    assert limit.value == pytest.approx(0.25, rel=1e-6)
+    assert limit.price == pytest.approx(-J * W / 0.25**2, rel=1e-4)
+    assert "with 1 s more, clutch.capacity changes by" in str(best)
+
+
+def test_the_worst_load_case_counts() -> None:
+    cases = [{"name": "light", "load_torque": 5.0}, {"name": "heavy", "load_torque": "25 N.m"}]
+    best = optimum(
+        DIRECT, minimize="clutch.capacity", free=CAPACITY, subject_to="clutch.lock_time <= 0.25 s", cases=cases
+    )
+    assert best["clutch.capacity"] == pytest.approx(capacity(0.25, 25.0), rel=1e-6)
+    assert [limit.price != 0.0 for limit in best.limits] == [False, True]
+
+
+def test_the_largest_load() -> None:
+    """With a clutch of 100 N.m, it is what J W / 0.3 s leaves."""
+    drive = load(DIRECT)
+    drive.set("clutch_torque", "100 N.m")
+    best = optimum(drive, maximize="load_torque", free={"load_torque": [1, 80]}, subject_to="clutch.lock_time <= 0.3 s")
+    assert best["load_torque"] == pytest.approx(100.0 - J * W / 0.3, rel=1e-6)
+
+
+def test_the_least_energy_of_a_motion() -> None:
+    """The force falls linearly, F = 3/2 (1 - t), and the integral of its square is 12/8."""
+    free = {"profile.table": {"points": 5, "from": -5, "to": 5}}
+    best = optimum(
+        loads(MOVED),
+        minimize="integral(profile.y*profile.y)",
+        free=free,
+        subject_to=["mass.s == 1 m", "mass.v == 0 m/s"],
+    )
+    assert best.objectives[0].value == pytest.approx(1.5, rel=1e-6)
+    np.testing.assert_allclose(list(best.values.values()), [1.5, 0.75, 0.0, -0.75, -1.5], atol=1e-3)
+
+
+def test_a_peak_that_jumps_from_one_time_to_another() -> None:
+    """The peaks are `share` and 2 (1 - share): their largest is least where both are 2/3."""
+    best = optimum(loads(SHARED), minimize="peak(early.y + late.y)", free={"share": [0.05, 0.95]})
+    assert best["share"] == pytest.approx(2.0 / 3.0, abs=1e-5)
+
+
+def test_limits_that_cannot_be_met_are_exceeded_least() -> None:
+    """The excesses of both limits are the same, each relative to the size of its output."""
+    limits = ["clutch.lock_time <= 0.1 s", "clutch.capacity <= 100 N.m"]
+    best = optimum(DIRECT, minimize="clutch.loss_energy", free=CAPACITY, subject_to=limits)
+    assert not best.feasible
+    assert [limit.broken for limit in best.limits] == [True, True]
+    time, torque = (limit.value for limit in best.limits)
+    first = J * W / (capacity(0.2) - LOAD)
+    assert (time - 0.1) / first == pytest.approx((torque - 100.0) / 100.0, rel=1e-3)
+    assert "cannot all be met" in str(best)
+
+
+def test_a_front_of_two_objectives() -> None:
+    """The friction work is M W t / 2 with M = J W / t + LOAD, so it grows with the time."""
+    front = optimize(
+        DIRECT, minimize=["clutch.lock_time", "clutch.capacity"], free={"clutch.capacity": [60, 200]}, points=6
+    )
+    assert isinstance(front, Front)
+    time, torque = front.values.T
+    np.testing.assert_allclose(torque, J * W / time + LOAD, rtol=1e-6)
+    assert len(time) == 6
+    assert np.all(np.diff(time) > 0)
+    np.testing.assert_allclose(np.diff(torque), -28.0, rtol=1e-3)
+
+
+def test_what_is_chosen_is_tried() -> None:
+    drive = load(DIRECT)
+    drive.set("clutch_torque", "100 N.m")
+    best = optimum(
+        drive, minimize="clutch.lock_time", free={"load_torque": ["15 N.m", "16 N.m"]},
+        choose={"spindle_inertia": [0.016, 0.02, 0.008]},
+    )  # fmt: skip
+    assert best.chosen == {"spindle_inertia": 0.008}
+    assert len(best.combinations) == 3
+
+
+def test_rows_of_a_table_and_the_netlist_of_the_best(tmp_path: Path) -> None:
+    (tmp_path / "hubs.csv").write_text("name,J\nlarge,0.01\nsmall,0.001\n")
+    text = DIRECT.read_text().replace('sizing = "sizing/machine_table.toml"\n', "")
+    section = """
+[optimize]
+minimize = "clutch.loss_energy"
+free = { "clutch.capacity" = ["40 N.m", "300 N.m"] }
+choose = { hub = "hubs.csv" }
+subject_to = ["clutch.tau <= 15.1 N.m", "clutch.lock_time >= 0.1 s"]
+"""
+    path = tmp_path / "table.toml"
+    path.write_text(text + section)
+    best = optimum(path)
+    assert best.chosen == {"hub": "small"}
+    inertia = J - 0.004 + 0.001
+    assert best["clutch.capacity"] == pytest.approx(inertia * W / 0.1 + LOAD, rel=1e-6)
+    best.save(tmp_path / "best.toml")
+    again = build(load(tmp_path / "best.toml"))
+    assert again.p[again.parameter_position["clutch.capacity"]] == pytest.approx(best["clutch.capacity"])
+    assert again.p[again.parameter_position["hub.J"]] == pytest.approx(0.001)
