@@ -17,7 +17,8 @@ MORE = {
     "simulate": ("plots.md", "pictures"),
     "report": ("reports.md", "reports"), "explore": ("explore.md", "explore"), "modes": ("analysis.md", "analysis"),
     "steady": ("analysis.md", "analysis"), "sweep": ("how_to/sweep.md", "sweeps"),
-    "sensitivity": ("sensitivities.md", "sensitivities"), "size": ("sizing.md", "design checks"),
+    "sensitivity": ("sensitivities.md", "sensitivities"),
+    "optimize": ("how_to/optimise.md", "optimisation"), "size": ("sizing.md", "design checks"),
     "export": ("fmu.md", "FMUs"), "runtimes": ("fmu.md", "FMUs"), "validate": ("importers.md", "importers"),
     "split": ("cosimulation.md", "co-simulation"), "cosim": ("cosimulation.md", "co-simulation"),
 }  # fmt: skip

@@ -85,7 +85,30 @@ def _sections() -> dict[str, Any]:
         "simulate": _simulate(),
         "sizing": {**_TEXT, "description": "sizing file, whose checks stand in reports"},
         "display": _map(_TEXT, units, {"speed": "rpm", "*.phi": "deg"}),
+        "optimize": _optimize(),
     }
+
+
+def _optimize() -> dict[str, Any]:
+    texts = {"anyOf": [_TEXT, {"type": "array", "items": _TEXT, "minItems": 1}]}
+    tables = {"type": "array", "items": {"type": "object"}, "minItems": 1}
+    limits = {**texts, "description": "limits of outputs", "examples": [["clutch.lock_time <= 0.4 s"]]}
+    files = "values to try by path, or a CSV table of kinds of a part"
+    properties = {
+        "minimize": {
+            **texts,
+            "description": "output that is to be small; of two, a front",
+            "examples": ["peak(a.tau)"],
+        },
+        "maximize": {**texts, "description": "output that is to be large"},
+        "free": {"type": "object", "description": "bounds by path", "examples": [{"clutch.capacity": [20, 120]}]},
+        "choose": {"type": "object", "description": files, "examples": [{"motor": "motors.csv"}]},
+        "subject_to": limits,
+        "for": {**tables, "description": "load cases: other values of parameters, and a name"},
+        "starts": {**_COUNT, "description": "starts of the search"},
+        "points": {**_COUNT, "description": "designs of a front"},
+    }
+    return {"type": "object", "description": "the best design", "additionalProperties": False, "properties": properties}
 
 
 def _simulate() -> dict[str, Any]:

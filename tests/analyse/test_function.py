@@ -1,6 +1,5 @@
 """A simulation as a CasADi function: derivatives, second derivatives, the check of the mode sequence, two designs."""
 
-import runpy
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -112,31 +111,3 @@ def test_any_sequence_goes_on() -> None:
 def test_a_series_is_no_output() -> None:
     with pytest.raises(LanguageError, match="is a trajectory"):
         simulation_function(EXAMPLES / "machine_table_direct.toml", ["load_torque"], ["series(table.s)"])
-
-
-@pytest.mark.slow
-def test_engagement_profile_with_ipopt() -> None:
-    design = runpy.run_path(str(EXAMPLES / "design" / "engagement_profile.py"))["design"]
-    first, best = design(600.0)
-    assert best.work <= 600.0 * (1 + 1e-6)
-    assert best.lock_time <= 0.4 * (1 + 1e-6)
-    assert best.peak < 0.6 * first.peak
-    # A force that never falls is best constant: its peak is the friction torque at standstill, with which it locks.
-    assert max(best.heights) - min(best.heights) < 1e-4
-
-
-def test_gear_and_flywheel_with_ipopt() -> None:
-    example = runpy.run_path(str(EXAMPLES / "design" / "gear_and_flywheel.py"))
-    first, best = example["design"](20.0, 0.8)
-    assert first.stored < 20.0
-    # Energy at the largest speed of the clutch: J w²/2 with the pulley of 3e-5 kg.m2.
-    assert best.disc == pytest.approx(2 * 20.0 / (50 * pi) ** 2 - 3e-5, rel=1e-5)
-    assert best.speed == pytest.approx(50 * pi, rel=1e-6)
-    assert best.lock_time <= 0.8
-    # No neighbour that keeps the limits needs less.
-    function = simulation_function(
-        load(example["NETLIST"]), example["INPUTS"], example["OUTPUTS"], until="1 s", any_sequence=True
-    )
-    for ratio, disc in ((0.97, 1.0), (1.03, 1.0), (1.0, 0.97), (1.0, 1.03), (1.03, 1.05)):
-        supply, stored, lock_time, _, speed = np.array(function([ratio * best.ratio, disc * best.disc])).ravel()
-        assert supply > best.supply or stored < 20.0 or lock_time > 0.8 or speed > 50 * pi

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modelica_like import build, load, optimize
+from modelica_like import build, load, optimize, simulation_function
 from modelica_like.analyse.optimize.result import Front, Optimum
 from modelica_like.netlist import loads
 
@@ -164,3 +164,30 @@ subject_to = ["clutch.tau <= 15.1 N.m", "clutch.lock_time >= 0.1 s"]
     again = build(load(tmp_path / "best.toml"))
     assert again.p[again.parameter_position["clutch.capacity"]] == pytest.approx(best["clutch.capacity"])
     assert again.p[again.parameter_position["hub.J"]] == pytest.approx(0.001)
+
+
+@pytest.mark.slow
+def test_engagement_profile() -> None:
+    best = optimum(EXAMPLES / "design" / "engagement_profile.toml")
+    peak, *_ = best.objectives
+    work, time = best.limits
+    assert work.value <= 600.0 * (1 + 1e-6)
+    assert time.value <= 0.4 * (1 + 1e-6)
+    assert peak.value < 0.6 * peak.before
+    # A force that never falls is best constant: its peak is the friction torque at standstill, with which it locks.
+    assert np.ptp([*best.values.values()]) < 1e-4
+
+
+def test_gear_and_flywheel() -> None:
+    best = optimum(EXAMPLES / "design" / "gear_and_flywheel.toml")
+    # Energy at the largest speed of the clutch: J w²/2 with the pulley of 3e-5 kg.m2.
+    assert best["bench.disc"] == pytest.approx(2 * 20.0 / (50 * math.pi) ** 2 - 3e-5, rel=1e-5)
+    assert best["bench.flywheel.w"] == pytest.approx(50 * math.pi, rel=1e-6)
+    # No neighbour that keeps the limits needs less.
+    inputs = ["bench.ratio", "bench.disc"]
+    outputs = [best.objectives[0].name, *(limit.name for limit in best.limits)]
+    function = simulation_function(EXAMPLES / "design" / "gear_and_flywheel.toml", inputs, outputs, any_sequence=True)
+    for ratio, disc in ((0.97, 1.0), (1.03, 1.0), (1.0, 0.97), (1.0, 1.03), (1.03, 1.05)):
+        x = [ratio * best["bench.ratio"], disc * best["bench.disc"]]
+        supply, stored, lock_time, speed = np.array(function(x)).ravel()
+        assert supply > best.objectives[0].value or stored < 20.0 or lock_time > 0.8 or speed > 50 * math.pi

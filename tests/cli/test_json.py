@@ -20,6 +20,7 @@ TABLES = {
     "steady": ([str(EXAMPLES / "dc_bench_motor.toml")], {"powers", "values"}),
     "sweep": ([DRIVE, "--over", "h1=5,10", "--of", "clutch.lock_time", "--processes", "1"], {"extremes"}),
     "sensitivity": ([DRIVE, "--of", "clutch.lock_time", "--to", "h1"], {"clutch.lock_time"}),
+    "optimize": ([str(EXAMPLES / "design" / "gear_and_flywheel.toml")], {"free", "outputs"}),
     "runtimes": ([], {"run-times"}),
     "describe": (["Clutch"], {"connectors", "parameters", "modes", "equations", "events", "where"}),
     "library": ([], {"types"}),

@@ -83,6 +83,8 @@ def optimize(
     number = starts or written.get("starts", 1)
     if not choices:
         return _Study(drive, question, seed).best(number, points or written.get("points", _POINTS))
+    if len(question.minimize) + len(question.maximize) > 1:
+        raise ValueOutOfRange("A choice needs one objective.", advice="Limit the other one by subject_to.")
     if not isinstance(drive, Component):
         raise LanguageError(
             "A compiled model has nothing to choose.", advice="Give the netlist or the component itself."
@@ -258,9 +260,8 @@ def _best_choice(
         except ModelicaLikeError as error:
             failures.append((choice, error))
             continue
-        if isinstance(result, Front):
-            raise ValueOutOfRange("A choice needs one objective.", advice="Limit the other one by subject_to.")
-        results.append((choice, result))
+        if isinstance(result, Optimum):
+            results.append((choice, result))
     if not results:
         raise failures[0][1]
     sign = 1.0 if question.minimize else -1.0

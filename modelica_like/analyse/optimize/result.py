@@ -27,8 +27,17 @@ _AT_BOUND = 1e-6
 """Distance from a bound, relative to that of both: at it."""
 
 
+class _InUnit:
+    unit: Unit
+
+    @property
+    def unit_text(self) -> str:
+        """The unit as text; empty for plain numbers."""
+        return "" if (shown := str(self.unit)) in ("1", "*") else shown
+
+
 @dataclass(frozen=True)
-class Chosen:
+class Chosen(_InUnit):
     """A free parameter with its bounds, its value before and the best one, in SI units."""
 
     name: str
@@ -46,7 +55,7 @@ class Chosen:
 
 
 @dataclass(frozen=True)
-class Measured:
+class Measured(_InUnit):
     """An objective or a limited output in a load case, in SI units.
 
     Attributes:
@@ -156,12 +165,13 @@ class Optimum(Shown):
     def sentences(self) -> list[str]:
         """Return what holds the design back, what that costs, and notes."""
         objective = self.objectives[0]
-        sentences = [
-            f"'{limit.text}' is active{limit.within}: with 1 {limit.unit} more, {objective.name} changes by "
-            f"{limit.price:+.4g} {objective.unit}."
-            for limit in self.limits
-            if limit.price and not limit.broken
-        ]
+        sentences: list[str] = []
+        for limit in self.limits:
+            if limit.price and not limit.broken:
+                more, change = limit.unit_text or "unit", f"{limit.price:+.4g} {objective.unit_text}".rstrip()
+                sentences.append(
+                    f"'{limit.text}' is active{limit.within}: with 1 {more} more, {objective.name} changes by {change}."
+                )
         ends = {end: [p.name for p in self.parameters if p.at_bound == end] for end in ("lower", "upper")}
         sentences += [f"At the {end} bound: {', '.join(names)}." for end, names in ends.items() if names]
         return [*sentences, *self.notes]
@@ -176,7 +186,7 @@ class Optimum(Shown):
             axes.plot(tried[within], values[within], "o", markersize=4, color=COLOURS[0], label="within all limits")
             axes.plot(tried[~within], values[~within], "x", markersize=5, color=COLOURS[1], label="exceeds a limit")
             axes.set_xlabel("design")
-            axes.set_ylabel(" ".join(filter(None, [objective.name, f"in {objective.unit}"])))
+            axes.set_ylabel(" ".join(filter(None, [objective.name, f"in {objective.unit_text}"])))
             axes.legend(loc="best")
         return figure
 
@@ -191,7 +201,7 @@ class Optimum(Shown):
         for row in (*self.objectives, *self.limits):
             limit = "" if np.isnan(row.limit) else f"  ({row.text})"
             case = f"  [{row.case}]" if row.case else ""
-            lines.append(f"  {row.name:{width}}  {row.before:12.6g} → {row.value:12.6g} {row.unit}{limit}{case}")
+            lines.append(f"  {row.name:{width}}  {row.before:12.6g} → {row.value:12.6g} {row.unit_text}{limit}{case}")
         return "\n".join([*lines, *self.sentences()])
 
 
@@ -221,12 +231,12 @@ class Front(Shown):
 
     def plot(self) -> Figure:
         """Draw the front."""
-        units = {row.name: str(row.unit) for row in self.points[0].objectives}
+        units = {row.name: row.unit_text for row in self.points[0].objectives}
         title = f"{self.points[0].model.name}: front of {len(self.points)} designs"
         with picture(title, 1, 4.2) as (figure, (axes,)):
             axes.plot(*self.values.T, "o-", markersize=4, color=COLOURS[0])
             for name, label in zip(self.names, (axes.set_xlabel, axes.set_ylabel), strict=True):
-                label(f"{name} in {units[name]}")
+                label(f"{name} in {units[name]}" if units[name] else name)
         return figure
 
     def __str__(self) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import UnitError, ValueOutOfRange
+from modelica_like.errors import UnitError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import ONE, Unit, read_quantity, same_dimension, to_si
 from modelica_like.runs.calls import call_of
 from modelica_like.runs.readings import Output, read_number
@@ -124,8 +124,11 @@ def _free(model: CompiledDae, name: str, bounds: Any) -> Free:
         raise ValueOutOfRange(
             f"{name}: the bounds must be two values, not {bounds!r}.", advice='Write ["20 N.m", "120 N.m"].'
         )
-    if name not in model.fixed_position:
+    if name in model.derived_position:
         model.with_parameters({name: 0.0})  # says why not
+    if name not in model.fixed_position:
+        near = did_you_mean(name, [*model.fixed_position, *model.derived_position]) or "."
+        raise UnknownName(f"{model.name} has no parameter '{name}'{near}")
     unit, value = model.units[name], model_value(model, name)
     low, high = (to_si(bound, unit, name) for bound in bounds)
     if not low < high:

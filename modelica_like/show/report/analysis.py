@@ -154,16 +154,20 @@ def optimum_report(result: Optimum | Front) -> RenderableType:
     """Return the best design: what is free before and after, objectives and limits, what a limit costs."""
     if not isinstance(result, Optimum):
         return _front(result)
-    free = [(p.name, p.before, p.value, str(p.unit), p.low, p.high) for p in result.parameters]
+    free = [(p.name, p.before, p.value, p.unit_text, p.low, p.high) for p in result.parameters]
+    measured = (*result.objectives, *result.limits)
+    cases = any(m.case for m in measured)
     rows = [
-        (m.name, m.case, m.before, m.value, str(m.unit), "" if np.isnan(m.limit) else m.text, "broken" * m.broken)
-        for m in (*result.objectives, *result.limits)
-    ]
+        (m.name, *([m.case] if cases else []), m.before, m.value, m.unit_text, "" if np.isnan(m.limit) else m.text,
+         "broken" * m.broken)
+        for m in measured
+    ]  # fmt: skip
     columns = "name", "before>.6g", "best>.6g", "unit", "from>.6g", "to>.6g"
     parts: list[RenderableType] = [f"[bold]{escape(result.model.name)}[/]  {result.runs} runs", ""]
     if result.chosen:
         parts += [table("chosen", "name", "value", rows=[(k, str(v)) for k, v in result.chosen.items()]), ""]
-    outputs = table("outputs", "name", "case", "before>.6g", "best>.6g", "unit", "limit", "", rows=rows)
+    case = ["case"] if cases else []
+    outputs = table("outputs", "name", *case, "before>.6g", "best>.6g", "unit", "limit", "", rows=rows)
     parts += [table("free", *columns, rows=free), "", outputs, ""]
     parts += [escape(sentence) for sentence in result.sentences()]
     return Group(*parts)
@@ -171,9 +175,9 @@ def optimum_report(result: Optimum | Front) -> RenderableType:
 
 def _front(front: Front) -> RenderableType:
     first = front.points[0]
-    units = [str(first.objectives[[m.name for m in first.objectives].index(name)].unit) for name in front.names]
-    titles = [f"{name} in {unit}>.6g" for name, unit in zip(front.names, units, strict=True)]
-    titles += [f"{p.name} in {p.unit}>.6g" for p in first.parameters]
+    units = {m.name: m.unit_text for m in first.objectives} | {p.name: p.unit_text for p in first.parameters}
+    names = [*front.names, *(p.name for p in first.parameters)]
+    titles = [f"{name} in {units[name]}>.6g" if units[name] else f"{name}>.6g" for name in names]
     rows = [(*map(float, v), *point.values.values()) for v, point in zip(front.values, front.points, strict=True)]
     head = f"[bold]{escape(first.model.name)}[/]  front of {len(rows)} designs, {front.runs} runs"
     return Group(head, "", table("front", *titles, rows=rows), *map(escape, front.notes))

@@ -1,0 +1,289 @@
+# ruff: noqa: E501 messages stand here as they are told
+"""What is said where an optimisation is not asked for rightly."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from modelica_like import build, optimize
+from modelica_like.analyse.sweeps.ranges import read_bounds
+from modelica_like.errors import LanguageError, ModelicaLikeError, NetlistError, UnitError, UnknownName, ValueOutOfRange
+from modelica_like.netlist import loads
+
+D = Path(__file__).parents[2] / "examples" / "machine_table_direct.toml"
+F = {"clutch.capacity": ["40 N.m", "300 N.m"]}
+M: dict[str, Any] = {"minimize": "clutch.lock_time"}
+MOVED = """
+[parts]
+profile = { is = "Table", table = [[0, 0], [2, 0]] }
+drive = { is = "Force" }
+mass = { is = "Mass", m = "1 kg", s = 0, v = 0 }
+[series]
+a = ["drive", "mass"]
+[connect]
+f = ["profile.y", "drive.f"]
+[simulate]
+until = "2 s"
+"""
+TEXT = """
+[parts]
+wheel = { is = "Inertia", J = "2 kg.m2", phi = 0, w = "50 rad/s" }
+brake = { is = "Brake", capacity = "20 N.m" }
+[series]
+drive = ["wheel", "brake"]
+[simulate]
+until = "20 s"
+[optimize]
+"""
+FREE = 'minimize = "brake.lock_time"\nfree = { "brake.capacity" = ["5 N.m", "100 N.m"] }\n'
+
+
+CALLS: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
+    "nothing is free": (
+        ValueOutOfRange,
+        lambda: optimize(D, **M),
+        """An optimisation needs something that is free.
+Give a parameter and its bounds: free = { "clutch.capacity" = ["20 N.m", "120 N.m"] }.""",
+    ),
+    "no objective": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F),
+        """An optimisation needs an objective.
+Say what is to be small: minimize = "peak(shaft.tau)".""",
+    ),
+    "one bound": (
+        ValueOutOfRange,
+        lambda: optimize(D, free={"clutch.capacity": "40 N.m"}, **M),
+        """clutch.capacity: the bounds must be two values, not '40 N.m'.
+Write ["20 N.m", "120 N.m"].""",
+    ),
+    "bounds the wrong way round": (
+        ValueOutOfRange,
+        lambda: optimize(D, free={"clutch.capacity": [60, 40]}, **M),
+        """clutch.capacity: the lower bound 60 is not below the upper bound 40.""",
+    ),
+    "a start outside the bounds": (
+        ValueOutOfRange,
+        lambda: optimize(D, free={"clutch.capacity": [40, 60]}, **M),
+        """clutch.capacity = 86.7843 N.m is not between its bounds 40 and 60.
+An optimisation begins with the drive as it is.
+Widen the bounds, or give the drive a value between them.""",
+    ),
+    "the unit of a bound": (
+        UnitError,
+        lambda: optimize(D, free={"clutch.capacity": ["40 kg", "60 N.m"]}, **M),
+        """clutch.capacity expects N.m; '40 kg' is kg.""",
+    ),
+    "a name": (
+        UnknownName,
+        lambda: optimize(D, free={"clutch.capacty": [40, 60]}, **M),
+        """machine_table_direct has no parameter 'clutch.capacty'; did you mean 'clutch.capacity'?""",
+    ),
+    "no relation": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, subject_to="clutch.lock_time", **M),
+        """'clutch.lock_time' is no limit: it compares nothing.
+Write "clutch.lock_time <= 0.4 s", with <=, >= or ==.""",
+    ),
+    "a limit without a unit": (
+        UnitError,
+        lambda: optimize(D, free=F, subject_to="clutch.lock_time <= 0.4", **M),
+        """'clutch.lock_time <= 0.4' compares a value in s with a number without a unit.
+Write "clutch.lock_time <= 0.4 s".""",
+    ),
+    "the unit of a limit": (
+        UnitError,
+        lambda: optimize(D, free=F, subject_to="clutch.lock_time <= 0.4 N", **M),
+        """clutch.lock_time expects s; '0.4 N' is N.""",
+    ),
+    "the name of a limit": (
+        UnknownName,
+        lambda: optimize(D, free=F, subject_to="clutch.lock_tim <= 0.4 s", **M),
+        """machine_table_direct has no variable 'clutch.lock_tim'; did you mean 'clutch.lock_time'?
+Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(…), at(…, time), first(… > …), duration(mode: name), series(…), time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time.""",
+    ),
+    "three objectives": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, minimize=["clutch.lock_time", "clutch.tau", "table.s"]),
+        """There may be one objective, or two for a front.
+Limit the others by subject_to.""",
+    ),
+    "the largest of different things": (
+        UnitError,
+        lambda: optimize(D, free=F, minimize="max(peak(clutch.tau), clutch.lock_time)"),
+        """'max(peak(clutch.tau), clutch.lock_time)' compares N.m with s.""",
+    ),
+    "free and given": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, cases=[{"name": "cold", "clutch.capacity": 20}], **M),
+        """clutch.capacity is free, and has a value in the load case 'cold'.
+Leave out one of the two.""",
+    ),
+    "the name in a load case": (
+        UnknownName,
+        lambda: optimize(D, free=F, cases=[{"name": "cold", "oil.T": 20}], **M),
+        """machine_table_direct has no parameter 'oil.T'.""",
+    ),
+    "a table of a compiled model": (
+        LanguageError,
+        lambda: optimize(build(D), free={"motor.table": {"points": 3, "from": 0, "to": 1}}, **M),
+        """Tables of a compiled model cannot be free.
+Give the netlist or the component itself.""",
+    ),
+    "no table": (
+        UnknownName,
+        lambda: optimize(D, free={"motor.table": {"points": 3, "from": 0, "to": 1}}, **M),
+        """machine_table_direct has no table 'motor.table'.""",
+    ),
+    "a trajectory": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, minimize="series(clutch.tau)"),
+        """series(clutch.tau) is a trajectory, not a number.
+Take it from the results.""",
+    ),
+    "no file": (
+        NetlistError,
+        lambda: optimize(D, free=F, choose={"hub": "hubs.csv"}, **M),
+        """choose: the table 'hubs.csv' for hub does not exist.
+Its place is beside the netlist; write a list for values of one parameter.""",
+    ),
+    "too many combinations": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, choose={"hub.J": [*range(1, 300)]}, **M),
+        """There are 299 combinations of what is chosen, more than 200.
+Choose among fewer, in several steps.""",
+    ),
+    "choices of a compiled model": (
+        LanguageError,
+        lambda: optimize(build(D), free=F, choose={"hub.J": [1]}, **M),
+        """A compiled model has nothing to choose.
+Give the netlist or the component itself.""",
+    ),
+    "the name of an entry": (
+        UnknownName,
+        lambda: optimize(loads(TEXT + 'minimise = "brake.tau"')),
+        """[optimize] has no 'minimise'; did you mean 'minimize'? It has minimize, maximize, free, choose, subject_to, for, starts, points.
+  in netlist.toml:10 `minimise = "brake.tau"`""",
+    ),
+    "an objective that is a number": (
+        NetlistError,
+        lambda: optimize(loads(TEXT + "minimize = 3")),
+        """optimize.minimize must be a text or a list of texts, such as "max(shaft.tau)".
+  in netlist.toml:10 `minimize = 3`""",
+    ),
+    "one bound in a netlist": (
+        NetlistError,
+        lambda: optimize(loads(TEXT + 'minimize = "brake.lock_time"\nfree = { "brake.capacity" = "40 N.m" }')),
+        """optimize.free.brake.capacity must be the lower and the upper bound.
+  in netlist.toml:11 `free = { "brake.capacity" = "40 N.m" }`
+Write ["20 N.m", "120 N.m"], or of a table { points = 12, from = "0 N", to = "9 kN" }.""",
+    ),
+    "the name of a limit in a netlist": (
+        UnknownName,
+        lambda: optimize(loads(TEXT + FREE + 'subject_to = ["brake.lock_tim <= 1 s"]')),
+        """netlist has no variable 'brake.lock_tim'; did you mean 'brake.lock_time'?
+  in netlist.toml:12 `subject_to = ["brake.lock_tim <= 1 s"]`
+Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(…), at(…, time), first(… > …), duration(mode: name), series(…), time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time.""",
+    ),
+    "load cases that are no list": (
+        NetlistError,
+        lambda: optimize(loads(TEXT + FREE + 'for = { "wheel.J" = 3 }')),
+        """optimize.for must be a list of load cases.
+  in netlist.toml:12 `for = { "wheel.J" = 3 }`
+Write [{ name = "cold", "oil.T" = "-20 degC" }].""",
+    ),
+    "choices that are no list": (
+        NetlistError,
+        lambda: optimize(loads(TEXT + FREE + 'choose = { "wheel.J" = 3 }')),
+        """optimize.choose.wheel.J must be a list of values, or the name of a table.
+  in netlist.toml:12 `choose = { "wheel.J" = 3 }`
+Write [2, 4, 6], or "motors.csv" with a column for each parameter.""",
+    ),
+    "no start": (
+        NetlistError,
+        lambda: optimize(loads(TEXT + "starts = 0")),
+        """optimize.starts = 0 must be a whole number from 1 to 10000.
+  in netlist.toml:10 `starts = 0`""",
+    ),
+    "an output that does not happen": (
+        UnknownName,
+        lambda: optimize(D, free={"clutch.capacity": [10, 300]}, until="0.1 s", **M),
+        """'clutch.lock_time' does not happen after the start of the run.
+clutch.mode does not change in this run.""",
+    ),
+    "no bounds of a profile": (
+        ValueOutOfRange,
+        lambda: optimize(loads(MOVED), minimize="mass.s", free={"profile.table": {"points": 3, "from": 0}}),
+        """free: profile.table needs `from` and `to`.
+Write { points = 12, from = "0 N", to = "9 kN", rising = true }.""",
+    ),
+    "an unknown entry of a profile": (
+        ValueOutOfRange,
+        lambda: optimize(
+            loads(MOVED), minimize="mass.s", free={"profile.table": {"from": 0, "to": 1, "monotone": True}}
+        ),
+        """free: profile.table has no 'monotone'.
+Write { points = 12, from = "0 N", to = "9 kN", rising = true }.""",
+    ),
+    "no number of points": (
+        ValueOutOfRange,
+        lambda: optimize(loads(MOVED), minimize="mass.s", free={"profile.table": {"points": 1, "from": 0, "to": 1}}),
+        """free: profile.table: points = 1 must be a whole number from 2 to 100.""",
+    ),
+    "rows that there are not": (
+        ValueOutOfRange,
+        lambda: optimize(loads(MOVED), minimize="mass.s", free={"profile.table": {"rows": [3], "from": 0, "to": 1}}),
+        """free: profile.table: rows = [3] must be a list of row numbers from 1 to 2.""",
+    ),
+    "a front of one point": (
+        ValueOutOfRange,
+        lambda: optimize(loads(MOVED), minimize=["mass.s", "mass.v"], free={"mass.m": [0.5, 2]}, points=1),
+        """A front needs at least 2 points, not 1.""",
+    ),
+    "a front of choices": (
+        ValueOutOfRange,
+        lambda: optimize(
+            loads(MOVED), minimize=["mass.s", "mass.v"], free={"mass.m": [0.5, 2]}, choose={"profile.scale": [1]}
+        ),
+        """A choice needs one objective.
+Limit the other one by subject_to.""",
+    ),
+    "no netlist to save": (
+        LanguageError,
+        lambda: optimize(build(D), minimize="clutch.lock_time", free={"load_torque": [10, 20]}).save("best.toml"),
+        """Only a drive of a netlist can be saved as one.
+The values are in `values`, the model in `model`.""",
+    ),
+    "no pair of numbers": (
+        ValueOutOfRange,
+        lambda: read_bounds("clutch.capacity=20"),
+        """'clutch.capacity=20': '20' is not LOW:HIGH.
+Write for example 'clutch.capacity=20:120 N.m'.""",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_message(check_message: Callable[..., None], name: str) -> None:
+    check_message(*CALLS[name])
+
+
+TABLES = {
+    "nothing": ("", "choose: 'hubs.csv' has no column of a parameter."),
+    "no row": ("name,J\n", "choose: 'hubs.csv' has no row."),
+    "a line that is too long": ("name,J\nsmall,1,2\n", "choose: a line of 'hubs.csv' has 3 cells, its first line 2."),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_of_kinds(tmp_path: Path, name: str) -> None:
+    text, message = TABLES[name]
+    (tmp_path / "hubs.csv").write_text(text)
+    path = tmp_path / "drive.toml"
+    path.write_text(TEXT + FREE + 'choose = { wheel = "hubs.csv" }\n')
+    with pytest.raises(NetlistError) as caught:
+        optimize(path)
+    assert caught.value.what == message
+    assert "hubs.csv" in str(caught.value)
