@@ -70,6 +70,7 @@ def test_the_least_clutch_that_locks_in_time() -> None:
     assert limit.value == pytest.approx(0.25, rel=1e-6)
     assert limit.price == pytest.approx(-J * W / 0.25**2, rel=1e-4)
     assert "with 1 s more, clutch.capacity changes by" in str(best)
+    assert best.history[0, 0] == pytest.approx(capacity(0.2), rel=1e-6)
 
 
 def test_the_worst_load_case_counts() -> None:

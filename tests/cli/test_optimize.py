@@ -36,6 +36,13 @@ def test_a_front_is_drawn_and_is_no_netlist(tmp_path: Path) -> None:
     assert result.stderr.startswith("A front is no single design to write.")
 
 
+def test_one_design_may_be_the_best_in_both_objectives() -> None:
+    words = ["--minimize", "clutch.lock_time", "--minimize", "clutch.loss_energy", "--points", "3"]
+    result = called(["optimize", DIRECT, *words, "--free", "clutch.capacity=60:300 N.m"])
+    assert "front of 1 designs" in result.stdout
+    assert "This design is the best in both objectives." in result.stdout
+
+
 def test_a_wrong_bound_is_told() -> None:
     result = called(["optimize", DIRECT, "--minimize", "clutch.tau", "--free", "clutch.capacity=40"])
     assert result.exit_code == 2

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import io
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from unittest import mock
 
 from modelica_like.cli import run
 
@@ -21,9 +23,12 @@ class Called:
 
 
 def called(words: Sequence[str]) -> Called:
-    """Call `modelica-like` with words."""
+    """Call `modelica-like` with words, whatever the program is that runs the tests."""
     code, exception = 0, None
-    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as told:
+    with (
+        mock.patch.object(sys, "argv", ["modelica-like", *words]), contextlib.redirect_stdout(io.StringIO()) as out,
+        contextlib.redirect_stderr(io.StringIO()) as told,
+    ):  # fmt: skip
         try:
             run(words)
         except SystemExit as end:

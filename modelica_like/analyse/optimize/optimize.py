@@ -26,6 +26,8 @@ from modelica_like.simulation import Model, loaded, simulate
 from modelica_like.solve.initialize import StartKind
 
 _POINTS = 20
+_SAME = 1e-5
+"""Distance of two designs relative to the bounds: a design is known to about the root of the solver's tolerance."""
 _DIFFERENCE = 1e-3
 """Of an output of the design in a run by IDAS, relative: more is told."""
 
@@ -152,7 +154,9 @@ class _Study:
                 x = outcome.x
                 results.append(self.optimum(search, outcome))
         results.append(self.optimum(searches[1], ends[1]))
-        return Front(_different(results), self.runs.count)
+        designs = _different(results)
+        notes = () if len(designs) > 1 else ("This design is the best in both objectives.",)
+        return Front(designs, self.runs.count, notes)
 
     def optimum(self, search: Search, outcome: Outcome) -> Optimum:
         """Return a result with its names, checked by IDAS."""
@@ -161,7 +165,6 @@ class _Study:
         before = self.runs.at(problem.begin)
         after, notes = self._checked(values, self.runs.at(x))
         first = before.values if before is not None else np.full(after.shape, np.nan)
-        history = [(design.x, design.values) for design in self.runs.designs]
         return Optimum(
             problem.model.with_parameters(dict(values)),
             tuple(
@@ -170,7 +173,7 @@ class _Study:
             ),
             {}, self._objectives(first, after), self._limits(search, outcome, first, after),
             outcome.excess <= FEASIBLE, outcome.optimal, self.runs.count,
-            np.array([search.measures(numbers) for _, numbers in history]),
+            np.array([search.measures(design.values) for design in self.runs.designs]) * [search.aim_scale, 1.0],
             notes=(*notes, *self._remarks(outcome)), drive=self.drive if isinstance(self.drive, Component) else None,
         )  # fmt: skip
 
@@ -236,10 +239,12 @@ def _better(outcomes: Sequence[Outcome]) -> Outcome:
 
 
 def _different(points: Sequence[Optimum]) -> tuple[Optimum, ...]:
-    """Return designs without those that are the same as one before."""
+    """Return designs without those that are the same as the one before."""
     kept: list[Optimum] = []
     for point in points:
-        if not any(np.allclose([*point.values.values()], [*other.values.values()], rtol=1e-9) for other in kept):
+        free = np.array([(p.value - p.low) / (p.high - p.low) for p in point.parameters])
+        before = [(p.value - p.low) / (p.high - p.low) for p in kept[-1].parameters] if kept else [np.inf] * len(free)
+        if np.abs(free - before).max() > _SAME:
             kept.append(point)
     return tuple(kept)
 

@@ -82,6 +82,11 @@ class Search:
         self.sizes = sizes
         self.aim_size = float(sizes[self.aim[0]].max())
 
+    @property
+    def aim_scale(self) -> float:
+        """The objective in SI units over what is minimised."""
+        return float(self.aim_size * self.aim[1][0])
+
     def measures(self, values: Vector) -> tuple[float, float]:
         """Return the objective and the largest excess of values, shape (cases, outputs), both over their sizes."""
         places, signs, _ = self.aim
@@ -124,7 +129,9 @@ class Search:
         begin = (x - problem.low) / problem.span
         first = self.measures(self._values(x))[1 if elastic else 0]
         nlp = {"x": unknowns, "f": objective, "g": g}
-        solver = ca.nlpsol("design", "ipopt", nlp, {"ipopt": _OPTIONS, "print_time": False})
+        solver = ca.nlpsol(
+            "design", "ipopt", nlp, {"ipopt": _OPTIONS, "print_time": False, "show_eval_warnings": False}
+        )
         free_bound = [-np.inf if not elastic else 0.0] if bounded else []
         solved = solver(
             x0=[*begin, *([first] if bounded else [])], lbx=[0.0] * n + free_bound,
@@ -163,9 +170,8 @@ class Search:
 
     def _prices(self, multipliers: Vector) -> Vector:
         places, signs, _ = self.limits
-        of_aim = self.aim_size * self.aim[1][0]
         per_row = multipliers.reshape(len(self.problem.cases), len(places)) if places else np.zeros((1, 0))
-        return -per_row * signs * of_aim / self.sizes[places]
+        return -per_row * signs * self.aim_scale / self.sizes[places]
 
     def _polished(self, outcome: Outcome) -> Outcome:
         """Go on without derivatives."""

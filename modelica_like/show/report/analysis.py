@@ -176,8 +176,11 @@ def optimum_report(result: Optimum | Front) -> RenderableType:
 def _front(front: Front) -> RenderableType:
     first = front.points[0]
     units = {m.name: m.unit_text for m in first.objectives} | {p.name: p.unit_text for p in first.parameters}
-    names = [*front.names, *(p.name for p in first.parameters)]
+    names = list(dict.fromkeys([*front.names, *(p.name for p in first.parameters)]))
     titles = [f"{name} in {units[name]}>.6g" if units[name] else f"{name}>.6g" for name in names]
-    rows = [(*map(float, v), *point.values.values()) for v, point in zip(front.values, front.points, strict=True)]
+    rows = [
+        [{**point.values, **dict(zip(front.names, map(float, v), strict=True))}[name] for name in names]
+        for v, point in zip(front.values, front.points, strict=True)
+    ]
     head = f"[bold]{escape(first.model.name)}[/]  front of {len(rows)} designs, {front.runs} runs"
     return Group(head, "", table("front", *titles, rows=rows), *map(escape, front.notes))
