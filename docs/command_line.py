@@ -18,7 +18,8 @@ MORE = {
     "report": ("reports.md", "reports"), "explore": ("explore.md", "explore"), "modes": ("analysis.md", "analysis"),
     "steady": ("analysis.md", "analysis"), "sweep": ("how_to/sweep.md", "sweeps"),
     "sensitivity": ("sensitivities.md", "sensitivities"),
-    "optimize": ("how_to/optimise.md", "optimisation"), "size": ("sizing.md", "design checks"),
+    "optimize": ("how_to/optimise.md", "optimisation"), "tolerance": ("how_to/tolerances.md", "tolerances"),
+    "size": ("sizing.md", "design checks"),
     "export": ("fmu.md", "FMUs"), "runtimes": ("fmu.md", "FMUs"), "validate": ("importers.md", "importers"),
     "split": ("cosimulation.md", "co-simulation"), "cosim": ("cosimulation.md", "co-simulation"),
 }  # fmt: skip

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from modelica_like.analyse.sweeps.importance import importance as importance
     from modelica_like.analyse.sweeps.pictures import plot_sweep as plot_sweep
     from modelica_like.analyse.sweeps.sweep import sweep as sweep
+    from modelica_like.analyse.tolerance.tolerance import tolerance as tolerance
     from modelica_like.compile.compiled import CompiledDae as CompiledDae
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
     from modelica_like.fmi.cosimulation.run import cosim as cosim
@@ -100,6 +101,7 @@ _HOME = {
     "steady": "modelica_like.analyse.operating.steady",
     "step_metrics": "modelica_like.analyse.after.steps",
     "sweep": "modelica_like.analyse.sweeps.sweep",
+    "tolerance": "modelica_like.analyse.tolerance.tolerance",
     "validate_fmu": "modelica_like.fmi.validate",
 }
 

@@ -1,4 +1,4 @@
-"""Commands that analyse drives: small motions, operating points, sweeps, exact derivatives, best designs."""
+"""Commands that analyse drives: small motions, operating points, sweeps, derivatives, best designs, tolerances."""
 
 from __future__ import annotations
 
@@ -202,3 +202,34 @@ def optimize(
             )
         if output and isinstance(result, Optimum):
             result.save(output)
+
+
+def tolerance(
+    netlist: Netlist, assignments: Assignments = None, *,
+    of: Annotated[list[str] | None, Option(metavar="OUTPUT", help="Output, e.g. 'max(shaft.tau)'.")] = None,
+    scatter: Annotated[
+        list[str] | None, Option(metavar="NAME=TEXT", help="E.g. 'clutch.mu=±10 %' or 'm=normal(20 kg, 1 kg)'.")
+    ] = None,
+    subject_to: Annotated[
+        list[str] | None, Option(metavar="LIMIT", help="How probably is it broken? E.g. 'clutch.lock_time <= 0.4 s'.")
+    ] = None,
+    until: Until = None, start: Start = None,
+    shares: Annotated[bool, Option("--shares", help="Shares of the variance by Sobol's indices, too.")] = False,
+    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw histograms.")] = None,
+    json: Json = False, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Tell what tolerances do: [tolerances] of the netlist, or these options."""
+    with told(debug, json=json, pictures=[plot]) as page:
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.analyse.sweeps.ranges import by_name, read_assignment
+        from modelica_like.analyse.tolerance.tolerance import tolerance as find
+        from modelica_like.show.plot import save_plot
+        from modelica_like.show.report.analysis import tolerance_report
+
+        given = by_name(map(read_assignment, scatter), "--scatter") if scatter else None
+        result = find(
+            assembly, of or (), given, subject_to=subject_to or (), until=until, start=start, shares=shares,
+        )  # fmt: skip
+        page.print(tolerance_report(result))
+        if plot:
+            save_plot(result.plot(), plot)

@@ -150,6 +150,7 @@ class InsideAssembly(InsideComponent):
         origin: path of its file.
         sizing: path of its sizing file.
         optimize: what is optimised, as written in the netlist.
+        tolerances: how parameters scatter, as written there.
         places: in the netlist, by section and name.
         made: the call that created it.
     """
@@ -164,6 +165,7 @@ class InsideAssembly(InsideComponent):
     origin: str = ""
     sizing: str = ""
     optimize: dict[str, Any] = field(default_factory=_empty)
+    tolerances: dict[str, Any] = field(default_factory=_empty)
     places: dict[str, Source] = field(default_factory=_empty)
     made: Source = NOWHERE
 

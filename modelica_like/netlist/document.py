@@ -21,7 +21,7 @@ from modelica_like.errors import (
 )
 from modelica_like.language.units import parse_unit, to_si
 from modelica_like.netlist.locate import Lines, locate
-from modelica_like.netlist.optimization import OPTIMIZE
+from modelica_like.netlist.optimization import OPTIMIZE, tolerances
 
 _ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
@@ -49,6 +49,7 @@ class Document:
         display: units in which results are shown, by path, pattern or quantity.
         sizing: path of a sizing file, whose checks stand in reports.
         optimize: what is optimised, as written.
+        tolerances: how parameters scatter, by path.
     """
 
     lines: Lines
@@ -66,6 +67,7 @@ class Document:
     display: dict[str, str] = field(default_factory=dict)
     sizing: str = ""
     optimize: dict[str, Any] = field(default_factory=dict)
+    tolerances: dict[str, Any] = field(default_factory=dict)
 
 
 def read_text(path: Path) -> str:
@@ -370,4 +372,5 @@ _READERS: Mapping[str, Reader] = {
     "display": each(_unit_text, flat=True),
     "sizing": whole(as_text),
     "optimize": options(OPTIMIZE),
+    "tolerances": whole(tolerances),
 }

@@ -70,6 +70,7 @@ def _sections() -> dict[str, Any]:
     free = {"type": "array", "items": _TEXT, "description": "connectors left free on purpose"}
     chain = "chains of parts: the outlet of each is joined to the inlet of the next"
     values = "parameters of the drive: numbers, quantities or formulas of earlier ones"
+    scatter = "how parameters scatter: ranges, distributions, files of measured values"
     units = "units in which results are shown, by quantity, path or pattern"
     return {
         "name": {**_TEXT, "description": "name of the model; default: that of the file"},
@@ -86,6 +87,7 @@ def _sections() -> dict[str, Any]:
         "sizing": {**_TEXT, "description": "sizing file, whose checks stand in reports"},
         "display": _map(_TEXT, units, {"speed": "rpm", "*.phi": "deg"}),
         "optimize": _optimize(),
+        "tolerances": _map({"anyOf": [_TEXT, {"type": ["object", "array"]}]}, scatter, {"clutch.capacity": "±10 %"}),
     }
 
 

@@ -1,4 +1,4 @@
-"""The form of the section [optimize] of a netlist."""
+"""The form of the sections [optimize] and [tolerances] of a netlist."""
 
 from __future__ import annotations
 
@@ -70,3 +70,24 @@ OPTIMIZE: Mapping[str, Callable[[str, Any], Any]] = {
     "starts": _count, "points": _count,
 }  # fmt: skip
 """Checks of its entries."""
+
+
+def tolerances(key: str, value: Any) -> dict[str, Any]:
+    """Return [tolerances]: a text by path, and the list `correlated`.
+
+    Raises:
+        NetlistError: an entry is no text, or `correlated` no list of tables.
+    """
+    given = dict(value) if isinstance(value, dict) else value
+    pairs = given.pop("correlated", []) if isinstance(given, dict) else []
+    entries = _by_path(key, given)
+    for path, entry in entries.items():
+        if not isinstance(entry, str):
+            raise NetlistError(
+                f"{key}.{path} must be a text.", advice='Write "±10 %", "normal(20 N.m, 1 N.m)" or "uniform(1, 2)".'
+            )
+    if not isinstance(pairs, list) or not all(isinstance(table, dict) for table in pairs):
+        raise NetlistError(
+            f"{key}.correlated must be a list of tables.", advice='Write [{ of = ["a", "b"], rho = 0.8 }].'
+        )
+    return {**entries, **({"correlated": pairs} if pairs else {})}

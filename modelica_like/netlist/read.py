@@ -119,7 +119,8 @@ class _Loader:
         record.origin, record.simulate, record.display = str(chain[-1]), document.simulate, document.display
         if document.sizing:
             record.sizing = str(chain[-1].parent / document.sizing)
-        record.optimize = document.optimize
+        record.optimize, record.tolerances = document.optimize, document.tolerances
+        Assembly.place(assembly, "tolerances", document.lines.source("tolerances"))
         for key in document.optimize:
             Assembly.place(assembly, f"optimize.{key}", document.lines.source("optimize", key))
         task = _Task(document, assembly, chain, self)

@@ -67,6 +67,7 @@ class _Writer:
             "simulate": inside(assembly).simulate,
             "display": inside(assembly).display,
             "optimize": {key: _inline(_as_written(entry)) for key, entry in inside(assembly).optimize.items()},
+            "tolerances": {key: _inline(_as_written(entry)) for key, entry in inside(assembly).tolerances.items()},
         }
         top: dict[str, Any] = {"name": inside(assembly).name}
         if inside(assembly).description:

@@ -21,6 +21,7 @@ TABLES = {
     "sweep": ([DRIVE, "--over", "h1=5,10", "--of", "clutch.lock_time", "--processes", "1"], {"extremes"}),
     "sensitivity": ([DRIVE, "--of", "clutch.lock_time", "--to", "h1"], {"clutch.lock_time"}),
     "optimize": ([str(EXAMPLES / "design" / "gear_and_flywheel.toml")], {"free", "outputs"}),
+    "tolerance": ([DRIVE, "--of", "shaft1.tau", "--scatter", "h1=±5 %"], {"outputs", "shares to first order"}),
     "runtimes": ([], {"run-times"}),
     "describe": (["Clutch"], {"connectors", "parameters", "modes", "equations", "events", "where"}),
     "library": ([], {"types"}),

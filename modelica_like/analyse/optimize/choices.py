@@ -68,7 +68,8 @@ def _rows(path: str, file: Path) -> list[Choice]:
         with file.open(newline="", encoding="utf-8-sig") as stream:
             head, *rows = [row for row in csv.reader(stream) if any(cell.strip() for cell in row)] or [[]]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise NetlistError(f"choose: '{file.name}' cannot be read: {error}.", where=Source(str(file))) from None
+        why = error.strerror if isinstance(error, OSError) else error
+        raise NetlistError(f"choose: '{file.name}' cannot be read: {why}.", where=Source(str(file))) from None
     head = [name.strip() for name in head]
     columns = [k for k, name in enumerate(head) if name != "name"]
     if not rows or not columns:

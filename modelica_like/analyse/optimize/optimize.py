@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +15,7 @@ from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optim
 from modelica_like.analyse.optimize.runs import Runs
 from modelica_like.analyse.optimize.solve import FEASIBLE, Outcome, Search
 from modelica_like.analyse.optimize.terms import Row
+from modelica_like.analyse.written import placed
 from modelica_like.arguments import checked
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
@@ -91,7 +91,7 @@ def optimize(
         raise LanguageError(
             "A compiled model has nothing to choose.", advice="Give the netlist or the component itself."
         )
-    with _placed(drive, "choose"):
+    with placed(drive, "optimize.choose"):
         options = combinations(drive, choices)
     return _best_choice(drive, question, options, number, seed)
 
@@ -100,23 +100,12 @@ def _listed(texts: str | Sequence[str]) -> tuple[str, ...]:
     return (texts,) if isinstance(texts, str) else tuple(texts)
 
 
-@contextmanager
-def _placed(drive: Component | CompiledDae, key: str) -> Iterator[None]:
-    """Add the place in [optimize] to an error without one."""
-    try:
-        yield
-    except ModelicaLikeError as error:
-        source = drive.source_of(f"optimize.{key}") if isinstance(drive, Assembly) else None
-        error.where = error.where or ((source,) if source is not None and source.file else ())
-        raise
-
-
 class _Study:
     """One optimisation of one drive."""
 
     def __init__(self, drive: Component | CompiledDae, question: Question, seed: int) -> None:
         self.drive, self.seed = drive, seed
-        self.problem = make_problem(drive, question, lambda key: _placed(drive, key))
+        self.problem = make_problem(drive, question, lambda key: placed(drive, f"optimize.{key}"))
         self.runs = Runs(self.problem)
 
     def best(self, starts: int, points: int) -> Optimum | Front:
@@ -256,7 +245,7 @@ def _best_choice(
     failures: list[tuple[Choice, ModelicaLikeError]] = []
     for choice in options:
         variant = copy.deepcopy(drive)
-        with _placed(drive, "choose"):
+        with placed(drive, "optimize.choose"):
             for path, value in choice.values.items():
                 variant.set(path, value)
         try:

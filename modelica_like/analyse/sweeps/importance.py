@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
@@ -17,6 +17,8 @@ from modelica_like.simulation import Model
 Kind = Literal["sobol", "morris"]
 _LEVELS = 4
 _CONSTANT = 1e-9
+_LEAST_SHARE = 0.5
+"""Of the runs: with fewer, what is left is another question than the one asked."""
 _FEWEST = 2
 """Samples from which there is a scatter."""
 
@@ -82,7 +84,7 @@ def importance(
 
     Raises:
         UnknownName: a name is not known.
-        ValueOutOfRange: there are no parameters or too few samples, or runs failed or gave no number, so the measures
+        ValueOutOfRange: there are no parameters or too few samples, or so many runs gave no number that the measures
             are not defined.
         MissingExtra: SALib is not installed.
     """
@@ -90,34 +92,68 @@ def importance(
         raise ValueOutOfRange(
             "There is no parameter to rank.", advice='Give bounds by path: importance(…, {"shaft.c": (300, 500)}, …).'
         )
+    if method not in get_args(Kind):
+        raise UnknownName(f"There is no method '{method}'. There are sobol and morris.")
     if samples < _FEWEST:
         raise ValueOutOfRange(f"samples = {samples} must be at least {_FEWEST}: one sample has no scatter.")
+    notices: list[str] = []
+    failures: list[str] = []
+
+    def runs(cube: Any) -> Any:
+        results = sweep(drive, ranges, outputs, sampling=Samples(cube), **settings)
+        notices.append(results.attrs["notice"])
+        failures.extend(str(text) for text in results["failure"].to_numpy())
+        return np.column_stack([results[name].to_numpy() for name in outputs])
+
+    measures, count, notes = ranked(method, [*ranges], runs, outputs, seed, samples, failures)
+    notice = "\n".join(filter(None, [*notices, *notes]))
+    return Importance(method, tuple(ranges), tuple(outputs), measures, count, notice)
+
+
+def ranked(
+    method: Kind, names: Sequence[str], runs: Callable[[Any], Any], outputs: Sequence[str], seed: int,
+    samples: int = 256, failures: Sequence[str] = (),
+) -> tuple[dict[str, Any], int, list[str]]:  # fmt: skip
+    """Return the measures of a method, the number of runs, and notes.
+
+    Args:
+        method: `sobol` or `morris`.
+        names: of the parameters.
+        runs: from points in [0, 1], shape (runs, parameters), to outputs, shape (runs, outputs).
+        outputs: their names.
+        seed: of the samples.
+        samples: blocks of runs.
+        failures: messages of runs, filled by `runs`.
+
+    Raises:
+        ValueOutOfRange: too many blocks have a run without a value.
+    """
     sample, analyse = _salib(method)
-    problem = {"num_vars": len(ranges), "names": list(ranges), "bounds": [[0.0, 1.0]] * len(ranges)}
-    if method == "sobol":
-        cube = sample.sample(problem, samples, calc_second_order=False, seed=seed)
-    else:
-        cube = sample.sample(problem, samples, num_levels=_LEVELS, seed=seed)
-    results = sweep(drive, ranges, outputs, sampling=Samples(cube), **settings)
-    columns = [results[name].to_numpy() for name in outputs]
-    for name, column in zip(outputs, columns, strict=True):
-        _check_numbers(name, column, [str(text) for text in results["failure"].to_numpy()])
-    measures: dict[str, list[Any]] = {}
-    for column in columns:
-        for key, values in _measures(method, analyse, problem, cube, column, seed).items():
-            measures.setdefault(key, []).append(values)
-    arrays = {key: np.array(rows) for key, rows in measures.items()}
-    return Importance(method, tuple(ranges), tuple(outputs), arrays, len(cube), results.attrs["notice"])
+    problem = {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
+    settings = {"calc_second_order": False} if method == "sobol" else {"num_levels": _LEVELS}
+    cube = sample.sample(problem, samples, **settings, seed=seed)
+    values, measures, notes = runs(cube), dict[str, list[Any]](), list[str]()
+    block = len(names) + (2 if method == "sobol" else 1)
+    for name, column in zip(outputs, values.T, strict=True):
+        kept = np.repeat(np.isfinite(column).reshape(-1, block).all(axis=1), block)
+        notes += _without(name, column, kept, failures)
+        for key, row in _measures(method, analyse, problem, cube[kept], column[kept], seed).items():
+            measures.setdefault(key, []).append(row)
+    return {key: np.array(rows) for key, rows in measures.items()}, len(cube), notes
 
 
-def _check_numbers(name: str, column: Any, failures: Sequence[str]) -> None:
+def _without(name: str, column: Any, kept: Any, failures: Sequence[str]) -> Iterator[str]:
+    """Tell what is left out: a run without a value takes those along with which it is compared."""
     bad = int(np.sum(~np.isfinite(column)))
-    if bad:
-        why = next((failure.splitlines()[0] for failure in failures if failure), "it does not happen there")
+    if not bad:
+        return
+    why = next((failure.splitlines()[0] for failure in failures if failure), "it does not happen there")
+    if np.mean(kept) < _LEAST_SHARE:
         raise ValueOutOfRange(
             f"{name} has no value in {bad} of {len(column)} runs: {why}",
-            advice="Narrow the ranges until all runs succeed.",
+            advice="Narrow the ranges until most runs succeed.",
         )
+    yield f"{name} has no value in {bad} of {len(column)} runs ({why}): {int(np.sum(~kept))} runs were left out."
 
 
 def _measures(method: Kind, analyse: Any, problem: dict[str, Any], cube: Any, column: Any, seed: int) -> dict[str, Any]:
@@ -133,7 +169,5 @@ def _measures(method: Kind, analyse: Any, problem: dict[str, Any], cube: Any, co
 
 
 def _salib(method: str) -> tuple[Any, Any]:
-    if method not in get_args(Kind):
-        raise UnknownName(f"There is no method '{method}'. There are sobol and morris.")
     sample, analyse = (extra_module(f"SALib.{part}.{method}", "analyse") for part in ("sample", "analyze"))
     return sample, analyse

@@ -1,4 +1,4 @@
-"""Results of analyses as tables: operating points, modes, sensitivities, sweeps, best designs."""
+"""Results of analyses as tables: operating points, modes, sensitivities, sweeps, best designs, tolerances."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from modelica_like.analyse.operating.steady import OperatingPoint
     from modelica_like.analyse.optimize.result import Front
     from modelica_like.analyse.sensitivity.result import Sensitivities
+    from modelica_like.analyse.tolerance.result import Tolerances
 
 _FAILURES_TOLD = 3
 _SMALL = 1e-9
@@ -184,3 +185,26 @@ def _front(front: Front) -> RenderableType:
     ]
     head = f"[bold]{escape(first.model.name)}[/]  front of {len(rows)} designs, {front.runs} runs"
     return Group(head, "", table("front", *titles, rows=rows), *map(escape, front.notes))
+
+
+def tolerance_report(result: Tolerances) -> RenderableType:
+    """Return how outputs scatter, by what, and how probably limits are broken."""
+    rows = [
+        (o.name, o.unit_text, o.nominal, o.linear_sigma, o.mean, o.sigma, o.quantiles[1], o.quantiles[3], o.low, o.high)
+        for o in result.outputs
+    ]
+    columns = "first order>.6g", "its sigma>.3g", "mean>.6g", "sigma>.3g", "5 %>.6g", "95 %>.6g", "lowest corner>.6g"
+    parts: list[RenderableType] = [f"[bold]{escape(result.model)}[/]  {result.runs} runs", ""]
+    parts += [table("outputs", "name", "unit", *columns, "highest corner>.6g", rows=rows), ""]
+    names = [scatter.name for scatter in result.scatters]
+    shares = [(name, *(100.0 * float(o.shares[k]) for o in result.outputs)) for k, name in enumerate(names)]
+    titles = [f"{o.name} in %>.3g" for o in result.outputs]
+    parts += [table("shares to first order", "parameter", *titles, rows=shares)]
+    for title, key in (("shares of the variance", "S1"), ("with interactions", "ST")):
+        if key in result.variances:
+            sampled = [(name, *(100.0 * float(v) for v in result.variances[key][:, k])) for k, name in enumerate(names)]
+            parts += ["", table(title, "parameter", *titles, rows=sampled)]
+    limits = [(p.limit, 100 * p.value, 100 * p.low, 100 * p.high) for p in result.limits]
+    if limits:
+        parts += ["", table("limits", "limit", "broken in %>.4g", "from>.3g", "to>.3g", rows=limits)]
+    return Group(*parts, *map(escape, result.notes))

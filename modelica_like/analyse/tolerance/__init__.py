@@ -1,0 +1,1 @@
+"""What tolerances of parameters do to outputs of a run: to first order, and by sampling."""
