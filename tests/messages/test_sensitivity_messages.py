@@ -2,10 +2,12 @@
 """What is said where a gradient does not exist, or is not asked for rightly."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -140,6 +142,18 @@ class Arriving(Component):
         yield when(self.x > 0.5, terminate("has arrived"))
 
 
+def doubtful_hessian() -> None:
+    """Ask for second derivatives of a run that ends just after the lock-up."""
+    drive = load(DIRECT)
+    drive.set("clutch_torque", "86.78432 N.m")
+    function = simulation_function(drive, ["clutch_torque"], ["table.v"], any_sequence=True, until=0.2002)
+    p = ca.MX.sym("p", 1)
+    with suppress(RuntimeError):
+        ca.Function("hessian", [p], [ca.hessian(function(p), p)[0]])([86.78432])
+    assert function.refusal is not None
+    raise function.refusal
+
+
 CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], Any], str]] = {
     "a run that a component ends": (
         NoGradient,
@@ -234,6 +248,10 @@ There is no output 'table.v' in these sensitivities; did you mean 'table.s'?""")
 The precision of a replay, 1e-20, is out of range: it must be between 1e-13 and 0.001."""),
     "an output that is infinite": (NoGradient, lambda: table("table.s/0"), """\
 table.s/0 is inf: what is not finite has no derivative."""),
+    "second derivatives beside another sequence": (NoGradient, lambda: doubtful_hessian(), """\
+The second derivatives of table.v by clutch_torque are not certain: steps of 0.001 and 0.002 of its value differ by 0.14 of the largest one.
+Within these steps the mode sequence changes, or the gradient bends sharply.
+Use the gradient alone: hessian_approximation = limited-memory in IPOPT."""),
     "a series as output of a function": (
         LanguageError, lambda: simulation_function(DIRECT, ["lead"], ["series(table.s)"]), """\
 series(table.s) is a trajectory; the outputs of a simulation function are numbers.

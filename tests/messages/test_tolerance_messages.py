@@ -1,4 +1,3 @@
-
 """What is said where tolerances are not asked for rightly."""
 
 from collections.abc import Callable

@@ -26,7 +26,9 @@ Found = TypeVar("Found")
 
 _TOGETHER = 1e-9
 _CHANGE = 1e-3
-"""Relative change of a parameter for second derivatives: the error of both, rounding and curvature, is about 1e-4."""
+"""Relative change of a parameter for second derivatives, and twice it: gradients known to 1e-8 give about 1e-5."""
+_UNCERTAIN = 1e-2
+"""Error of second derivatives over the largest one, each by relative changes, from which on they are refused."""
 _FINER = 1e-2
 """Tolerance of a run relative to that of its replay, so that both agree."""
 
@@ -34,8 +36,8 @@ _FINER = 1e-2
 class SimulationFunction(NamedCallback):
     """y = f(p): simulates with all events; its Jacobian is that of the replay, exact through the events.
 
-    Second derivatives are central differences of the exact Jacobian. The object must live as long as anything built
-    from it. CasADi rewrites an error of the simulation; `refusal` has the original.
+    Second derivatives are extrapolated differences of the exact Jacobian. The object must live as long as anything
+    built from it. CasADi rewrites an error of the simulation; `refusal` has the original.
 
     Attributes:
         inputs: paths of the parameters p.
@@ -43,6 +45,7 @@ class SimulationFunction(NamedCallback):
         start_values: values of the parameters in the model, a starting point.
         runs: number of simulations so far.
         refusal: why the last evaluation failed, if it did.
+        second_error: bound of the error of the last second derivatives, over the largest one.
     """
 
     def __init__(
@@ -54,6 +57,7 @@ class SimulationFunction(NamedCallback):
         self.outputs = tuple(outputs)
         self.runs = 0
         self.refusal: ModelicaLikeError | None = None
+        self.second_error = 0.0
         freed = free_formulas(drive, inputs, run["parameters"])
         self._model = freed.model
         self._run = {**run, "parameters": freed.values}
@@ -169,7 +173,11 @@ class _Jacobian(NamedCallback):
 
 
 class _Second(NamedCallback):
-    """d²y/dp² of a simulation: CasADi's own differences have a step of 1e-8, in which a parameter of 1e4 drowns."""
+    """d²y/dp² of a simulation: CasADi's own differences have a step of 1e-8, in which a parameter of 1e4 drowns.
+
+    Central differences of the exact Jacobian with two steps, extrapolated (L. F. Richardson, 1911). What both differ by
+    bounds the error: where it is not small, a mode sequence changes within the steps, or the gradient bends sharply.
+    """
 
     def __init__(self, simulation: SimulationFunction, size: tuple[int, int]) -> None:
         super().__init__()
@@ -181,14 +189,43 @@ class _Second(NamedCallback):
 
     def eval(self, arg: Any) -> list[Any]:
         p = np.array(arg[0], float).ravel()
-        derivatives = np.full((self._size[0] * self._size[1], self._size[1]), np.nan)
-        for k, step in enumerate(_CHANGE * np.where(p == 0, 1.0, np.abs(p))):
-            moved = (p + sign * step * (np.arange(len(p)) == k) for sign in (1, -1))
-            sides = [self._simulation.attempt(self._simulation.at, result) for result in moved]
-            if None not in sides:
-                above, below = (side.derivatives for side in sides if side is not None)
-                derivatives[:, k] = ((above - below) / (2 * step)).ravel("F")
-        return [ca.DM(derivatives), ca.DM(self._size[0] * self._size[1], self._size[0])]
+        derivatives = self._simulation.attempt(self._derivatives, p)
+        if derivatives is None:
+            derivatives = np.full((*self._size, self._size[1]), np.nan)
+        flat = derivatives.reshape(self._size[0] * self._size[1], -1, order="F")
+        return [ca.DM(flat), ca.DM(self._size[0] * self._size[1], self._size[0])]
+
+    def _derivatives(self, p: Vector) -> Vector:
+        """Return second derivatives, shape (outputs, parameters, parameters).
+
+        Raises:
+            NoGradient: they are not certain.
+        """
+        sizes = np.where(p == 0.0, 1.0, np.abs(p))
+        derivatives, errors = (np.zeros((*self._size, self._size[1])) for _ in range(2))
+        for k in range(len(p)):
+            near, far = (self._difference(p, k, change * sizes[k]) for change in (_CHANGE, 2.0 * _CHANGE))
+            derivatives[:, :, k] = (4.0 * near - far) / 3.0
+            errors[:, :, k] = np.abs(near - far) / 3.0
+        scale = sizes[:, None] * sizes
+        largest = (np.abs(derivatives) * scale).max(axis=(1, 2))
+        relative = (errors * scale).max(axis=1) / np.where(largest > 0.0, largest, 1.0)[:, None]
+        self._simulation.second_error = float(relative.max())
+        row, column = np.unravel_index(np.argmax(relative), relative.shape)
+        if relative[row, column] > _UNCERTAIN:
+            of, by = self._simulation.outputs[row], self._simulation.inputs[column]
+            raise NoGradient(
+                f"The second derivatives of {of} by {by} are not certain: steps of {_CHANGE:g} and {2 * _CHANGE:g} of "
+                f"its value differ by {relative[row, column]:.2g} of the largest one.",
+                why="Within these steps the mode sequence changes, or the gradient bends sharply.",
+                advice="Use the gradient alone: hessian_approximation = limited-memory in IPOPT.",
+            )
+        return derivatives
+
+    def _difference(self, p: Vector, k: int, step: float) -> Vector:
+        unit = step * (np.arange(len(p)) == k)
+        above, below = (self._simulation.at(p + sign * unit).derivatives for sign in (1.0, -1.0))
+        return (above - below) / (2.0 * step)
 
 
 @checked
