@@ -192,3 +192,24 @@ def test_gear_and_flywheel() -> None:
         x = [ratio * best["bench.ratio"], disc * best["bench.disc"]]
         supply, stored, lock_time, speed = np.array(function(x)).ravel()
         assert supply > best.objectives[0].value or stored < 20.0 or lock_time > 0.8 or speed > 50 * math.pi
+
+
+def test_a_limit_that_must_hold_with_a_probability() -> None:
+    """The torque is anywhere within 10 % of M: 1 % of all undercut what locks in time if that is (0.9 + 0.002) M."""
+    limit = "P(clutch.lock_time <= 0.25 s) >= 99 %"
+    best = optimum(
+        DIRECT, minimize="clutch.capacity", free=CAPACITY, subject_to=limit, tolerances={"clutch.capacity": "±10 %"}
+    )
+    assert best["clutch.capacity"] == pytest.approx(capacity(0.25) / 0.902, rel=1e-3)
+    assert "is broken in" in str(best)
+
+
+@pytest.mark.slow
+def test_a_probability_of_a_normal_distribution() -> None:
+    """The load scatters by 1 N.m: the torque is larger by 3.0902 of these."""
+    limit = "P(clutch.lock_time <= 0.25 s) >= 99.9 %"
+    best = optimum(
+        DIRECT, minimize="clutch.capacity", free=CAPACITY, subject_to=limit,
+        tolerances={"load_torque": "normal(1 N.m)"},
+    )  # fmt: skip
+    assert best["clutch.capacity"] == pytest.approx(capacity(0.25) + 3.0902, rel=2e-3)

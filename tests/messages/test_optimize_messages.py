@@ -250,6 +250,30 @@ Write { points = 12, from = "0 N", to = "9 kN", rising = true }.""",
         """A choice needs one objective.
 Limit the other one by subject_to.""",
     ),
+    "a probability of 100 %": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, subject_to="P(clutch.lock_time <= 0.3 s) >= 100 %", **M),
+        """'P(clutch.lock_time <= 0.3 s) >= 100 %': a probability must be between 50 % and 100 %, and that of a limit with <= or >=.
+Write "P(clutch.lock_time <= 0.4 s) >= 99.9 %".""",
+    ),
+    "a probability where nothing scatters": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, subject_to="P(clutch.lock_time <= 0.3 s) >= 99 %", **M),
+        """'P(clutch.lock_time <= 0.3 s) >= 99 %' asks for a probability, but nothing scatters.
+Say how parameters scatter: [tolerances] in the netlist, or tolerances={"clutch.mu": "±10 %"}.""",
+    ),
+    "a front with a probability": (
+        ValueOutOfRange,
+        lambda: optimize(
+            D,
+            free=F,
+            minimize=["clutch.lock_time", "clutch.tau"],
+            subject_to="P(clutch.lock_time <= 0.3 s) >= 99 %",
+            tolerances={"load_torque": "±1 %"},
+        ),
+        """A front has no limits with a probability.
+Give plain limits.""",
+    ),
     "no netlist to save": (
         LanguageError,
         lambda: optimize(build(D), minimize="clutch.lock_time", free={"load_torque": [10, 20]}).save("best.toml"),

@@ -5,10 +5,12 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from modelica_like.analyse.optimize.chance import Chances
 from modelica_like.analyse.optimize.choices import Choice, combinations
 from modelica_like.analyse.optimize.problem import Question, make_problem
 from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optimum
@@ -39,6 +41,7 @@ def optimize(
     choose: Mapping[str, Any] | None = None, cases: Sequence[Mapping[str, Any]] = (),
     until: float | str | None = None, parameters: Mapping[str, Any] | None = None, start: StartKind | None = None,
     starts: int | None = None, points: int | None = None, seed: int = 0,
+    tolerances: Mapping[str, Any] | None = None, correlated: Sequence[Mapping[str, Any]] | None = None,
 ) -> Optimum | Front:  # fmt: skip
     """Find the best design of a drive.
 
@@ -62,6 +65,9 @@ def optimize(
         starts: number of starts of the search, all but the first from a Latin hypercube between the bounds.
         points: number of designs on a Pareto front; 20 by default.
         seed: of the Latin hypercube.
+        tolerances: how parameters scatter, as in `tolerance`, for limits that must hold with a probability,
+            `P(clutch.lock_time <= 0.4 s) >= 99.9 %`; by default [tolerances] of the netlist.
+        correlated: which of them scatter together, as in `tolerance`.
 
     Raises:
         UnknownName, UnitError, ValueOutOfRange: something does not fit the drive; netlists tell file and line.
@@ -69,13 +75,19 @@ def optimize(
         ModelicaLikeError: the drive cannot be run as it is.
     """
     drive = loaded(drive)
-    written = inside(drive).optimize if isinstance(drive, Assembly) else {}
+    written, scatter, folder = {}, dict[str, Any](), ""
+    if isinstance(drive, Assembly):
+        written, scatter = inside(drive).optimize, dict(inside(drive).tolerances)
+        folder = str(Path(inside(drive).origin).parent)
+    pairs = scatter.pop("correlated", ())
     asked = {"minimize": _listed(minimize), "maximize": _listed(maximize)}
     aims = asked if any(asked.values()) else {key: tuple(written.get(key, ())) for key in asked}
     question = Question(
         **aims, free=free if free is not None else written.get("free"),
         subject_to=_listed(subject_to) or tuple(written.get("subject_to", ())),
         cases=tuple(cases) or tuple(written.get("for", ())), parameters=parameters, until=until, start=start,
+        tolerances=tolerances if tolerances is not None else scatter,
+        correlated=tuple(pairs if correlated is None else correlated), folder=folder,
     )  # fmt: skip
     if len(question.minimize) + len(question.maximize) > 2:
         raise ValueOutOfRange(
@@ -111,9 +123,19 @@ class _Study:
     def best(self, starts: int, points: int) -> Optimum | Front:
         """Return the optimum, or with two objectives their front."""
         if len(self.problem.aims) == 1:
+            return self._optimum(starts)
+        if any(limit.probability < 1.0 for limit in self.problem.limits):
+            raise ValueOutOfRange("A front has no limits with a probability.", advice="Give plain limits.")
+        return self._front(starts, points)
+
+    def _optimum(self, starts: int) -> Optimum:
+        if all(limit.probability == 1.0 for limit in self.problem.limits):
             search = Search(self.problem, self.runs)
             return self.optimum(search, self._search(search, starts))
-        return self._front(starts, points)
+        chances = Chances(self.problem)
+        problem, outcome = chances.search(lambda moved: self._search(Search(moved, self.runs), starts))
+        result = self.optimum(Search(problem, self.runs), outcome)
+        return replace(result, notes=(*result.notes, *map(str, chances.results)))
 
     def _search(self, search: Search, starts: int) -> Outcome:
         begins = [self.problem.begin]

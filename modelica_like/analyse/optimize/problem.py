@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from modelica_like.analyse.optimize.terms import (
     read_free,
     read_limits,
 )
+from modelica_like.analyse.tolerance.scatter import read_population
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean
@@ -46,6 +48,9 @@ class Question:
         parameters: other values of parameters, in all cases.
         until: end time.
         start: kind of start.
+        tolerances: how parameters scatter, for limits with a probability.
+        correlated: which scatter together.
+        folder: of files with measured values.
     """
 
     minimize: tuple[str, ...] = ()
@@ -56,6 +61,9 @@ class Question:
     parameters: Mapping[str, Any] | None = None
     until: float | str | None = None
     start: Any = None
+    tolerances: Mapping[str, Any] | None = None
+    correlated: tuple[Mapping[str, Any], ...] = ()
+    folder: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +129,8 @@ def make_problem(
     plain = {path: given for path, given in (question.free or {}).items() if path not in profiles}
     with placed("free"):
         drive, cells, ordered = _with_profiles(loaded(drive), profiles)
-        model = build(drive, free=plain, tables=[path.replace("[", "[[]") for path in profiles])
+        scattering = [*(question.tolerances or {})]
+        model = build(drive, free=[*plain, *scattering], tables=[path.replace("[", "[[]") for path in profiles])
         model = model.with_parameters(dict(question.parameters or {}))
         free = read_free(model, plain | cells)
     with placed("minimize" if question.minimize else "maximize"):
@@ -134,7 +143,24 @@ def make_problem(
     rows = [*(row for aim in aims for row in aim.rows), *(row for limit in limits for row in limit.rows())]
     outputs = tuple(dict.fromkeys([*(row.output for row in rows), *(limit.name for limit in limits)]))
     order = tuple((names.index(low), names.index(high)) for low, high in ordered)
+    _check_chances(model, question, limits, placed)
     return Problem(question, model, free, aims, limits, cases, order, outputs)
+
+
+def _check_chances(
+    model: CompiledDae, question: Question, limits: Sequence[Limit],
+    placed: Callable[[str], AbstractContextManager[None]],
+) -> None:  # fmt: skip
+    """Refuse limits with a probability where nothing scatters."""
+    chances = [limit for limit in limits if limit.probability < 1.0]
+    if chances and not question.tolerances:
+        with placed("subject_to"):
+            raise ValueOutOfRange(
+                f"'{chances[0].text}' asks for a probability, but nothing scatters.",
+                advice='Say how parameters scatter: [tolerances] in the netlist, or tolerances={"clutch.mu": "±10 %"}.',
+            )
+    if chances:
+        read_population(model, question.tolerances or {}, question.correlated, Path(question.folder))
 
 
 def _with_profiles(

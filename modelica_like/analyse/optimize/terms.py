@@ -16,6 +16,9 @@ from modelica_like.runs.calls import call_of
 from modelica_like.runs.readings import Output, read_number
 
 Sense = Literal["<=", ">=", "=="]
+_CHANCE = re.compile(r"P\s*\((?P<inside>.+)\)\s*>=\s*(?P<share>[^<>=()]+)", re.DOTALL)
+_LEAST_CHANCE = 0.5
+"""At one half, and below, a limit need not keep a distance."""
 _LIMIT = re.compile(r"(?P<left>.+?)(?P<sense><=|>=|==|<|>|=)(?P<right>.+)", re.DOTALL)
 
 
@@ -70,6 +73,8 @@ class Limit:
         output: of a run.
         sense: the relation.
         value: the limit.
+        probability: with which it must hold; 1 for a plain limit.
+        inner: the relation as written, without the probability.
     """
 
     text: str
@@ -77,6 +82,8 @@ class Limit:
     output: Output
     sense: Sense
     value: float
+    probability: float = 1.0
+    inner: str = ""
 
     def rows(self) -> tuple[Row, ...]:
         """Return the numbers that must not be above theirs; both sides of an equation."""
@@ -97,6 +104,11 @@ class Case:
 
     name: str
     values: Mapping[str, Any]
+
+    @property
+    def suffix(self) -> str:
+        """Its name, for sentences."""
+        return f" in the load case '{self.name}'" if self.name else ""
 
 
 def read_free(model: CompiledDae, given: Mapping[str, Any]) -> tuple[Free, ...]:
@@ -202,7 +214,21 @@ def read_limits(model: CompiledDae, texts: Sequence[str]) -> tuple[Limit, ...]:
         UnknownName: the model has no such output.
         UnitError: the sides have different units.
     """
-    return tuple(_limit(model, text) for text in texts)
+    return tuple(_with_probability(model, text) for text in texts)
+
+
+def _with_probability(model: CompiledDae, text: str) -> Limit:
+    called = _CHANCE.fullmatch(text.strip())
+    if called is None:
+        return _limit(model, text)
+    number, limit = read_quantity(called["share"]), _limit(model, called["inside"].strip())
+    share = number[0] * number[1].factor if number is not None and same_dimension(number[1], ONE) else 0.0
+    if not _LEAST_CHANCE < share < 1.0 or limit.sense == "==":
+        raise ValueOutOfRange(
+            f"'{text}': a probability must be between 50 % and 100 %, and that of a limit with <= or >=.",
+            advice='Write "P(clutch.lock_time <= 0.4 s) >= 99.9 %".',
+        )
+    return replace(limit, text=text, probability=share, inner=called["inside"].strip())
 
 
 def _limit(model: CompiledDae, text: str) -> Limit:
