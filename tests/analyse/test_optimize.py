@@ -213,3 +213,29 @@ def test_a_probability_of_a_normal_distribution() -> None:
         tolerances={"load_torque": "normal(1 N.m)"},
     )  # fmt: skip
     assert best["clutch.capacity"] == pytest.approx(capacity(0.25) + 3.0902, rel=2e-3)
+
+
+TWO_MASSES = """
+[parts]
+J1 = { is = "Inertia", J = "0.5 kg.m2", phi = 0, w = 0 }
+shaft = { is = "SpringDamper", c = "2000 N.m/rad", d = 0 }
+J2 = { is = "Inertia", J = "0.2 kg.m2", phi = 0, w = 0 }
+[series]
+a = ["J1", "shaft", "J2"]
+"""
+
+
+def test_the_softest_shaft_above_a_frequency() -> None:
+    """f = √(c (1/J1 + 1/J2))/2π without damping."""
+    limit, free = "mode(1).frequency >= 12 Hz", {"shaft.c": [100, 1e5]}
+    best = optimum(loads(TWO_MASSES), minimize="shaft.c", free=free, subject_to=limit, until=0.1)
+    assert best["shaft.c"] == pytest.approx((2 * math.pi * 12.0) ** 2 / (1 / 0.5 + 1 / 0.2), rel=1e-6)
+    assert best.limits[0].price == pytest.approx(2.0 * best["shaft.c"] / 12.0, rel=1e-4)
+
+
+def test_a_mode_alone_needs_no_run() -> None:
+    """The stiffest shaft, and the lightest masses, vibrate fastest."""
+    free = {"shaft.c": [100, 3000], "J2.J": [0.1, 0.3]}
+    best = optimum(loads(TWO_MASSES), maximize="mode(1).frequency", free=free)
+    assert best.values == pytest.approx({"shaft.c": 3000.0, "J2.J": 0.1}, rel=1e-9)
+    assert best.objectives[0].value == pytest.approx(math.sqrt(3000.0 * (1 / 0.5 + 1 / 0.1)) / (2 * math.pi), rel=1e-9)

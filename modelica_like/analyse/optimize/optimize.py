@@ -24,7 +24,7 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, ModelicaLikeError, ValueOutOfRange
 from modelica_like.language import Assembly, Component
 from modelica_like.language.inside import inside
-from modelica_like.simulation import Model, loaded, simulate
+from modelica_like.simulation import Model, loaded
 from modelica_like.solve.initialize import StartKind
 
 _POINTS = 20
@@ -190,12 +190,11 @@ class _Study:
 
     def _checked(self, values: Mapping[str, float], design: Any) -> tuple[Vector, list[str]]:
         """Return the outputs of a design in runs of their own, by IDAS, and what differs."""
-        problem, question = self.problem, self.problem.question
-        rows: list[list[float]] = []
+        problem = self.problem
+        rows: list[Vector] = []
         for case in problem.cases:
             given = {**case.values, **values}
-            run = simulate(problem.model, question.until, parameters=given, start=question.start, solver="idas")
-            rows.append([float(value) for value in run.read(*problem.outputs)])
+            rows.append(self.runs.by_idas(given))
         after = np.array(rows)
         if design is None:
             return after, []
@@ -227,7 +226,7 @@ class _Study:
                 broken = limit.excess(after[c, k]) > 10 * FEASIBLE * size
                 measured.append(
                     Measured(
-                        limit.text, limit.name, limit.output.unit, case.name, first[c, k], after[c, k], limit.value,
+                        limit.text, limit.name, limit.unit, case.name, first[c, k], after[c, k], limit.value,
                         bool(broken), price if weight > 1e-4 else 0.0,
                     )
                 )  # fmt: skip

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from modelica_like.analyse.optimize.modal import modal_slopes, modal_unit, modal_values
 from modelica_like.analyse.optimize.problem import Problem
 from modelica_like.analyse.sensitivity.function import SimulationFunction, simulation_function
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import ModelicaLikeError
+from modelica_like.simulation import simulate
 
 PRECISION = 1e-7
 """Of the derivatives: the values of limits are as precise as a tenth of a thousandth of a thousandth."""
@@ -43,11 +46,15 @@ class Runs:
         self.problem = problem
         question, names = problem.question, [parameter.name for parameter in problem.free]
         self.functions: list[SimulationFunction] = []
-        for case in problem.cases:
+        self.modal = [name for name in problem.outputs if modal_unit(name) is not None]
+        self.read = [name for name in problem.outputs if name not in self.modal]
+        order = [*self.read, *self.modal]
+        self._places = [order.index(name) for name in problem.outputs]
+        for case in problem.cases if self.read else ():
             run = {"until": question.until, "start": question.start, "parameters": dict(case.values)}
             try:
                 function = simulation_function(
-                    problem.model, names, problem.outputs, **run, precision=PRECISION, any_sequence=True
+                    problem.model, names, self.read, **run, precision=PRECISION, any_sequence=True
                 )
             except ModelicaLikeError as error:
                 place = f" in the load case '{case.name}'" if case.name else ""
@@ -72,12 +79,16 @@ class Runs:
 
     def _run(self, x: Vector) -> Design | ModelicaLikeError:
         try:
-            results = [function.at(x) for function in self.functions]
+            parts = [self._modes(x, slopes=True)]
+            if self.read:
+                results = [function.at(x) for function in self.functions]
+                values = np.array([[output.value for output in result.outputs] for result in results])
+                parts.insert(0, (values, np.array([result.derivatives for result in results])))
         except ModelicaLikeError as error:
             self.refusals.append((x.copy(), error))
             return error
-        values = np.array([[output.value for output in result.outputs] for result in results])
-        design = Design(x.copy(), values, np.array([result.derivatives for result in results]))
+        values, slopes = (np.concatenate(part, axis=1)[:, self._places] for part in zip(*parts, strict=True))
+        design = Design(x.copy(), values, slopes)
         self.designs.append(design)
         return design
 
@@ -87,7 +98,36 @@ class Runs:
         if isinstance(known, Design):
             return known.values
         try:
-            return np.array([function.values_at(x) for function in self.functions])
+            parts = [np.array([function.values_at(x) for function in self.functions])] if self.read else []
+            return np.concatenate([*parts, self._modes(x, slopes=False)[0]], axis=1)[:, self._places]
         except ModelicaLikeError as error:
             self.refusals.append((x.copy(), error))
             return None
+
+    def _modes(self, x: Vector, *, slopes: bool) -> tuple[Vector, Vector]:
+        """Return outputs of modes, shape (cases, outputs), and their derivatives by x."""
+        problem, names = self.problem, [parameter.name for parameter in self.problem.free]
+        values = np.zeros((len(problem.cases), len(self.modal)))
+        derivatives = np.zeros((*values.shape, len(x)))
+        given = dict(zip(names, map(float, x), strict=True))
+        for c, case in enumerate(problem.cases if self.modal else ()):
+            model = problem.model.with_parameters({**case.values, **given})
+            values[c] = modal_values(model, self.modal, problem.question.start)
+            if slopes:
+                derivatives[c] = modal_slopes(
+                    model, self.modal, problem.question.start, given, problem.low, problem.span
+                )
+        return values, derivatives
+
+    def by_idas(self, parameters: Mapping[str, float]) -> Vector:
+        """Return the outputs of a run by IDAS, shape (outputs,)."""
+        question, values = self.problem.question, dict[str, float]()
+        if self.read:
+            run = simulate(
+                self.problem.model, question.until, parameters=dict(parameters), start=question.start, solver="idas"
+            )
+            values |= dict(zip(self.read, map(float, run.read(*self.read)), strict=True))
+        if self.modal:
+            model = self.problem.model.with_parameters(dict(parameters))
+            values |= dict(zip(self.modal, map(float, modal_values(model, self.modal, question.start)), strict=True))
+        return np.array([values[name] for name in self.problem.outputs])

@@ -9,11 +9,12 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from modelica_like.analyse.optimize.modal import modal_unit
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnitError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import ONE, Unit, read_quantity, same_dimension, to_si
 from modelica_like.runs.calls import call_of
-from modelica_like.runs.readings import Output, read_number
+from modelica_like.runs.readings import read_number
 
 Sense = Literal["<=", ">=", "=="]
 _CHANCE = re.compile(r"P\s*\((?P<inside>.+)\)\s*>=\s*(?P<share>[^<>=()]+)", re.DOTALL)
@@ -70,7 +71,7 @@ class Limit:
     Attributes:
         text: as written.
         name: of the output.
-        output: of a run.
+        unit: its unit.
         sense: the relation.
         value: the limit.
         probability: with which it must hold; 1 for a plain limit.
@@ -79,7 +80,7 @@ class Limit:
 
     text: str
     name: str
-    output: Output
+    unit: Unit
     sense: Sense
     value: float
     probability: float = 1.0
@@ -182,11 +183,17 @@ def _aim(model: CompiledDae, text: str, sign: float) -> Aim:
     names = _split(called[1]) if called is not None and called[0] == ("max" if sign > 0 else "min") else [text]
     if len(names) == 1:
         names = [text.strip()]
-    outputs = [read_number(model, name) for name in names]
-    for output in outputs[1:]:
-        if not same_dimension(output.unit, outputs[0].unit):
-            raise UnitError(f"'{text}' compares {outputs[0].unit} with {output.unit}.")
-    return Aim(text.strip(), outputs[0].unit, sign, tuple(row for name in names for row in _rows(name, sign)))
+    units = [_unit(model, name) for name in names]
+    for unit in units[1:]:
+        if not same_dimension(unit, units[0]):
+            raise UnitError(f"'{text}' compares {units[0]} with {unit}.")
+    return Aim(text.strip(), units[0], sign, tuple(row for name in names for row in _rows(name, sign)))
+
+
+def _unit(model: CompiledDae, name: str) -> Unit:
+    """Return the unit of an output of a run or of a mode."""
+    unit = modal_unit(name)
+    return read_number(model, name).unit if unit is None else unit
 
 
 def _split(text: str) -> list[str]:
@@ -240,17 +247,17 @@ def _limit(model: CompiledDae, text: str) -> Limit:
         )
     left, right = sides["left"].strip(), sides["right"].strip()
     sense = cast("Sense", {"<": "<=", ">": ">="}.get(sides["sense"], sides["sense"]))
-    output = read_number(model, left)
+    unit = _unit(model, left)
     number = read_quantity(right)
     if number is None:
         name = f"{left} - ({right})"
-        return Limit(text, name, read_number(model, name), sense, 0.0)
-    if number[1] == ONE and str(output.unit) not in ("1", "*"):
+        return Limit(text, name, read_number(model, name).unit, sense, 0.0)
+    if number[1] == ONE and str(unit) not in ("1", "*"):
         raise UnitError(
-            f"'{text}' compares a value in {output.unit} with a number without a unit.",
-            advice=f'Write "{left} {sides["sense"]} {right} {output.unit}".',
+            f"'{text}' compares a value in {unit} with a number without a unit.",
+            advice=f'Write "{left} {sides["sense"]} {right} {unit}".',
         )
-    return Limit(text, left, output, sense, to_si(right, output.unit, left))
+    return Limit(text, left, unit, sense, to_si(right, unit, left))
 
 
 def read_cases(model: CompiledDae, given: Sequence[Mapping[str, Any]], free: Sequence[Free]) -> tuple[Case, ...]:
