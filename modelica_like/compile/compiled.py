@@ -21,6 +21,7 @@ from modelica_like.compile.groups import Equations, EventTables, Held, Starts, f
 from modelica_like.compile.groups import Reset as Reset
 from modelica_like.compile.groups import StartEntry as StartEntry
 from modelica_like.compile.start_system import StartSystem as StartSystem
+from modelica_like.compile.symbolic import Symbolic, symbolic
 from modelica_like.errors import LanguageError, ModelicaLikeError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
 from modelica_like.language.units import Unit, to_si
@@ -309,6 +310,10 @@ class CompiledDae:
             run: further arguments of `modelica_like.simulation_function`.
         """
         return upper.simulation_function(self, inputs, outputs, **run)
+
+    def symbolic(self) -> Symbolic:
+        """Return the equations as named CasADi symbols: rates, residuals, guards, any variable."""
+        return symbolic(self)
 
     def native(self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), **how: Any) -> Any:
         """Return a handle for control loops: an instance that steps at the speed of C.
