@@ -84,7 +84,7 @@ def test_functions_in_sympy(make) -> None:
 
 def test_a_name_that_there_is_not() -> None:
     equations = build(loads(LAW)).symbolic()
-    with pytest.raises(UnknownName, match=r"has no variable or parameter 'wheel\.j'; did you mean 'wheel\.J'\?"):
+    with pytest.raises(UnknownName, match=r"has no variable or parameter 'wheel\.ww'; did you mean 'wheel\.w'\?"):
         _ = equations["wheel.ww"]
 
 
