@@ -71,6 +71,27 @@ MESSAGES: dict[str, tuple[str, str]] = {
         f"  in a.mo:3 `Real x = 1; {R}.Inertia a(w(displayUnit = x));`",
     ),
     **{
+        f"no condition: {text}": (
+            model("Integer k = 2; Boolean b = time > 1; Real x;", text),
+            f"{what}.\n  in a.mo:5 `{text}`",
+        )
+        for text, what in {
+            "x = if k then 1 else 2;": "The condition of this 'if' is a number",
+            "if k then x = 1; else x = 2; end if;": "The condition of this 'if' is a number",
+            "der(x) = 1; when k then reinit(x, 0); end when;": "The condition of this 'when' is a number",
+            'x = 1; assert(k, "k");': "The condition of this 'assert' is a number",
+            "x = if not k then 1 else 2;": "'not' joins conditions, and a number is none",
+            "x = if b and pre(k) then 1 else 2;": "'and' joins conditions, and a number is none",
+            "x = if b > k then 1 else 2;": "A condition and a number cannot be compared by >",
+            "der(x) = b;": "A condition is no number: write `if … then 1 else 0`",
+            "x = pre(b);": "x is a Real, and a truth value is none",
+        }.items()
+    },
+    "a Boolean with a number": (
+        model("Integer k = 2; Boolean b = k;"),
+        "b is a Boolean, and a formula of numbers is none.\n  in a.mo:3 `Integer k = 2; Boolean b = k;`",
+    ),
+    **{
         f"declared: {text}": (
             model(text, before=TYPES),
             f"{what.rstrip('?')}{'?' if what.endswith('?') else '.'}\n  in a.mo:3 `{text}`",

@@ -21,6 +21,10 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": abs, "sign": lambda x: float((x > 0) - (x < 0)), "integer": math.floor, "min": min, "max": max,
     "mod": lambda x, y: x - math.floor(x / y) * y, "div": lambda x, y: float(math.trunc(x / y)), "rem": math.fmod,
 }  # fmt: skip
+_SAME_TYPE = ("pre", "noEvent", "previous", "hold")
+"""Calls that have the type of their argument."""
+_ANSWERS = ("initial", "terminal", "edge", "change", "sample", "Clock")
+"""Calls that are conditions."""
 KNOWN = ("number", "boolean", "literal", "string")
 _KINDS = {"number": "a number", "boolean": "a truth value", "literal": "a value of an enumeration", "string": "a text"}
 
@@ -86,7 +90,7 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
     kind = kind.removeprefix(".")
     if kind in ("neg", *_BINARY) and any(map(is_condition, args)):
         raise Unfit("A condition is no number: write `if … then 1 else 0`")
-    if kind in ("not", "and", "or") and any(map(is_number, args)):
+    if kind in ("not", "and", "or") and not all(map(is_condition, args)):
         raise Unfit(f"'{kind}' joins conditions, and a number is none")
     if kind == "neg":
         return number(-args[0].args[0], line) if args[0].kind == "number" else Expr("neg", args, line)
@@ -102,6 +106,8 @@ def operation(kind: str, args: tuple[Expr, ...], line: int) -> Expr:
         return left[0] if len(left) == 1 else Expr(kind, args, line)
     if kind in _RELATIONS and not all(argument.kind in KNOWN for argument in args):
         args = tuple(map(numbered, args))
+        if is_condition(args[0]) is not is_condition(args[1]):
+            raise Unfit(f"A condition and a number cannot be compared by {kind}")
     if kind in _RELATIONS and all(argument.kind in KNOWN for argument in args):
         return Expr("boolean", (_related(kind, *args),), line)
     if kind in _BINARY and all(argument.kind == "number" for argument in args):
@@ -121,13 +127,14 @@ def numbered(expression: Expr) -> Expr:
 
 
 def is_condition(expression: Expr) -> bool:
-    """Whether a resolved expression is Boolean for sure; a name of a part may be."""
+    """Whether a resolved expression is Boolean; all others are numbers, texts, arrays or choices."""
+    if expression.kind == "if":
+        return is_condition(expression.args[1])
+    if expression.kind == "call":
+        name, args, _ = expression.args
+        same = name in _SAME_TYPE or (name == "sample" and len(args) == 1)
+        return is_condition(args[-1]) if same else name in _ANSWERS
     return expression.kind in ("boolean", "condition", "not", "and", "or", *_RELATIONS)
-
-
-def is_number(expression: Expr) -> bool:
-    """Whether a resolved expression is a number for sure."""
-    return expression.kind in ("number", "neg", *_BINARY)
 
 
 def _of_arrays(kind: str, args: tuple[Expr, ...], line: int) -> Expr:

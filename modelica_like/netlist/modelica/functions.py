@@ -278,7 +278,7 @@ class _Call:
         if not branches:
             return
         condition, statements = branches[0]
-        holds = Expr("boolean", (True,)) if condition is None else self.here()(condition)
+        holds = Expr("boolean", (True,)) if condition is None else self.here().condition(condition, "if", line)
         if holds.kind == "boolean":
             if holds.args[0]:
                 self.run(statements)

@@ -78,10 +78,7 @@ class Resolver:
         if kind == "if":
             kept, otherwise = list[Expr](), args[-1]
             for condition, value in zip(args[:-1:2], args[1::2], strict=True):
-                choice = self(condition)
-                if fold.is_number(choice):
-                    what = "The condition of this 'if' is a number."
-                    raise ModelicaTextError(what, where=self.text.place(line))
+                choice = self.condition(condition, "if", line)
                 if choice.kind != "boolean":
                     kept += [choice, self(value)]
                 elif choice.args[0]:
@@ -95,6 +92,17 @@ class Resolver:
             return self._told(lambda: fold.row(start, step, stop, line), line)
         values = tuple(map(self, args))
         return self._told(lambda: fold.operation(kind, values, line), line)
+
+    def condition(self, expression: Expr, word: str, line: int) -> Expr:
+        """Return the resolved condition of an `if` and the like.
+
+        Raises:
+            ModelicaTextError: it is none.
+        """
+        resolved = self(expression)
+        if not all(map(fold.is_condition, resolved.args if resolved.kind == "array" else (resolved,))):
+            raise ModelicaTextError(f"The condition of this '{word}' is a number.", where=self.text.place(line))
+        return resolved
 
     def _told(self, make: Callable[[], Expr], line: int) -> Expr:
         try:

@@ -218,7 +218,9 @@ class Statements:
         resolver = Resolver(self.instance, text, local)
         open_branches: list[tuple[Expr | None, Statements]] = []
         for condition, body in statement.parts:
-            holds = Expr("boolean", (True,)) if condition is None else resolver(condition)
+            holds = (
+                Expr("boolean", (True,)) if condition is None else resolver.condition(condition, "if", statement.line)
+            )
             if holds.kind == "boolean" and not holds.args[0]:
                 continue
             target = Statements(self.instance) if open_branches or holds.kind != "boolean" else self
@@ -273,7 +275,11 @@ class Statements:
         else:
             if left.kind == "number" and right.kind == "name":
                 left, right = right, left
-            self.equations.append((left, self._fitting(left, right, text, line), text.place(line)))
+            fitting = self._fitting(left, right, text, line)
+            if fold.is_condition(left) is not fold.is_condition(right):
+                what = "A condition is no number: write `if … then 1 else 0`."
+                raise ModelicaTextError(what, where=text.place(line))
+            self.equations.append((left, fitting, text.place(line)))
 
     def _check_type(self, left: Expr, right: Expr, text: ClassText, line: int) -> Basic | None:
         """Return the type of an own variable; refuse a value of another one."""
@@ -300,9 +306,9 @@ class Statements:
         for condition, body in statement.parts:
             if condition is None:
                 raise refused("'else' of a 'when'", text, statement.line)
-            holds = resolver(condition)
+            holds = resolver.condition(condition, "when", statement.line)
             conditions = holds.args if holds.kind == "array" else (holds,)
-            if any(each.kind in ("boolean", "number") for each in conditions):
+            if any(each.kind == "boolean" for each in conditions):
                 raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
             values = self._changes(body, text, local)
             calls = (s.parts[0] for s in body if s.kind == "call" and s.parts[0].args[0] == "reinit")
@@ -347,7 +353,7 @@ class Statements:
         level = given[2] if len(given) > 2 else dict(named).get("level")
         if level is not None and not (level.kind == "name" and level.args[-1][0] == "error"):
             return None
-        condition = resolver(given[0])
+        condition = resolver.condition(given[0], "assert", call.line)
         words = _words(given[1]) if len(given) > 1 else "an assertion is broken"
         if condition.kind != "boolean":
             return condition, Expr("string", (words,), call.line)

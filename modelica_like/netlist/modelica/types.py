@@ -6,20 +6,20 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, unknown_class
 from modelica_like.netlist.modelica.tree import ClassText, Expr
 
 SCALARS = ("Real", "Integer", "Boolean", "String")
-_TRUTHS = ("boolean", "condition", "and", "or", "not", "<", "<=", ">", ">=", "==", "<>")
 _FIT = {
     "Real": ("number", "+", "-", "*", "/", "^", "neg"),
     "Integer": ("number", "+", "-", "*", "/", "^", "neg"),
-    "Boolean": _TRUTHS,
+    "Boolean": (),
     "String": ("string",),
     "enumeration": ("literal",),
     "StateSelect": ("literal",),
 }
-"""Kinds of expressions that fit a type; calls and names may be of any."""
+"""Kinds of expressions that fit a type, beside names and calls of numbers, and conditions for a Boolean."""
 
 
 @dataclass(slots=True)
@@ -99,9 +99,13 @@ def with_article(basic: Basic) -> str:
 def misfit(value: Expr, basic: Basic) -> str:
     """Return what is wrong with the type of a value, in words; empty if it fits, or is not known before the run."""
     for leaf in _leaves(value):
-        if leaf.kind in ("name", "call") or basic.kind not in _FIT:
+        if basic.kind not in _FIT:
             continue
-        other = leaf.kind not in _FIT[basic.kind]
+        condition = fold.is_condition(leaf)
+        if leaf.kind in ("name", "call"):
+            other = condition is not (basic.kind == "Boolean")
+        else:
+            other = not condition if basic.kind == "Boolean" else leaf.kind not in _FIT[basic.kind]
         if basic.kind == "Integer" and leaf.kind == "number":
             other = leaf.args[0] != math.floor(leaf.args[0])
         if leaf.kind == "literal" and not other:
@@ -128,4 +132,4 @@ def _words(leaf: Expr) -> str:
         return str(leaf.args[0]).lower()
     if leaf.kind in ("string", "literal"):
         return f'"{leaf.args[0]}"' if leaf.kind == "string" else str(leaf.args[0])
-    return "a truth value" if leaf.kind in _TRUTHS else "a formula of numbers"
+    return "a truth value" if fold.is_condition(leaf) else "a formula of numbers"
