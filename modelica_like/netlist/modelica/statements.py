@@ -95,12 +95,8 @@ class Statements:
         name = argument.args[0][0] if argument is not None and argument.kind == "name" else ""
         member = self.instance.members.get(name)
         basic = basic_type(self.instance, member) if member is not None else None
-        if (
-            basic is not None
-            and basic.kind == "Real"
-            and "discrete" not in basic.prefixes
-            and name not in self.assigned
-        ):
+        continuous = basic is not None and basic.kind == "Real" and "discrete" not in basic.prefixes
+        if continuous and name not in self.assigned:
             raise ModelicaTextError(
                 f"{call.args[0]}({name}): only what changes at events has a value before them.", where=source
             )
