@@ -46,6 +46,12 @@ def checked(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return call
 
 
+def checked_fields(kind: type[_R]) -> type[_R]:
+    """Let a public dataclass refuse fields that are not of the annotated kind, as `checked` does of functions."""
+    cast(Any, kind).__init__ = checked(cast(Any, kind).__init__)
+    return kind
+
+
 def wrong_kind(name: str, value: object, kind: Any, of: str = "") -> ValueOutOfRange:
     """Return the error about a value of another kind.
 

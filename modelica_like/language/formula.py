@@ -146,7 +146,7 @@ class Formula(Arithmetic):
         units = [operand.unit(lookup, plain=plain) for operand in operands]
         if kind in _ALIKE:
             if not same_dimension(units[0], units[1]):
-                raise UnitError(f"'{self}' mixes {units[0]} and {units[1]}.")
+                raise UnitError(f"'{self}' mixes {units[0]} and {units[1]}.", advice=self._with_unit(units))
             return units[1] if units[0] == ANY else units[0]
         if kind in ("*", "/"):
             return _product(units[0], units[1] if kind == "*" else units[1] ** -1, plain=plain)
@@ -157,6 +157,13 @@ class Formula(Arithmetic):
         if kind not in _SAME and not same_dimension(units[0], ONE):
             raise UnitError(f"'{self}' takes a number; '{operands[0]}' is in {units[0]}.")
         return units[0] if kind in _SAME else ONE
+
+    def _with_unit(self, units: list[Unit]) -> str:
+        """Return what to write for an operand that is a plain number beside one with a unit."""
+        for operand, other in zip(self.operands, reversed(units), strict=True):
+            if operand._is_number():
+                return f"Give the number its unit: {float(operand.evaluate(lookup=str)):g} {other}."
+        return ""
 
     def _power(self, base: Unit, exponent: Unit) -> Unit:
         power = self.operands[1]

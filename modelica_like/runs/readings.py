@@ -301,6 +301,9 @@ def _locks(model: CompiledDae, owner: str) -> tuple[Change, ...]:
 
 def _mode_change(model: CompiledDae, name: str, inside: str) -> Output:
     parts = _CHANGE.match(inside)
+    if parts is None and _CONDITION.fullmatch(inside) and "->" not in inside:
+        advice = f"When a condition is true for the first time is first({inside.strip()})."
+        raise UnknownName(f"'{name}': only mode changes have a time(…).", advice=advice)
     if parts is None:
         raise UnknownName(
             f"'{name}' does not say which mode change.",

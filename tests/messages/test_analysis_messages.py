@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from components import ConstantTorque, Inertia
-from modelica_like import build, open_loop, overlay, simulate
+from modelica_like import build, open_loop, order_response, overlay, simulate
 from modelica_like.analyse.calibration.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
 from modelica_like.analyse.calibration.measurements import read_table
 from modelica_like.analyse.linear.campbell import campbell
@@ -56,6 +56,10 @@ class Accelerated(Component):
 
 def model() -> Any:
     return build(Accelerated())
+
+
+def excited() -> Any:
+    return linearize(model(), inputs=["torque.tau_constant"], outputs=["mass.w"])
 
 
 def swept(**changed: Any) -> Any:
@@ -171,8 +175,19 @@ Leave the row out; variables with gaps at other times are measurements of their 
 A measurement has nothing that is measured."""),
     "no such column is given": (UnknownName, lambda: fitted(OperatingPoints({"torque.tau_constant": [1.0], "mass.w": [1.0]}, given=["torque.tau"])), """\
 The table of operating points has no column 'torque.tau'; did you mean 'torque.tau_constant'?"""),
+    "a text in the place of names": (ValueOutOfRange, lambda: OperatingPoints({"mass.w": [1.0]}, given="mass.w"), """\
+OperatingPoints: given = 'mass.w' is no list of texts.
+Give one, such as ["…"]."""),
     "an uncertainty of nothing": (UnknownName, lambda: fitted(Numbers({"mass.w": 1.0}, uncertainty={"mas.w": 0.1}, until=1.0)), """\
 The uncertainty of 'mas.w' belongs to nothing measured; did you mean 'mass.w'?"""),
+    "a speed of an order that is no number": (ValueOutOfRange, lambda: order_response(excited(), {1.0: 1.0}, [1.0, float("nan")]), """\
+Speeds of an order response must be finite, and at least one."""),
+    "no speed of an order": (ValueOutOfRange, lambda: order_response(excited(), {1.0: 1.0}, []), """\
+Speeds of an order response must be finite, and at least one."""),
+    "an order that is no number": (ValueOutOfRange, lambda: order_response(excited(), {float("nan"): 1.0}, [1.0]), """\
+Orders of an excitation must be above zero, and finite."""),
+    "an amplitude of an order that is no number": (ValueOutOfRange, lambda: order_response(excited(), {1.0: float("nan")}, [1.0]), """\
+Amplitudes of an excitation must be finite."""),
     "a measurement sets what is to be found": (ValueOutOfRange, lambda: fitted(Numbers({"mass.w": 1.0}, until=1.0, parameters={"mass.J": 2.0})), """\
 mass.J is to be found, and a measurement sets it.
 Leave it out at one of the two places."""),

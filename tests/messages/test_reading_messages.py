@@ -11,7 +11,7 @@ import pytest
 
 from modelica_like import ModelicaLikeError, build, calibrate, load_spectrum, sensitivities, simulate, sweep
 from modelica_like.analyse.sizing import load_of
-from modelica_like.errors import MissingValue, NetlistError, UnknownName, ValueOutOfRange
+from modelica_like.errors import MissingValue, NetlistError, UnitError, UnknownName, ValueOutOfRange
 from modelica_like.runs.readings import read_output
 from modelica_like.runs.recorded import RecordedModel, RecordedSolution, RecordedVariable
 from modelica_like.runs.results import settled
@@ -38,6 +38,12 @@ CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
     "a formula of readings": (UnknownName, lambda: run().read("rms(clutch.tau)*max(clutch.tau)"), """\
 'rms(clutch.tau)*max(clutch.tau)' calculates with readings of a run, which formulas cannot.
 Ask for each reading and calculate with the numbers; a formula may stand inside: max(a.tau + b.tau)."""),
+    "a condition with a time": (UnknownName, lambda: run().read("time(table.v > 1 m/s)"), """\
+'time(table.v > 1 m/s)': only mode changes have a time(…).
+When a condition is true for the first time is first(table.v > 1 m/s)."""),
+    "a condition with a plain number": (UnitError, lambda: run().read("first(table.v > 10)"), """\
+'table.v - 10.0' mixes m/s and 1.
+Give the number its unit: 10 m/s."""),
     "half a reading": (UnknownName, lambda: run().read("max(clutch.tau)/2"), """\
 'max(clutch.tau)/2' calculates with readings of a run, which formulas cannot.
 Ask for each reading and calculate with the numbers; a formula may stand inside: max(a.tau + b.tau)."""),

@@ -91,13 +91,18 @@ def order_response(linear: LinearModel, excitation: Mapping[float, complex], spe
         speeds: of the rotation in rad/s.
 
     Raises:
-        ValueOutOfRange: the linear model has another number of inputs, or an order is not above zero.
+        ValueOutOfRange: the linear model has another number of inputs, an order is not above zero, or a speed or
+            amplitude is not finite.
     """
     if len(linear.inputs) != 1:
         raise ValueOutOfRange(f"An excitation acts on one input, and the linear model has {len(linear.inputs)}.")
-    if not excitation or min(excitation) <= 0:
-        raise ValueOutOfRange("Orders of an excitation must be above zero.")
+    if not excitation or not all(0 < order < np.inf for order in excitation):
+        raise ValueOutOfRange("Orders of an excitation must be above zero, and finite.")
+    if not np.all(np.isfinite(list(excitation.values()))):
+        raise ValueOutOfRange("Amplitudes of an excitation must be finite.")
     speeds = np.atleast_1d(np.asarray(speeds, float))
+    if not speeds.size or not np.all(np.isfinite(speeds)):
+        raise ValueOutOfRange("Speeds of an order response must be finite, and at least one.")
     responses = [size * linear.response(n * speeds / (2 * np.pi))[:, 0] for n, size in excitation.items()]
     return OrderResponse(linear, tuple(map(float, excitation)), speeds, np.stack(responses, axis=1))
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from modelica_like.analyse.operating.steady import OperatingPoint, steady, steady_slopes
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
+from modelica_like.arguments import checked_fields
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import DuplicateName, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import Unit, parse_unit, to_si
@@ -43,6 +44,7 @@ class Measurement(ABC):
         """Compare a model that has the values under test, and differentiate by the parameters `names`."""
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Numbers(Measurement):
     """Numbers read off one run, such as a lock-up time.
@@ -75,6 +77,7 @@ class Numbers(Measurement):
         return (now - wanted) / sizes, sensitivity.derivatives / sizes[:, None], list(self.values)
 
 
+@checked_fields
 @dataclass(frozen=True)
 class OperatingPoints(Measurement):
     """Steady states: a table whose rows set some parameters and measure some variables.
@@ -115,6 +118,7 @@ class OperatingPoints(Measurement):
         return np.concatenate(deviations), np.concatenate(slopes), labels
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Trajectories(Measurement):
     """Measured curves over time.
