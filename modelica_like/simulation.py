@@ -194,7 +194,10 @@ class _Run:
 
     def __call__(self, options: Options) -> Solution:
         model = self.model
-        loop = self.loop(model, options, upper.initialize(model, self.t0, self.start), self.end, self.progress)
+        point = upper.initialize(model, self.t0, self.start)
+        loop = self.loop(model, options, point, self.end, self.progress)
+        if self.start == "steady":
+            loop.record.notices += upper.unstable("The steady state at the start", model, point)
         numbers = collector(model, self.readings, options.atol)
         if self.readings:
             loop.record.keeper.read = lambda steps: numbers.feed(loop.dense(steps))

@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from modelica_like.analyse.operating.steady import unstable as unstable
     from modelica_like.analyse.sensitivity.function import simulation_function as simulation_function
     from modelica_like.native.handle import Native as Native
     from modelica_like.native.run import EngineLoop as EngineLoop
@@ -35,6 +36,7 @@ _HOME = {
     "schematic": "show.draw",
     "simulation_function": "analyse.sensitivity.function",
     "sizing_report": "show.report.sizing",
+    "unstable": "analyse.operating.steady",
 }
 
 

@@ -430,7 +430,8 @@ def test_which_of_two_steady_states_is_stable():
     for sign, near in ((-1, 150.0), (1, 50.0)):
         machine = AsynchronousMachine(p=2, Jr=J, tau_k=tau_k, s_k=s_k, w=near)
         parts = {"machine": machine, "load": ConstantTorque(tau_constant=-load)}
-        point = steady(Assembly("d", parts=parts, series={"s": list(parts)}))
+        drive = Assembly("d", parts=parts, series={"s": list(parts)})
+        point = steady(drive)
         q = tau_k / load
         s = s_k * (q + sign * np.sqrt(q**2 - 1))
         assert point["machine.w"] == pytest.approx(w_s * (1 - s), rel=1e-9)
@@ -441,6 +442,8 @@ def test_which_of_two_steady_states_is_stable():
         told = [f"It is not stable: what departs from it grows to e times in {1 / rate:.3g} s."] if rate > 0 else []
         assert list(point.notices) == told
         assert all(line in str(point) for line in told)
+        start = [line.replace("It", "The steady state at the start") for line in told]
+        assert list(simulate(drive, 0.1, start="steady").notices) == start
 
 
 @pytest.mark.parametrize("damping", [0.0, 1.0])

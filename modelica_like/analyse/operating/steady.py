@@ -93,20 +93,12 @@ class OperatingPoint(Shown, Mapping[str, float]):
 
         Less than 1e-6 of the fastest small motion counts as 0.
         """
-        if self.model.events.delay_parts or sampled(self.model, ()):
-            return float("nan")
-        rates, motions = slopes(self.model, self.point, "ode", columns=[]).x, free_motions(self.model, self.point)
-        values = np.linalg.eigvals(rates[motions.keep] @ motions.shape)
-        fastest = float(np.max(values.real, initial=0.0))
-        return fastest if fastest > _NO_GROWTH * np.max(np.abs(values), initial=0.0) else 0.0
+        return growth(self.model, self.point)
 
     @property
     def notices(self) -> tuple[str, ...]:
         """What a reader of its numbers should know; of drives with up to 500 states whether it is stable."""
-        growth = self.growth if len(self.model.states) <= _MOST_STATES else 0.0
-        return (
-            (f"It is not stable: what departs from it grows to e times in {1 / growth:.3g} s.",) if growth > 0 else ()
-        )
+        return unstable("It", self.model, self.point)
 
     def __str__(self) -> str:
         lines = [f"Operating point of {self.model.name}"]
@@ -118,6 +110,22 @@ class OperatingPoint(Shown, Mapping[str, float]):
         lines += [f"  {path} sticks" for path in self.stuck]
         lines += [f"  {notice}" for notice in self.notices]
         return "\n".join(lines)
+
+
+def growth(model: CompiledDae, point: Point) -> float:
+    """Return the rate in 1/s at which what departs from a steady state grows, as `OperatingPoint.growth`."""
+    if model.events.delay_parts or sampled(model, ()):
+        return float("nan")
+    rates, motions = slopes(model, point, "ode", columns=[]).x, free_motions(model, point)
+    values = np.linalg.eigvals(rates[motions.keep] @ motions.shape)
+    fastest = float(np.max(values.real, initial=0.0))
+    return fastest if fastest > _NO_GROWTH * np.max(np.abs(values), initial=0.0) else 0.0
+
+
+def unstable(what: str, model: CompiledDae, point: Point) -> tuple[str, ...]:
+    """Return the notice about a steady state, called `what`, that is not stable: none if it is, or is too large."""
+    rate = growth(model, point) if len(model.states) <= _MOST_STATES else 0.0
+    return (f"{what} is not stable: what departs from it grows to e times in {1 / rate:.3g} s.",) if rate > 0 else ()
 
 
 @checked
