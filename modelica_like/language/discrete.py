@@ -95,6 +95,7 @@ def is_a(symbol: Symbol, kind: type | tuple[type, ...]) -> bool:
 
 
 _JOINS = {ca.OP_AND: ca.logic_and, ca.OP_OR: ca.logic_or}
+_CONDITIONS = (*_JOINS, ca.OP_NOT, ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE)
 SILENT, CONTINUOUS = 2.0, 3.0
 """Marks of conditions without events: asked for, or with branches that meet wherever the condition changes."""
 
@@ -123,21 +124,22 @@ def eventful(condition: Expr | bool) -> Expr:
         condition: relations and Boolean variables, joined with `all_of`, `any_of`, `negate`.
 
     Raises:
-        LanguageError: it compares values that change continuously by `==`, or is no condition.
+        LanguageError: it compares values that change continuously by `==`, or is no condition; two conditions may be.
     """
     expression: Any = ca.SX(cast(Any, condition))
     operation = expression.op()
-    if silence(expression):
+    if silence(expression) or not moves(expression):
         return expression
     if operation in _JOINS:
         return _JOINS[operation](*(cast(Any, eventful(expression.dep(k))) for k in (0, 1)))
     if operation == ca.OP_NOT:
         return ca.logic_not(cast(Any, eventful(expression.dep(0))))
-    if not moves(expression):
-        return expression
     if operation in (ca.OP_LT, ca.OP_LE):
         return marker("relation", expression)
     if operation in (ca.OP_EQ, ca.OP_NE):
+        sides = [expression.dep(k) for k in (0, 1)]
+        if all(side.op() in _CONDITIONS or not moves(side) for side in sides):
+            return ca.SX.binary(operation, *map(eventful, sides))
         what = f"{expression} compares values that change continuously: they are equal at single instants only."
         raise LanguageError(what, where=caller(), advice="Write a relation with < or >.")
     what = f"{expression} is not a condition: it changes continuously."

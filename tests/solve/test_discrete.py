@@ -301,6 +301,33 @@ def test_relations_are_located(solver):
     assert times(found, "relation[2]") == pytest.approx([2], abs=CLOSE)
 
 
+class Compared(Component):
+    """Two conditions are equal except from 0.3 s to 0.6 s."""
+
+    rate: Parameter = param("1/s", "rate", default=1.0)
+    x: Variable = var("1", "rises", default=0)
+    q: Variable = var("1", "time for which they differ", default=0)
+    alike: Discrete = boolean("whether they are equal")
+    late: Discrete = boolean("whether x is above 0.6")
+    n: Discrete = integer("how often they became equal")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate
+        yield self.late == (self.x > 0.6)
+        yield self.alike == ((self.x > 0.3) == self.late)
+        yield der(self.q) == self.rate * if_((self.x > 0.3) != (self.x > 0.6), 1, 0)
+
+    def events(self) -> Events:
+        yield when(self.late == (self.x > 0.3), {self.n: pre(self.n) + 1})
+
+
+def test_conditions_are_compared(solver):
+    found = run(Compared(), 1.0, solver)
+    assert found.final["q"] == pytest.approx(0.3, abs=1e-9)
+    assert (found.final["alike"], found.final["n"]) == (1, 1)
+    assert found.at(0.45)["alike"] == 0
+
+
 class Source(Component):
     """A Boolean that a part has."""
 
