@@ -10,6 +10,7 @@
 #define SMOOTHER 0.6      /* leaves more than this part of them */
 #define SMOOTH 7          /* a kink that has come again so often is smooth */
 #define DEGREE 5          /* of the polynomial through rows */
+#define SPREAD 0.5        /* least distance of rows in a polynomial, in the step around the time */
 #define APART 1e-12       /* relative: nearer rows tell nothing but rounding */
 #define FEWEST 4          /* rows of a step */
 #define MOST 256
@@ -57,26 +58,34 @@ void keep_past(Instance *c, double t, const double *point, double order) {
     }
 }
 
-/* The polynomial through the rows around a time, none of them on the other side of a jump or kink (Neville). */
+/* The next row on one side that is at least so far away, or -1 at an end of the past, a jump or a kink. */
+static int row_beside(const Instance *c, int from, int way, double apart) {
+    int k = from;
+    do {
+        if (way < 0 ? k == 0 || row_at(c, k)->order >= 0 : k + 1 == c->state.n_past || row_at(c, k + 1)->order >= 0)
+            return -1;
+        k += way;
+    } while (fabs(row_at(c, k)->t - row_at(c, from)->t) < apart);
+    return k;
+}
+
+/* The polynomial through the rows around a time (Neville). Beside a long step rows of short ones are passed over: they
+   have the same noise, which a polynomial through a crowd of them makes the larger the farther away it is. */
 static double past_value(const Instance *c, int which, double t) {
-    int low = 0, high = c->state.n_past, first, last, n;
+    int low = 0, high = c->state.n_past, first, last, n = 0;
     double times[DEGREE + 1], values[DEGREE + 1];
     while (high - low > 1) {
         int middle = (low + high) / 2;
         *(row_at(c, middle)->t <= t ? &low : &high) = middle;
     }
     if (t <= row_at(c, 0)->t) return row_at(c, 0)->values[which];
-    for (first = last = low; last - first < DEGREE;) {
-        int before = first > 0 && row_at(c, first)->order < 0;
-        int behind = last + 1 < c->state.n_past && row_at(c, last + 1)->order < 0;
-        if (!before && !behind) break;
-        if (behind && (last == low || !before || row_at(c, last + 1)->t - t < t - row_at(c, first - 1)->t)) last++;
-        else first--;
-    }
-    n = last - first + 1;
-    for (int k = 0; k < n; k++) {
-        times[k] = row_at(c, first + k)->t;
-        values[k] = row_at(c, first + k)->values[which];
+    double apart = low + 1 < c->state.n_past ? SPREAD * (row_at(c, low + 1)->t - row_at(c, low)->t) : 0;
+    for (int row = first = last = low; row >= 0 && n <= DEGREE;) {
+        times[n] = row_at(c, row)->t;
+        values[n++] = row_at(c, row)->values[which];
+        int before = row_beside(c, first, -1, apart), behind = row_beside(c, last, 1, apart);
+        int later = behind >= 0 && (last == low || before < 0 || row_at(c, behind)->t - t < t - row_at(c, before)->t);
+        row = later ? (last = behind) : before >= 0 ? (first = before) : -1;
     }
     for (int step = 1; step < n; step++)
         for (int k = 0; k + step < n; k++)

@@ -24,6 +24,8 @@ from modelica_like.language import (
     discrete,
     if_,
     integer,
+    maximum,
+    minimum,
     mod,
     param,
     pre,
@@ -83,6 +85,30 @@ def test_pieces_are_shorter_where_the_past_moves_fast(run: Run):
     late = np.maximum(found.time - 1.0, 0.0)
     assert found["y"] == pytest.approx(np.sin(100 * late), abs=1e-8)
     assert found["x"] == pytest.approx(1 - np.cos(100 * late), abs=1e-6)  # without a delay IDAS is off by 2e-7
+
+
+class Uneven(Component):
+    """A decay is delayed, while the kinks of another rate make some steps very short."""
+
+    T: Parameter = param("s", "delay", default=0.2)
+    tau: Parameter = param("s", "time constant", default=1.0)
+    x: Variable = var("1", "decays", default=1.0)
+    q: Variable = var("1", "integral of a rate with kinks", default=0.0)
+    late: Variable = var("1", "x, later")
+
+    def equations(self) -> Equations:
+        t = self.time / self.tau
+        yield self.late == delay(self.x, self.T)
+        yield self.tau * der(self.x) == -self.x
+        yield self.tau * der(self.q) == minimum(sin(0.5 * t), maximum(self.x, sin(4 * t)))
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9])
+def test_short_steps_beside_long_ones_leave_the_past_as_it_was(run: Run, rtol: float):
+    """The past has the errors of the run, up to about ten tolerances with IDAS, and no more."""
+    found = run(Uneven(), 4.0, rtol)
+    late = found.time > 0.2
+    assert found["late"][late] == pytest.approx(np.exp(0.2 - found.time[late]), abs=20 * rtol)
 
 
 class Relay(Component):
