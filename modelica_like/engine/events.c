@@ -9,6 +9,7 @@
 #define LATER 1e3     /* time resolutions, for the difference of a rate: what turns round in less is at rest */
 #define CLEARS 0.5    /* least height of a rebound above zero, in its whole height: less of it is rounding */
 #define NEVER 1e29    /* s: a moment that does not come */
+#define JUMPED 1e-6   /* share of what a guard was before an update: a jump to less is one to zero */
 #define CONVERGES 0.9 /* length of a crowd over the one before: rebounds come to their end, chattering does not */
 #define CROWDED 1e-6  /* of the run: in less time, CROWD further instants follow each other ever faster */
 
@@ -240,11 +241,13 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
     return RESULT_OK;
 }
 
-/* Adds guards that an update has made positive, however soon they will fall again: a rebound may be that short. */
+/* Adds guards that an update has made positive, however soon they will fall again: a rebound may be that short. One
+   that jumps to zero, up to rounding and the location of the event, is judged by where it goes, as others are. */
 static void want_jumped(Instance *c, const double *before, unsigned char *wanting) {
     values_now(c, &c->model->tapes.guards, c->guards_before);
     for (int g = 0; g < c->model->n_guards; g++)
-        if (before[g] < 0 && c->guards_before[g] > 0 && guard_active(c, g)) wanting[c->model->guard_transition[g]] = 1;
+        if (before[g] < 0 && c->guards_before[g] > -JUMPED * before[g] && guard_active(c, g))
+            wanting[c->model->guard_transition[g]] = 1;
 }
 
 /* Fire what wants to fire until nothing does. `wanting` holds the state events that were located, if `located`. */

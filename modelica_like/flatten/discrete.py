@@ -107,6 +107,7 @@ class DiscreteEquations:
         self._write_markers(
             [*others, *expressions, *((e, u.source) for u in self.updates for e in (u.active, u.value))]
         )
+        self.events = [_in_a_round(event) if isinstance(event, Transition) else event for event in self.events]
 
     def forms(self, path: Any) -> tuple[UpdateForm, ...]:
         """Return the updates without their expressions; `path` names a symbol from the component."""
@@ -184,7 +185,7 @@ class DiscreteEquations:
                 if isinstance(marker, Part):
                     seen.update(map(id, parts(marker.whole)))
                     # Before the start, a delay is its value at the start.
-                    marker.whole.of = with_events(marker.whole.of)
+                    marker.whole.of = with_events(between_events(marker.whole.of))
                     self.delays.append((marker.whole, source))
                     for k, part in enumerate(parts(marker.whole)):
                         part.name = f"delay[{len(self.delays)}][{k}]"
@@ -294,6 +295,13 @@ def between_events(expression: Any) -> Any:
     if not pres:
         return expression
     return ca.substitute(ca.SX(expression), ca.vertcat(*pres), ca.vertcat(*(pre.of for pre in pres)))
+
+
+def _in_a_round(transition: Transition) -> Transition:
+    """Return a transition as a round of an instant sees it, before the updates: there `pre(v)` of a relation is v."""
+    whole = {name: between_events(e) for name in ("when", "at") if (e := getattr(transition, name)) is not None}
+    reset = {key: between_events(value) for key, value in transition.reset.items()}
+    return replace(transition, reset=reset, **cast(Any, whole))
 
 
 def is_discrete(equation: Equation) -> bool:

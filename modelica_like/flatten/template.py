@@ -363,7 +363,7 @@ def _energy_terms(component: Component, wiring: Iterable[Connection | FreeEnd]) 
     passed_on = {id(end) for joint in wiring if isinstance(joint, Connection) for end in joint.ends}
     terms: list[Any] = [component.stored_energy(), component.loss_power(), component.source_power()]
     terms += [c.power() for c in component.connectors.values() if c.used and id(c) not in passed_on]
-    return [ca.SX(cast(Any, term)) for term in terms]
+    return [between_events(ca.SX(cast(Any, term))) for term in terms]
 
 
 def _rows(sparsity: ca.Sparsity) -> tuple[tuple[int, ...], ...]:

@@ -25,6 +25,7 @@ from modelica_like.language import (
     clock,
     connect,
     cos,
+    delay,
     der,
     discrete,
     edge,
@@ -326,6 +327,63 @@ def test_conditions_are_compared(solver):
     assert found.final["q"] == pytest.approx(0.3, abs=1e-9)
     assert (found.final["alike"], found.final["n"]) == (1, 1)
     assert found.at(0.45)["alike"] == 0
+
+
+class Stairs(Component):
+    """What `pre` of a discrete variable means in what is located: the value of the variable before each round."""
+
+    rate: Parameter = param("1/s", "rate", default=1.0)
+    T: Parameter = param("s", "period of a count", default=0.2)
+    x: Variable = var("1", "time", default=0)
+    stepped: Variable = var("1", "integral of an if that compares with a count", default=0)
+    whole: Variable = var("1", "integral of a whole number less the count", default=0)
+    late: Variable = var("1", "integral of a count that is delayed", default=0)
+    n: Discrete = integer("counts by the clock")
+    passed: Discrete = integer("counts every 0.3 that x rises")
+    period: Discrete = discrete("s", "of another clock, which is doubled at 0.55 s", start=0.1)
+    ticks: Discrete = integer("counts by that clock")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate
+        yield der(self.stepped) == self.rate * if_(self.x > 0.1 + self.T * self.rate * pre(self.n), 1, 0)
+        yield der(self.whole) == self.rate * floor(10 * self.x - pre(self.n), events=True)
+        yield der(self.late) == self.rate * delay(pre(self.n), self.T / 2)
+
+    def events(self) -> Events:
+        yield when(clock(self.T, self.T), {self.n: pre(self.n) + 1})
+        yield when(self.x > 0.3 * (pre(self.passed) + 1), {self.passed: pre(self.passed) + 1})
+        yield when(clock(pre(self.period)), {self.ticks: pre(self.ticks) + 1})
+        yield when(self.time > 0.55 / self.rate, {self.period: 2 * pre(self.period)})
+
+
+def test_the_value_before_in_what_is_located(solver):
+    """n = ⌊t/0.2⌋; half of each step counts; ⌊10 t - n⌋ is 0, 1, 1, 2, 2, 3, … tenths; n is late by 0.1 s."""
+    found = run(Stairs(), 1.0 + 1e-6, solver)
+    assert found.final["stepped"] == pytest.approx(0.5, abs=2e-6)
+    assert found.final["whole"] == pytest.approx(0.1 * sum(k - k // 2 for k in range(10)), abs=1e-5)
+    assert found.final["late"] == pytest.approx(0.2 * (0 + 1 + 2 + 3) + 0.1 * 4, abs=1e-5)
+    assert (found.final["n"], found.final["passed"], found.final["ticks"]) == (5, 3, 6)
+
+
+class Commutated(Component):
+    """A count that follows x to the nearest multiple of 0.3: each count leaves it just at the other border."""
+
+    rate: Parameter = param("1/s", "rate", default=-1.0)
+    x: Variable = var("1", "position", default=0)
+    n: Discrete = integer("multiple")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate
+
+    def events(self) -> Events:
+        off = self.x - 0.3 * pre(self.n)
+        yield when(off > 0.15, {self.n: pre(self.n) + 1}).elsewhen(off < -0.15, {self.n: pre(self.n) - 1})
+
+
+@pytest.mark.parametrize("rate", [-1.0, 1.0, -37.0])
+def test_rounding_does_not_count_back(solver, rate):
+    found = run(Commutated(rate=rate), 2.0, solver)
+    assert found.final["n"] == round(2 * rate / 0.3)
 
 
 class Source(Component):
