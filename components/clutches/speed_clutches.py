@@ -43,7 +43,7 @@ class ViscousClutch(Commanded, Lossy, CompliantWithRelativeStates):
     """
 
     icon = icons.VISCOUS
-    fill: Input = signal_in("1", "filling of the working space, 0 to 1", default=1.0)
+    fill: Input = signal_in("1", "filling of the working space, 0 to 1; less is none", default=1.0)
     tau_nominal: Parameter = param("N.m", "torque at w_nominal and T_nominal", min=0)
     w_nominal: Parameter = param("rad/s", "slip to which tau_nominal belongs", min=1e-12)
     p: Parameter = param("1", "exponent of the slip", default=1.0, min=0)
@@ -57,7 +57,7 @@ class ViscousClutch(Commanded, Lossy, CompliantWithRelativeStates):
         T = self.heat_port.T if self.heat_port.used else self.T
         w, scale = self.w_rel / self.w_nominal, self.w_smooth / self.w_nominal
         law = w * (w**2 + scale**2) ** (0.5 * (self.p - 1))
-        yield self.tau == self.tau_nominal * self.fill * exp(-self.beta * (T - self.T_nominal)) * law
+        yield self.tau == self.tau_nominal * maximum(self.fill, 0) * exp(-self.beta * (T - self.T_nominal)) * law
 
     def events(self) -> Events:
         yield from super().events()

@@ -149,7 +149,7 @@ class OpenPlates(Feasible, Commanded, Lossy, CompliantWithRelativeStates):
     """
 
     icon = icons.OPEN_PLATES
-    fill: Input = signal_in("1", "part of the gaps that is full of oil, 0 to 1", default=1.0)
+    fill: Input = signal_in("1", "part of the gaps that is full of oil, 0 to 1; less is none", default=1.0)
     n: Parameter = param("1", "number of gaps", default=1.0, min=0)
     r_o: Parameter = param("m", "outer radius of the plates", min=1e-12)
     r_i: Parameter = param("m", "inner radius of the plates", default=0.0, min=0)
@@ -165,7 +165,7 @@ class OpenPlates(Feasible, Commanded, Lossy, CompliantWithRelativeStates):
     def equations(self) -> Equations:
         yield from super().equations()
         drag = self.n * pi * self.eta * (self.r_o**4 - self.r_i**4) / (2 * self.h)
-        yield self.tau == drag * self.fill * self.w_rel
+        yield self.tau == drag * maximum(self.fill, 0) * self.w_rel
 
     def events(self) -> Events:
         yield from super().events()

@@ -17,6 +17,7 @@ from components import (
     Inertia,
     Mass,
     OldhamCoupling,
+    OpenPlates,
     Position,
     Rope,
     RuptureCoupling,
@@ -149,11 +150,17 @@ def test_disc_of_an_oldham_coupling_is_an_inertia() -> None:
     assert run.energy().power_closure <= 1e-8
 
 
-def test_filling_of_a_viscous_clutch() -> None:
-    clutch = ViscousClutch(tau_nominal=10.0, w_nominal=50.0, fill=0.25)
+@pytest.mark.parametrize(("fill", "share"), [(0.25, 0.25), (-0.5, 0.0)])
+def test_filling_of_a_viscous_clutch(fill: float, share: float) -> None:
+    """Less than nothing in it is nothing: it never drives."""
+    clutch = ViscousClutch(tau_nominal=10.0, w_nominal=50.0, fill=fill)
+    plates = OpenPlates(n=4, r_o=0.1, r_i=0.05, h=1e-4, eta=0.05, fill=fill)
     parts: dict[str, Component] = {"motor": ConstantSpeed(w_fixed=100.0), "clutch": clutch, "wall": Fixed()}
-    run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 0.1, **TIGHT)
-    assert run.final["clutch.tau"] == pytest.approx(-5.0)
+    beside = {"plates": ["motor.flange", "plates.flange_a"], "still": ["plates.flange_b", "wall.flange"]}
+    drive = Assembly("drive", parts={**parts, "plates": plates}, series={"s": list(parts)}, connect=beside)
+    run = simulate(drive, 0.1, **TIGHT)
+    assert run.final["clutch.tau"] == pytest.approx(-20.0 * share)
+    assert run.final["plates.tau"] == pytest.approx(-4 * np.pi * 0.05 * (0.1**4 - 0.05**4) / 2e-4 * 100 * share)
 
 
 @pytest.mark.parametrize(("cones", "blocks"), [(1.001, True), (0.999, False)])
