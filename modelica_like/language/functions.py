@@ -11,7 +11,7 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError
-from modelica_like.language.discrete import CONTINUOUS, Marker, if_, marker, silent
+from modelica_like.language.discrete import CONTINUOUS, Marker, if_, marker, moves, silent
 from modelica_like.language.expr import (
     TIME,
     Expr,
@@ -130,9 +130,9 @@ def floor(x: Scalar, *, events: bool | None = None) -> Expr:
         x: an expression or a number.
         events: as of `where`.
     """
-    if events:
+    if events and moves(_sx(x)):
         return marker("floor", _sx(x))
-    return ca.floor(_sx(x)) if events is None else -ca.ceil(-_sx(x))
+    return -ca.ceil(-_sx(x)) if events is False else ca.floor(_sx(x))
 
 
 def mod(x: Scalar, y: Scalar, *, events: bool | None = None) -> Expr:

@@ -14,6 +14,7 @@ from modelica_like.language import (
     Component,
     Equations,
     Events,
+    Mode,
     Parameter,
     Variable,
     any_of,
@@ -361,6 +362,55 @@ def test_the_value_of_an_input_is_an_equation(kind: str, tmp_path: Path) -> None
     assert result["one.y"] == pytest.approx(0.5 * t**3 + t - 1 + np.exp(-t), rel=1e-8, abs=1e-10)
     assert result["constant_rate.y"] == pytest.approx(4 * t, rel=1e-10, abs=1e-12)
     assert result["one_s"] == pytest.approx(2.0)
+
+
+REMAINDERS = """model Remainders
+  Real x(start = 0, fixed = true);
+  Integer n, k;
+equation
+  der(x) = 1;
+  when sample(0.35, 0.2) then
+    n = pre(n) + 1;
+  end when;
+  when x > 0.3 + 0.2*mod(pre(n), 3) then
+    k = pre(k) + 1;
+  end when;
+end Remainders;
+"""
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_remainder_of_a_count_changes_with_it(solver, tmp_path: Path) -> None:
+    """The border is 0.3, then 0.5 from 0.35 s, 0.7 from 0.55 s, and 0.3 again from 0.75 s: x passes it three times."""
+    (file := tmp_path / "remainders.mo").write_text(REMAINDERS)
+    assert simulate(load(file), 1.0, solver=solver).final["k"] == 3
+
+
+class Thrown(Component):
+    """Begins beyond the wall, where it turns at once, and comes back to the other one."""
+
+    x: Variable = var("1", "position", state="always", default=1.5)
+    v: Variable = var("1", "speed", state="always", default=1.0)
+    rate: Parameter = param("1/s", "unit of speed", default=1.0)
+    way = Mode("right", "left")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate * self.v
+        yield der(self.v) == 0
+
+    def events(self) -> Events:
+        yield self.way.go("right", "left", when=self.x > 1, reset={self.v: -self.v})
+        yield self.way.go("left", "right", when=self.x < 0, reset={self.v: -0.5 * self.v})
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_what_happens_at_the_start_happens_in_the_text_too(solver, tmp_path: Path) -> None:
+    """1.5 s to the left with the speed 1, then 0.5 s to the right with half of it."""
+    (file := tmp_path / "thrown.mo").write_text(modelica_text(Assembly("d", parts={"ball": Thrown()})))
+    for drive in (Thrown(), load(file)):
+        end = simulate(drive, 2.0, solver=solver).final
+        x, v = (end[next(name for name in end if name.rpartition(".")[2] == last)] for last in ("x", "v"))
+        assert (x, v) == pytest.approx((0.25, 0.5), abs=1e-9)
 
 
 class Counting(Component):

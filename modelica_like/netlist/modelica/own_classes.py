@@ -96,7 +96,8 @@ def _events(component: Component) -> list[str]:
         lines.append(f"  {name} = if initial() then ({first}){rest} else pre({name});")
     resets = [e for e in events if isinstance(e, Transition) and e.reset]
     for k, event in enumerate(resets):
-        lines.append(f"  {'elsewhen' if k else 'when'} {_due(event, component)} then")
+        # What is true from the start has no edge in Modelica; here it fires at the start.
+        lines.append(f"  {'elsewhen' if k else 'when'} not initial() and {_due(event, component)} then")
         for target, value in event.reset.items():
             symbol, new = symbols_in(target)[0], _value(value, component, True)
             field = symbol.owner.fields[symbol.name]
