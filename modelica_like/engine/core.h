@@ -125,6 +125,7 @@ int guard_active(const Instance *c, int guard);
 double next_moment(Instance *c, int idle_too);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 void drop_balanced(Instance *c, double *soon);
+void drop_returning(Instance *c, const double *modes, double *soon);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
 int count_clocks(const Instance *c);
 Result tick(Instance *c, double *step);

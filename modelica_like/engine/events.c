@@ -89,16 +89,21 @@ void drop_balanced(Instance *c, double *soon) {
         if (number_or_false(now[k]) < 0 && soon[k] > 0 && soon[k] <= BALANCED * fabs(now[k])) soon[k] = now[k];
 }
 
-/* At the same edge a mode that was left in this round is not wanted back where that soon is no longer
- * so: what settles within few time resolutions moves so much within one that both modes want the other. `soon` as
+/* At the same edge a mode that was left in this instant is not wanted back where that soon is no longer so, in later
+ * rounds either, which updates ask for: what settles within few time resolutions moves so much within one that both
+ * modes want the other. Without `modes`, at the begin of an instant and for an importer, all count as left. `soon` as
  * above. */
-static void drop_returning(Instance *c, const double *modes, double *soon) {
+void drop_returning(Instance *c, const double *modes, double *soon) {
     const Model *m = c->model;
     double *now = c->guards_before;
+    int any = 0;
+    for (int k = 0; k < m->n_guards; k++) any |= number_or_false(soon[k]) > 0 && guard_active(c, k);
+    if (!any) return;
     values_now(c, &m->tapes.guards, now);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
-        int returns = guard_active(c, k) && modes[one->mode] == one->target && now[k] > 0;
+        int left = !modes || modes[one->mode] == one->target || c->d_begun[one->mode] == one->target;
+        int returns = guard_active(c, k) && left && now[k] > 0;
         if (returns && soon[k] > 0 && now[k] < LATER * (now[k] - soon[k])) soon[k] = -now[k];
     }
 }
@@ -260,6 +265,10 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     memset(c->entered, 0, (size_t)m->n_holds);
     leave_crowd(&c->state);
     if (find_wanting(c, wanting, !located)) {
+        if (!located && !c->bounded && m->n_guards > 0) {
+            drop_returning(c, NULL, c->guards);
+            keep_wanting(c, c->guards, wanting);
+        }
         if (m->n_ideals > 0 && !pushed(c) && !meet(c, -1, &met)) return RESULT_ERROR;
         if (!share_anew(c, wanting)) return RESULT_ERROR;
     }

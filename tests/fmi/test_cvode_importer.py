@@ -9,6 +9,21 @@ import pytest
 import sksundae.cvode as sundae
 
 from modelica_like import simulate
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Parameter,
+    Variable,
+    der,
+    if_,
+    integer,
+    param,
+    pre,
+    var,
+    when,
+)
 
 DRIVES = [
     "machine_table_direct", "machine_table_geared", "machine_tool_startup", "ravigneaux", "lepelletier", "dc_bench",
@@ -117,3 +132,27 @@ def test_a_gap_without_width_is_crossed_at_once(exported: Callable[..., Any]) ->
         importer.go(instant)
         overlap, pressed = importer.fmu.getReal([x, press])
         assert pressed == pytest.approx(overlap, abs=1e-9)
+
+
+class Slowed(Component):
+    """Goes on more slowly behind a border: an importer stops a time resolution before it, which then lasts longer."""
+
+    rate: Parameter = param("1/s", "first speed", default=1.0)
+    slower: Parameter = param("1", "second speed over the first one", default=0.3)
+    x: Variable = var("1", "position", default=0)
+    n: Discrete = integer("how often it passes the border")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate * if_(self.n > 0, self.slower, 1)
+
+    def events(self) -> Events:
+        yield when(self.x > 0.5123, {self.n: pre(self.n) + 1})
+
+
+@pytest.mark.parametrize("slower", [0.9, 0.3, 0.01])
+def test_a_border_behind_which_all_is_slower_is_passed_once(exported: Callable[..., Any], slower: float) -> None:
+    case = exported(Slowed(slower=slower))
+    importer = Importer(case.started("me", until=1.0), 1, case.model.events.guards.numel_out(0))
+    importer.go(1.0)
+    x, n = (next(one.reference for one in case.face.variables if one.name == name) for name in "xn")
+    assert importer.fmu.getReal([x, n]) == pytest.approx([0.5123 + slower * (1 - 0.5123), 1.0], abs=1e-7)
