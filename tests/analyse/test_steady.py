@@ -40,6 +40,7 @@ from modelica_like.language import (
     Output,
     Parameter,
     Variable,
+    absolute,
     clock,
     der,
     discrete,
@@ -444,6 +445,26 @@ def test_which_of_two_steady_states_is_stable():
         assert all(line in str(point) for line in told)
         start = [line.replace("It", "The steady state at the start") for line in told]
         assert list(simulate(drive, 0.1, start="steady").notices) == start
+
+
+class Kinked(Component):
+    """x' = c·|x| - b·x departs from zero to the right with the rate c - b, and comes back from the left."""
+
+    b: Parameter = param("1/s", "decay", default=0.5)
+    c: Parameter = param("1/s", "rate", default=2.0)
+    x: Variable = var("1", "state", state="always")
+    y: Variable = var("1", "follows", state="always")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.c * absolute(self.x) - self.b * self.x
+        yield der(self.y) == self.b * (self.x - self.y)
+
+
+@pytest.mark.parametrize(("c", "rate"), [(2.0, 1.5), (-2.0, 1.5), (0.4, 0.0)])
+def test_what_departs_to_one_side_of_a_kink_grows(c, rate):
+    point = steady(Kinked(c=c, x=guess(0.0), y=guess(0.0)))
+    assert (point["x"], point["y"]) == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert point.growth == pytest.approx(rate, rel=1e-6)
 
 
 @pytest.mark.parametrize("damping", [0.0, 1.0])

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.linear.held import free_motions
+from modelica_like.analyse.linear.held import Motions, free_motions
 from modelica_like.analyse.operating.sampling import change_with_samples, unsettled, with_samples
 from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae, Vector
@@ -17,7 +18,7 @@ from modelica_like.language.units import to_si
 from modelica_like.native.start import steady_between_ticks, steady_near
 from modelica_like.runs.trajectories import Trajectories
 from modelica_like.simulation import Model, build
-from modelica_like.solve.initialize import Point, call, holding
+from modelica_like.solve.initialize import Point, call, holding, solve_implicit
 from modelica_like.solve.initialize.memory import sampled
 from modelica_like.solve.initialize.slopes import Sizes, columns_of, nodes_of, slopes
 from modelica_like.upper import Shown
@@ -28,6 +29,9 @@ _CLOSE, _CLOSE_ENOUGH = 1e-12, 1e-9
 _ENERGY_LOSS, _ENERGY_SOURCE = 1, 2
 _NO_GROWTH = 1e-6
 """Share of the fastest motion: two zeros of a free rotation are known to the root of the rounding, 1e-8."""
+_ON_A_KINK, _ASIDE, _ALIKE = 1e-9, 1e-6, 1e-3
+"""How near a kink counts as being on it; how far beside it slopes are taken, relative to states of at least 1; and
+relative difference of slopes that are the same: those of smooth laws change less on that way."""
 _MOST_STATES = 500
 """Eigenvalues of more states take longer than a second."""
 
@@ -91,7 +95,8 @@ class OperatingPoint(Shown, Mapping[str, float]):
     def growth(self) -> float:
         """Rate in 1/s at which what departs from it grows: 0 if nothing does, nan where samples or delays decide that.
 
-        Less than 1e-6 of the fastest small motion counts as 0.
+        Less than 1e-6 of the fastest small motion counts as 0. Where it lies on a kink, such as that of |x|, what goes
+        straight away to one side counts, too.
         """
         return growth(self.model, self.point)
 
@@ -116,10 +121,48 @@ def growth(model: CompiledDae, point: Point) -> float:
     """Return the rate in 1/s at which what departs from a steady state grows, as `OperatingPoint.growth`."""
     if model.events.delay_parts or sampled(model, ()):
         return float("nan")
-    rates, motions = slopes(model, point, "ode", columns=[]).x, free_motions(model, point)
-    values = np.linalg.eigvals(rates[motions.keep] @ motions.shape)
-    fastest = float(np.max(values.real, initial=0.0))
+    motions = free_motions(model, point)
+    rates = _small_motions(model, point, motions)
+    values = np.linalg.eigvals(rates)
+    fastest = max(float(np.max(values.real, initial=0.0)), *_beside_kinks(model, point, motions, rates))
     return fastest if fastest > _NO_GROWTH * np.max(np.abs(values), initial=0.0) else 0.0
+
+
+def _small_motions(model: CompiledDae, point: Point, motions: Motions) -> Any:
+    """Return the rates of the motions that are left free by themselves, shape (kept, kept)."""
+    return slopes(model, point, "ode", columns=[]).x[motions.keep] @ motions.shape
+
+
+def _beside_kinks(model: CompiledDae, point: Point, motions: Motions, rates: Any) -> Iterator[float]:
+    """Yield at which rates something departs to one side, where the state lies on a kink: there slopes are others.
+
+    Only what goes straight away and stays on its side is looked at: what swings crosses the kink.
+    """
+    yield 0.0
+    if not np.any(np.abs(call(model, model.edges.function, point)[: model.edges.kinks]) < _ON_A_KINK):
+        return
+    scale = _ASIDE * np.maximum(np.abs(point.x), 1.0)
+
+    def beside(way: Any) -> Any:
+        """Return the small motions a little away; those of the point where there is no solution."""
+        moved = point.copy()
+        moved.x = point.x + scale * (motions.shape @ way)
+        with suppress(InitializationError):
+            solve_implicit(model, moved)
+            return _small_motions(model, moved, motions)
+        return rates
+
+    def alike(one: Any, other: Any) -> bool:
+        return np.allclose(one, other, rtol=_ALIKE, atol=_ALIKE * np.max(np.abs(rates), initial=0.0))
+
+    for way in (sign * row for row in np.eye(len(rates)) for sign in (1, -1)):
+        if alike(side := beside(way), rates):
+            continue
+        values, vectors = np.linalg.eig(side)
+        for value, vector in zip(values, vectors.T, strict=True):
+            along = vector.real / np.max(np.abs(vector.real), initial=1e-300)
+            if value.imag == 0 and value.real > 0 and any(alike(beside(sign * along), side) for sign in (1, -1)):
+                yield float(value.real)
 
 
 def unstable(what: str, model: CompiledDae, point: Point) -> tuple[str, ...]:
