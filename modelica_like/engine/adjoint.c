@@ -116,8 +116,7 @@ static void rates_back(Instance *c, double begin, double h, const double *rates)
             add_bars(c, vector_of(c, v));
         }
     }
-    memset(c->dots + c->special[0].first_known, 0,
-        (size_t)m->tapes.rates.n_operations * sizeof(double)); /* does not move */
+    memset(c->dots + m->n_slots, 0, (size_t)c->known_used * sizeof(double)); /* does not move */
 }
 
 /* The error of a step, which its last stage estimates, beside the largest effects of states, parameters and inputs on

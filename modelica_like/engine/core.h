@@ -26,10 +26,18 @@
 #include "types.h"
 
 /* tape.c */
+void run_operations(const Tape *tape, double *slots);
 void tape_run(const Tape *tape, double *slots, double *outputs);
 void tape_tangent(const Tape *tape, const double *slots, double *dots, double *output_dots);
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars);
 void slopes(int operation, double a, double b, double f, double *by_left, double *by_right);
+/* special.c */
+const Tape *run_on_tape(Instance *c, const Tape *tape, double *outputs);
+void run_special(Instance *c, const Tape *tape, double *outputs);
+void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int period);
+void evaluate_part(Instance *c, double t, const double *point, double *outputs);
+void ask_for(Instance *c, int node);
+void forget_sets(Instance *c);
 /* linear.c */
 int qr_factor(const QrPattern *pattern, const double *values, Instance *c);
 void qr_solve(const QrPattern *pattern, const Instance *c, double *x);
@@ -46,13 +54,8 @@ double dot(int n, const double *p, const double *q);
 double make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
-const Tape *run_on_tape(Instance *c, const Tape *tape, double *outputs);
-void run_special(Instance *c, const Tape *tape, double *outputs);
 void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 const Tape *evaluate_on_tape(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
-void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int period);
-void evaluate_part(Instance *c, double t, const double *point, double *outputs);
-void ask_for(Instance *c, int node);
 void load(Instance *c, double t, const double *point);
 void load_point(Instance *c, double t, const double *point);
 void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs);

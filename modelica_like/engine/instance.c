@@ -114,7 +114,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
     const Model *m = c->model;
     Strike *strike = &c->strike;
     uint64_t n = m->n_unknowns, n_x = m->n_x, n_z = m->n_z, n_d = m->n_d, holds = m->n_holds, guards = m->n_guards;
-    uint64_t starts = m->n_starts, slots = m->n_slots, delays = m->n_delays, used = 0, left = 0;
+    uint64_t starts = m->n_starts, slots = m->n_slots, delays = m->n_delays, used = 0, left = 0, room = 0;
     uint64_t members = m->most_members + 1, ideal = m->n_ideals > 0 ? n_z : 0, dense = n_z * n_z;
     uint64_t jacobian = larger(m->n_jacobian, m->start.n_nonzeros), system = larger(n, m->start.size);
     uint64_t last = 2 * n + 1 - (uint64_t)m->lu.n_ends;
@@ -136,17 +136,15 @@ static uint64_t lay_out(Instance *c, double *memory) {
     c->n_numbers = (size_t)used;
     for (int k = 0; k < N_SPECIALS; k++) {
         const Tape *tape = tapes_of(m) + k;
-        Special *s = &c->special[k];
-        uint64_t operations = tape->n_operations;
-        TAKE(s->runs, operations);
-        TAKE(s->operands, operations);
-        TAKE(s->outputs, tape->n_outputs);
-        TAKE(s->wanted, tape->n_outputs);
-        s->tape = (Tape){0, 0, tape->n_outputs, tape->first_result, s->runs, s->operands, s->outputs};
-        s->first_known = (int)(slots + left); /* among the slots, behind all others */
-        left += operations;
+        left += tape->n_operations; /* among the slots, behind all others */
+        room += 4 * (uint64_t)tape->n_operations + 2 * (uint64_t)tape->n_outputs;
     }
-    Special *part = &c->special[N_SPECIALS]; /* of guards */
+    c->known_for_set = (int)left;
+    c->room_for_set = (size_t)room;
+    left *= WHOLE_SETS;
+    TAKE(c->room, WHOLE_SETS * room);
+    TAKE(c->special, N_SETS * N_SPECIALS);
+    Special *part = &c->part; /* of guards */
     TAKE(part->runs, m->tapes.guards.n_operations);
     TAKE(part->operands, m->tapes.guards.n_operations);
     TAKE(part->outputs, 2 * guards);

@@ -60,16 +60,17 @@ typedef struct { /* results of another integrator from the present point, and th
 /* Integrates from the present point up to a time at most; returns 0 where it cannot. */
 typedef int (*Integrator)(double limit, Panel *panel);
 
-typedef struct { /* a tape for the present modes, see tape.c */
+typedef struct { /* a tape for a set of modes, see special.c */
     Tape tape;
     Run *runs;
     Operands *operands;
     int *outputs;
     int *wanted; /* the outputs of the whole */
-    int first_known, uses;
-    uint64_t belongs_to;
+    int uses;
 } Special;
-enum { N_SPECIALS = 7 }; /* of the first tapes of a model, from its rates to its edges */
+/* Of the first tapes of a model, from its rates to its edges, for so many sets of modes: runs come back to most
+ * of theirs. There is room for whole tapes of so many. */
+enum { N_SPECIALS = 7, N_SETS = 64, WHOLE_SETS = 3 };
 
 /* Arrays with their sizes, for which lay_out has short names. */
 #define FIELD(name, size) *name
@@ -105,7 +106,7 @@ typedef struct {
         A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), \
         A(kept_z, n_z), A(reactions, members), A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges),  \
         A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n), A(edge_guards, 2 * guards),          \
-        A(trials, 2 * (n + n_d)), A(known_values, m->n_known)
+        A(trials, 2 * (n + n_d)), A(known_values, m->n_known), A(set_keys, N_SETS *(n_d + 1))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; jolted: what new
  * values of states let go; idle:
@@ -173,13 +174,18 @@ typedef struct Instance {
     int doubts, doubtful; /* about the sign of a guard: of steps since the last event; of the present piece */
     Terms *terms, *strike_terms;
     Strike strike;
-    int stopped;                     /* something has been stopped at the present instant */
-    Special special[N_SPECIALS + 1]; /* the last one: a part, see `make_part` */
-    uint64_t decided_by;             /* counts changes of what decides about tapes: modes and parameters */
-    uint64_t altered;                /* counts all changes of these, those of tuned parameters, too */
-    uint64_t known_by[N_CODES];      /* at which of the latter what compiled tapes know was worked out */
-    uint64_t active_by;              /* behind which of the former guards were marked `active` */
-    int n_active;                    /* of `active_guard` */
+    int stopped;            /* something has been stopped at the present instant */
+    Special *special, part; /* by set and tape; see `make_part` */
+    size_t room_for_set, room_used;
+    int *room, known_for_set, known_used; /* for what these consist of, and what they know */
+    int set;                              /* the present one; how many there have been */
+    uint64_t n_sets;
+    uint64_t chosen_by;         /* behind which count of `decided_by` the set was chosen */
+    uint64_t decided_by;        /* counts changes of what decides about tapes: modes and parameters */
+    uint64_t altered;           /* counts all changes of these, those of tuned parameters, too */
+    uint64_t known_by[N_CODES]; /* at which of the latter what compiled tapes know was worked out */
+    uint64_t active_by;         /* behind which of the former guards were marked `active` */
+    int n_active;               /* of `active_guard` */
 
     const char *name;
     void *environment;

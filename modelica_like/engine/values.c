@@ -119,8 +119,10 @@ static int before_start(const State *s) {
 
 /* From now on tapes are not specialised for the value of a parameter. */
 void mark_tuned(Instance *c, int parameter) {
-    c->decided_by += !c->tuned[parameter];
+    if (c->tuned[parameter]) return;
     c->tuned[parameter] = 1;
+    c->decided_by++;
+    forget_sets(c);
 }
 
 static Result set_parameter(Instance *c, const Variable *v, double value) {

@@ -110,8 +110,8 @@ def test_little_room_changes_nothing(monkeypatch):
 def test_specialised_tapes_change_nothing(monkeypatch, tmp_path):
     """The same run-time that never specialises gives the same numbers."""
     texts = sources.runtime_sources(("native",))
-    assert "#define WORTH_IT 6 " in texts["tape.c"]
-    texts["tape.c"] = texts["tape.c"].replace("#define WORTH_IT 6 ", "#define WORTH_IT 2000000000 ")
+    assert "#define WORTH_IT 6 " in texts["special.c"]
+    texts["special.c"] = texts["special.c"].replace("#define WORTH_IT 6 ", "#define WORTH_IT 2000000000 ")
     plain = declared(CDLL(str(compiled(texts, native_platform(), tmp_path))))
     for netlist in (STARTUP, CLUTCHES, EXAMPLES / "lepelletier.toml"):
         special = simulate(netlist, 2.0, solver="native")
