@@ -133,13 +133,13 @@ static double error_back(Instance *c, double h, const double *after) {
     for (int v = 0; v < g->n_of; v++) {
         const double *vector = vector_of(c, v);
         double *largest = &g->largest[v];
-        for (size_t k = 0; k < all; k++) *largest = fmax(*largest, fabs(vector[k]) * sizes[k]);
+        for (size_t k = 0; k < all; k++) *largest = max_of(*largest, fabs(vector[k]) * sizes[k]);
         for (int k = 0; k < m->n_x; k++)
-            *largest = fmax(*largest, fabs(after[(size_t)v * n + (size_t)k]) * sizes[first + k]);
+            *largest = max_of(*largest, fabs(after[(size_t)v * n + (size_t)k]) * sizes[first + k]);
         for (int k = 0; k < m->n_x && *largest > 0; k++) x[k] += vector[first + k] / *largest;
     }
     step_back(c, h, x, g->work + n, 1);
-    for (int k = 0; k < m->n_x; k++) error = fmax(error, fabs(x[k]) * sizes[first + k]);
+    for (int k = 0; k < m->n_x; k++) error = max_of(error, fabs(x[k]) * sizes[first + k]);
     return error;
 }
 
@@ -205,11 +205,11 @@ static double span_of(const Instance *c) {
 static double felt(const Instance *c, const double *direction, const double *some, const double *others) {
     const double *x = direction + (c->x - c->numbers), *nominals = c->model->nominals;
     double largest = 0, most = 0, span = span_of(c);
-    for (int k = 0; k < c->model->n_x; k++) largest = fmax(largest, fabs(x[k]) / nominals[k]);
+    for (int k = 0; k < c->model->n_x; k++) largest = max_of(largest, fabs(x[k]) / nominals[k]);
     for (int k = 0; k < c->model->n_x; k++) {
         double change = fabs(some[k] - others[k]), least = FELT_SLOPE * largest * nominals[k] / span;
-        int any = change > least && change > FELT_KINK * fmax(fabs(some[k]), fabs(others[k]));
-        if (any) most = fmax(most, change / nominals[k]);
+        int any = change > least && change > FELT_KINK * max_of(fabs(some[k]), fabs(others[k]));
+        if (any) most = max_of(most, change / nominals[k]);
     }
     return most;
 }
@@ -241,7 +241,7 @@ static int direction_off(Instance *c, double *slope, double *direction) {
         int is_state = state >= 0 && state < c->model->n_x, is_entry = entry >= 0 && entry < c->model->n_d;
         double size = fabs(c->numbers[k]) + (is_state ? c->model->nominals[state] : 1);
         direction[k] = is_state || is_entry || g->asked[k] ? slope[k] * size : 0;
-        largest = fmax(largest, fabs(direction[k]));
+        largest = max_of(largest, fabs(direction[k]));
         direction[k] *= size;
     }
     for (size_t k = 0; k < c->n_smooth && largest > 0; k++) direction[k] /= largest;
@@ -303,7 +303,7 @@ void piece_back(Instance *c, const Record *along) {
     memcpy(c->piece, along->own, piece_size(c->model));
     do {
         begins[parts] = behind;
-        ends[parts] = parts < MOST_EDGES ? fmin(edge_ahead(c, begins[parts], &behind), along->end) : along->end;
+        ends[parts] = parts < MOST_EDGES ? min_of(edge_ahead(c, begins[parts], &behind), along->end) : along->end;
     } while (parts++ < MOST_EDGES && behind <= along->end && behind < INFINITY);
     while (parts-- > 0) {
         smoothly_back(c, begins[parts], ends[parts], MOST_HALVINGS);

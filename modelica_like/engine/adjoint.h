@@ -2,6 +2,7 @@
 #ifndef ADJOINT_H
 #define ADJOINT_H
 
+#include "core.h"
 #include "rodas.h"
 
 enum { N_NODES = LAST_POINTS }; /* of stages: the last ones have one */

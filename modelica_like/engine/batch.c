@@ -81,7 +81,7 @@ static int reads_along(const Reading *one) {
 static void take_reading(Batch *b, int64_t k, double t, double value) {
     const Reading *one = &b->asked->readings[k];
     double *found = &b->values[k];
-    b->sizes[k] = fmax(b->sizes[k], fabs(value));
+    b->sizes[k] = max_of(b->sizes[k], fabs(value));
     if (one->kind == READ_MAX && !(value <= *found)) *found = value;
     if (is_condition(one) && isnan(*found) && is_met(one, value)) *found = t;
 }
@@ -109,11 +109,11 @@ static int is_rough(const Batch *b) {
         if (!reads_along(&b->asked->readings[k])) continue;
         for (int i = 0; i < READ_NODES; i++) {
             sum += SHARES[i] * v[i];
-            size = fmax(size, fabs(v[i]));
+            size = max_of(size, fabs(v[i]));
         }
-        if (fabs(sum - simpson) > fmax(BENT * size, b->asked->atol)) return 1;
+        if (fabs(sum - simpson) > max_of(BENT * size, b->asked->atol)) return 1;
         if (fabs(v[3] - v[1] - (NODE_PLACES[3] - NODE_PLACES[1]) * (v[4] - v[0])) >
-            fmax(TWISTED * size, b->asked->atol))
+            max_of(TWISTED * size, b->asked->atol))
             return 1;
     }
     return 0;
@@ -147,7 +147,7 @@ static void climb(Batch *b, int64_t k, double low, double high) {
             f = g;
             g = value_at(b, k, second = low + GOLDEN * (high - low));
         }
-        take_reading(b, k, first, fmax(f, g));
+        take_reading(b, k, first, max_of(f, g));
     }
 }
 
@@ -180,7 +180,7 @@ static void search_stretch(Batch *b, int64_t k, double begin, double h) {
         if (first && i > 0 && isnan(b->values[k]) && is_met(one, now))
             meet_zero(b, k, begin + width * (i - 1), i < last ? begin + width * i : begin + h);
         if (!first && now >= b->values[k] - BENT * b->sizes[k] && is_top(v, i, before, now, after))
-            climb(b, k, begin + width * fmax(i - 1, 0), i < last - 1 ? begin + width * (i + 1) : begin + h);
+            climb(b, k, begin + width * max_of(i - 1, 0), i < last - 1 ? begin + width * (i + 1) : begin + h);
         before = now;
         now = after;
     }
@@ -202,7 +202,7 @@ static void take_stretch(Batch *b, double begin, double h) {
 
 static void read_along(Batch *b, double t, double end) {
     /* Halves of what is less than a few last digits of the time are as long as the whole. */
-    double least = fmax(LEAST_PART * (end - t), least_step(&b->c->state)), h = end - t;
+    double least = max_of(LEAST_PART * (end - t), least_step(&b->c->state)), h = end - t;
     look_along(b, t, 0);
     while (t < end && !b->failed) {
         if (t + 1.0001 * h >= end) h = end - t;

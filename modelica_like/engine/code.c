@@ -56,3 +56,10 @@ int factor_by_code(Instance *c, double diagonal) {
                lu_factor(last, c->lu_last, c->last_order);
     return c->by_lu;
 }
+
+/* The stages after it; returns -1 where there is no code for them. */
+int take_stages_by_code(Instance *c, const Step *step) {
+    const double *known;
+    if (!c->by_lu || code_of(c, &c->model->tapes.rates, &known) == NULL || c->model->codes->stages == NULL) return -1;
+    return c->model->codes->stages(c->slots, known, step);
+}

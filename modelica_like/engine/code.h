@@ -2,13 +2,14 @@
 #ifndef CODE_H
 #define CODE_H
 
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
 /* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
    Versions can only be told to a linker that is given libm. */
-#if defined(OLD_GLIBC) && defined(__GLIBC__) && (defined(__x86_64__) || defined(__aarch64__))
+#if defined(OLD_GLIBC) && !defined(CODE_ONLY) && defined(__GLIBC__) && (defined(__x86_64__) || defined(__aarch64__))
 #ifdef __x86_64__
 #define OLD(f) ".symver " #f "," #f "@GLIBC_2.2.5\n"
 #else
@@ -19,6 +20,10 @@ __asm__(OLD(exp) OLD(log) OLD(pow) OLD(hypot) OLD(fmod));
 
 /* What does not count is not multiplied: an inactive branch may be infinite. */
 static inline double product(double a, double b) { return a == 0 || b == 0 ? 0 : a * b; }
+
+/* As fmax and fmin, for which compilers call a library: what is no number does not count. */
+static inline double max_of(double a, double b) { return a >= b || b != b ? a : b; }
+static inline double min_of(double a, double b) { return a <= b || b != b ? a : b; }
 
 static inline double sign(double a) { return a < 0 ? -1 : a > 0 ? 1 : a; }
 
@@ -39,11 +44,18 @@ typedef struct { /* a tape: what parameters and modes decide; the rest; this wit
 } Code;
 enum { N_CODES = 8 }; /* of the first tapes of a model; of those that are not compiled, `run` is NULL */
 
-typedef struct { /* tapes, and the LU of the step matrix (linear.c), in three parts; or NULL */
+typedef struct { /* a step of rodas.h: what it begins with, its factors; its stages, and rows of its piece */
+    double t, h, u_time;
+    const double *first, *rates, *slope, *u, *u_rate, *lu, *pivots, *last_lu;
+    const int *last_order;
+    double *stages, *last;
+} Step;
+
+typedef struct { /* tapes, and the LU of the step matrix (linear.c), with stages that go by it; or NULL */
     Code tapes[N_CODES];
     int (*factor)(const double *jacobian, double diagonal, double *lu, double *pivots, double *last);
-    void (*lower)(const double *lu, const double *x, double *y);
-    void (*upper)(const double *lu, const double *pivots, const double *y, double *x);
+    void (*solve)(const double *lu, const double *pivots, const double *last, const int *order, double *x);
+    int (*stages)(double *slots, const double *known, const Step *step);
 } Codes;
 
 #define MOST_GROWTH                                                                                  \
@@ -53,6 +65,28 @@ typedef struct { /* tapes, and the LU of the step matrix (linear.c), in three pa
 /* To a value that is larger, or no number. */
 static inline void raise_to(double *most, double value) {
     if (!(value <= *most)) *most = value;
+}
+
+static inline int all_finite(int n, const double *values) {
+    int finite = 1;
+    for (int k = 0; k < n; k++) finite &= fabs(values[k]) <= DBL_MAX;
+    return finite;
+}
+
+static inline void swap(double *a, double *b) {
+    double kept = *a;
+    *a = *b;
+    *b = kept;
+}
+
+static inline void lu_solve(int n, const double *m, const int *order, double *x) {
+    for (int j = 0; j < n; j++) swap(&x[j], &x[order[j]]);
+    for (int j = 0; j < n; j++)
+        for (int i = j + 1; i < n; i++) x[i] -= m[i + n * j] * x[j];
+    for (int j = n - 1; j >= 0; j--) {
+        x[j] /= m[j + n * j];
+        for (int i = 0; i < j; i++) x[i] -= m[i + n * j] * x[j];
+    }
 }
 
 #ifdef CODE_ONLY

@@ -44,11 +44,9 @@ void qr_solve(const QrPattern *pattern, const Instance *c, double *x);
 void qr_solve_transposed(const QrPattern *pattern, const Instance *c, double *x);
 int factor_matrix(Instance *c);
 void combine(int n, const double *from, int count, const double *weights, const double *rows, int row, double *to);
-int all_finite(int n, const double *values);
 void solve_step(const Instance *c, double *x);
 void solve_step_transposed(const Instance *c, double *x);
 int lu_factor(int n, double *matrix, int *order);
-void lu_solve(int n, const double *matrix, const int *order, double *x);
 void lu_solve_transposed(int n, const double *matrix, const int *order, double *x);
 double dot(int n, const double *p, const double *q);
 double make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
@@ -57,6 +55,7 @@ void keeping_least_squares(int n, int states, double *a, double *turns, double *
 void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 const Tape *evaluate_on_tape(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void load(Instance *c, double t, const double *point);
+void load_decided(Instance *c);
 void load_point(Instance *c, double t, const double *point);
 void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void evaluate_now(Instance *c, const Tape *tape, double *outputs); /* at the present point */
@@ -75,6 +74,7 @@ const unsigned char *active_guards(Instance *c);
 int run_code(Instance *c, const Tape *tape, const unsigned char *wanted, double *outputs);
 void run_slopes(Instance *c, double *rates, double *slopes);
 int factor_by_code(Instance *c, double diagonal);
+int take_stages_by_code(Instance *c, const Step *step);
 /* start.c */
 void start_values(Instance *c);
 Result start_solve(Instance *c);
@@ -125,7 +125,9 @@ Result leave_instant(Instance *c, int happened);
 double just_after(const State *s);
 int is_source(const Instance *c, const Transition *one);
 int guard_active(const Instance *c, int guard);
+int has_fixed_moments(const Model *m);
 double next_moment(Instance *c, int idle_too);
+int is_due(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 void drop_balanced(Instance *c, double *soon);
 void drop_returning(Instance *c, const double *modes, double *soon);
@@ -163,7 +165,6 @@ Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
 Result move_to(Instance *c, double t);
 Result take_changes(Instance *c);
-int is_due(Instance *c);
 /* panels.c */
 static inline int takes_panels(const Instance *c) { return c->integrator != NULL && c->own_steps == 0; }
 void piece_between(Instance *c, const Piece *whole, double begin, double end, Piece *piece);

@@ -29,7 +29,7 @@ static Row *last_row(const Instance *c) { return row_at(c, c->state.n_past - 1);
 static void forget(Instance *c, const double *delayed) {
     double longest = 0;
     int n = c->state.n_past, first = 0;
-    for (int k = 0; k < c->model->n_delays; k++) longest = fmax(longest, delayed[2 * k + 1]);
+    for (int k = 0; k < c->model->n_delays; k++) longest = max_of(longest, delayed[2 * k + 1]);
     while (first + DEGREE + 1 < n && row_at(c, first + DEGREE + 1)->t <= last_row(c)->t - longest) first++;
     c->state.n_past = n - first;
     memmove(c->past, row_at(c, first), (size_t)((char *)row_at(c, n) - (char *)row_at(c, first)));
@@ -42,7 +42,7 @@ void keep_past(Instance *c, double t, const double *point, double order) {
     Row *row;
     if (c->model->n_delays == 0 || (s->n_past == 0 && order < 0)) return;
     while (s->n_past > 1 && last_row(c)->t > t) s->n_past--;
-    if (order < 0 && last_row(c)->t + APART * fmax(1, fabs(t)) >= t) return;
+    if (order < 0 && last_row(c)->t + APART * max_of(1, fabs(t)) >= t) return;
     evaluate(c, &c->model->tapes.delays, t, point, delayed);
     c->variables_valid = 0;
     if (s->n_past == MOST_PAST) forget(c, delayed);
@@ -54,7 +54,7 @@ void keep_past(Instance *c, double t, const double *point, double order) {
     row->order = order;
     for (int k = 0; k < c->model->n_delays; k++) {
         row->values[k] = delayed[2 * k];
-        c->past_sizes[k] = fmax(c->past_sizes[k], fabs(delayed[2 * k]));
+        c->past_sizes[k] = max_of(c->past_sizes[k], fabs(delayed[2 * k]));
     }
 }
 
@@ -116,7 +116,7 @@ void keep_piece(Instance *c, double end) {
     double *point = c->vector + c->model->n_z, begin;
     if (c->model->n_delays == 0 || c->state.n_past == 0) return;
     begin = last_row(c)->t;
-    if (!(begin + APART * fmax(1, fabs(end)) < end)) return;
+    if (!(begin + APART * max_of(1, fabs(end)) < end)) return;
     for (int n = c->integrator != NULL ? FEWEST / 2 : FEWEST; n <= MOST; n *= 2) {
         for (int k = 1; k <= n; k++) {
             double t = k < n ? begin + (end - begin) * k / n : end;
@@ -144,7 +144,7 @@ static double series(Instance *c, double half, const double *delayed, double *te
             double value = past_value(c, which, c->state.t + half * (1 + cos(angle)) - delayed[2 * which + 1]);
             for (int k = 0; k < DELAY_TERMS; k++) terms[k] += value * cos(k * angle) * (k ? 2 : 1) / DELAY_TERMS;
         }
-        rough = fmax(rough, largest_of(LAST, terms + DELAY_TERMS - LAST) / allowed_of(c, which));
+        rough = max_of(rough, largest_of(LAST, terms + DELAY_TERMS - LAST) / allowed_of(c, which));
     }
     return rough;
 }
@@ -173,12 +173,12 @@ static Result renew_delays(Instance *c) {
     for (int k = 0; k < m->n_delays; k++) {
         double time = delayed[2 * k + 1];
         if (!(time > 0) || isinf(time)) return fail(c, DELAY_NOT_POSITIVE, k, time);
-        end = fmin(end, s->t + time);
+        end = min_of(end, s->t + time);
         for (int i = 0; i < s->n_past; i++) {
             const Row *row = row_at(c, i);
             if (row->order < 0 || row->t + time < s->t - resolution) continue;
-            if (row->t + time <= s->t + resolution) order = fmin(order, row->order);
-            else end = fmin(end, row->t + time);
+            if (row->t + time <= s->t + resolution) order = min_of(order, row->order);
+            else end = min_of(end, row->t + time);
         }
     }
     if (s->past_lost) return fail(c, PAST_TOO_LONG, MOST_PAST);

@@ -56,7 +56,7 @@ static int any_between(const Instance *c, const double *before, const double *af
 static double place_between(const Instance *c, const double *before, const double *after) {
     double place = 0;
     for (int k = 0; k < c->model->settings->n_edges; k++)
-        if (differs(before[k], after[k])) place = fmax(place, before[k] / (before[k] - after[k]));
+        if (differs(before[k], after[k])) place = max_of(place, before[k] / (before[k] - after[k]));
     return place;
 }
 
@@ -87,7 +87,7 @@ static double next_edge(Instance *c, double low, double *before, int precisely) 
         double place = round % 4 == 3 ? 0.5 : place_between(c, before, after);
         double t = low + place * (high - low) + (near ? ROUGHLY * part : 0);
         if (!(t < high)) t = 0.5 * (low + high);
-        if (!(t > low)) t = low + fmin(ROUGHLY * part, 0.5 * (high - low));
+        if (!(t > low)) t = low + min_of(ROUGHLY * part, 0.5 * (high - low));
         edges_inside(c, t, now);
         int behind = any_between(c, before, now);
         near = !precisely && all_near(c, before, after, now, sizes);
@@ -106,17 +106,17 @@ double edge_ahead(Instance *c, double t, double *behind) {
     if (c->model->settings->n_edges == 0) return INFINITY;
     edges_inside(c, t, now);
     *behind = next_edge(c, t, now, 1);
-    return fmax(t, fmin(*behind - most, nextafter(*behind, t)));
+    return max_of(t, min_of(*behind - most, nextafter(*behind, t)));
 }
 
 /* Do slopes differ at two neighbouring times of the piece? Edges tell where a step of a count is but for rounding. */
 int jumps_between(Instance *c, double before, double behind) {
     const Model *m = c->model;
     double *point = c->vector + m->n_z, *first = c->edge_slopes, *last = c->edge_change;
-    double beside = BESIDE * fmax(1, fabs(behind));
+    double beside = BESIDE * max_of(1, fabs(behind));
     int any = 0;
     for (int side = 0; side < 2; side++) {
-        double t = side == 0 ? fmax(before - beside, c->piece->begin) : fmin(behind + beside, c->piece->end);
+        double t = side == 0 ? max_of(before - beside, c->piece->begin) : min_of(behind + beside, c->piece->end);
         edges_inside(c, t, c->edges_middle + side * m->tapes.edges.n_outputs);
         if (!solve_implicit(c, t, point, 1)) return 0;
         evaluate_special(c, &m->tapes.rates, t, point, side == 0 ? first : last);
@@ -232,13 +232,13 @@ static int has_risen(Instance *c, double t) {
 /* Goes through the windows of a step and returns the smaller length that it must have, or infinity. */
 static double judge_windows(Instance *c, double least, int of_slopes, int of_guards, int precisely) {
     double begin = c->piece->begin, h = c->piece->end - begin, landing = h, *now = c->edges_middle;
-    double resolved = begin + TIME_RESOLUTION * fmax(1, fabs(begin));
+    double resolved = begin + TIME_RESOLUTION * max_of(1, fabs(begin));
     int unseen = 0, noise = 0, windows = 0;
     memcpy(now, c->edges, (size_t)c->model->tapes.edges.n_outputs * sizeof(double));
     for (double before = begin, edge = begin; edge < c->piece->end && !(unseen && landing < h); before = edge) {
-        edge = fmin(next_edge(c, before, now, precisely), c->piece->end);
+        edge = min_of(next_edge(c, before, now, precisely), c->piece->end);
         if (edge - before < resolved - begin && ++noise > MOST_NOISE) { /* windows become twice as long, each time */
-            edge = fmin(before + ldexp(resolved - begin, noise - MOST_NOISE), c->piece->end);
+            edge = min_of(before + ldexp(resolved - begin, noise - MOST_NOISE), c->piece->end);
             edges_inside(c, edge, now);
         }
         if (++windows > MOST_WINDOWS) return 0.5 * h;
@@ -246,7 +246,7 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
         if (of_guards && between > resolved && has_risen(c, between)) return between - begin;
         if (of_guards && edge > resolved && has_risen(c, edge)) return edge - begin;
         unseen |= of_slopes && is_unseen(c, before, edge);
-        if (landing == h && edge - begin > fmax(least, ALREADY * h)) landing = edge - begin;
+        if (landing == h && edge - begin > max_of(least, ALREADY * h)) landing = edge - begin;
     }
     if (unseen && landing >= h && takes_panels(c)) return 0.5 * h; /* the piece ends at its only edge */
     return unseen && landing < h ? landing * (1 + BEHIND) : INFINITY;
@@ -265,8 +265,8 @@ static int out_of_reach(const Instance *c, double h) {
     int n = c->model->tapes.edges.n_outputs;
     const double *first = c->edges, *last = first + n, *before = last + n;
     for (int k = 0; k < c->model->settings->n_edges && c->edges_kept > 0; k++) {
-        double way = fmax(fabs(last[k] - first[k]), fabs(first[k] - before[k]) * h / c->edges_kept);
-        if (differs(first[k], last[k]) || (way > 0 && fmin(fabs(first[k]), fabs(last[k])) < REACH * way)) return 0;
+        double way = max_of(fabs(last[k] - first[k]), fabs(first[k] - before[k]) * h / c->edges_kept);
+        if (differs(first[k], last[k]) || (way > 0 && min_of(fabs(first[k]), fabs(last[k])) < REACH * way)) return 0;
     }
     return c->edges_kept > 0;
 }
@@ -283,10 +283,10 @@ double seen_length(Instance *c, double least, double *most) {
     edges_at(c, c->piece->end, last_of(m, c->piece), last);
     if (n > n_edges) edges_inside(c, begin + 0.5 * h, middle);
     for (int k = n_edges; k < n; k++) /* a phase may jump, but not in both halves of a step */
-        advance = fmax(advance, 2 * fmin(fabs(last[k] - middle[k]), fabs(middle[k] - first[k])));
+        advance = max_of(advance, 2 * min_of(fabs(last[k] - middle[k]), fabs(middle[k] - first[k])));
     *most = advance > 0 ? FINE * h / advance : INFINITY;
     /* What advances in a shorter time jumps. */
-    if (advance > 1 && h > TIME_RESOLUTION * fmax(1, fabs(begin))) return *most;
+    if (advance > 1 && h > TIME_RESOLUTION * max_of(1, fabs(begin))) return *most;
     if (n_edges == 0) return INFINITY;
     if (out_of_reach(c, h)) return explained_length(c);
     if (n == n_edges) edges_inside(c, begin + 0.5 * h, middle);

@@ -31,19 +31,45 @@ int guard_active(const Instance *c, int guard) {
 /* Room for a mark per transition; none wants to fire yet. */
 unsigned char *nothing_wanting(Instance *c) { return memset(c->wishes, 0, (size_t)c->model->n_transitions); }
 
-double just_after(const State *s) { return s->t + SAME_TIME * fmax(1, fabs(s->t)); }
+double just_after(const State *s) { return s->t + SAME_TIME * max_of(1, fabs(s->t)); }
+
+/* Do parameters and modes alone decide when time events come? */
+int has_fixed_moments(const Model *m) {
+    const Tape *tape = &m->tapes.moments;
+    int fixed = 1;
+#define FIXED(slot) ((slot) >= m->slot_p && ((slot) < m->slot_u || (slot) >= m->slot_d))
+    for (int k = 0; k < tape->n_operations; k++)
+        fixed &= FIXED(tape->operands[k].left) && FIXED(tape->operands[k].right);
+    for (int k = 0; k < tape->n_outputs; k++) fixed &= FIXED(tape->outputs[k]);
+#undef FIXED
+    return fixed;
+}
+
+/* Are those that decide the same as when the next one was looked up? */
+static int knows_next(Instance *c) {
+    if (c->fixed_moments) load_decided(c);
+    return c->fixed_moments && c->next_by == c->altered;
+}
 
 /* Of the time events that are not idle, or of all. */
 double next_moment(Instance *c, int idle_too) {
-    double *moments = c->guards, next = c->model->n_delays > 0 ? c->state.delayed_until : INFINITY;
-    if (c->model->n_moments == 0) return next;
+    double *moments = c->guards, next = INFINITY, delayed = c->model->n_delays > 0 ? c->state.delayed_until : INFINITY;
+    if (c->model->n_moments == 0) return delayed;
+    if (idle_too && knows_next(c) && c->next_moment > just_after(&c->state)) return min_of(delayed, c->next_moment);
     evaluate_now(c, &c->model->tapes.moments, moments);
     for (int k = 0; k < c->model->n_transitions; k++) {
         const Transition *one = &c->model->transitions[k];
         if (one->timed && (idle_too || !c->idle[k]) && is_source(c, one) && moments[one->index] > just_after(&c->state))
-            next = fmin(next, moments[one->index]);
+            next = min_of(next, moments[one->index]);
     }
-    return next;
+    if (idle_too) c->next_moment = next, c->next_by = c->altered;
+    return min_of(delayed, next);
+}
+
+int is_due(Instance *c) {
+    if (delays_due(c) || c->model->n_moments == 0) return delays_due(c);
+    if (knows_next(c)) return c->next_moment <= just_after(&c->state);
+    return find_wanting(c, nothing_wanting(c), 0);
 }
 
 /* Evaluates a tape at states moved by their rates. */
@@ -66,7 +92,7 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
     }
     if (m->n_guards > 0 && guards_too) {
         /* What has rebounded many times in less than the time resolution is judged where it turns round. */
-        double later = TIME_RESOLUTION * fmax(1, fabs(c->state.t));
+        double later = TIME_RESOLUTION * max_of(1, fabs(c->state.t));
         if (c->state.resting > 0 && c->state.resting < later) look_ahead(c, &m->tapes.guards_soon, later, values);
         else values_now(c, &m->tapes.guards_soon, values);
         for (int k = 0; k < m->n_guards; k++)
@@ -200,7 +226,7 @@ Result tick(Instance *c, double *step) {
     for (int k = 0; k < m->n_transitions; k++) {
         const Transition *one = &m->transitions[k];
         double next = one->timed ? after[one->index] : INFINITY;
-        if (ticks(c, one) && next < NEVER) *step = fmin(*step, next - fmax(before[one->index], c->state.t));
+        if (ticks(c, one) && next < NEVER) *step = min_of(*step, next - max_of(before[one->index], c->state.t));
     }
     return changes ? fail(c, NOT_SETTLED, c->state.t, ROUNDS) : share_and_solve(c);
 }
@@ -221,7 +247,7 @@ static Result crowded(Instance *c) {
     s->instants[s->n_instants % CROWD] = s->t;
     if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
     if (c->model->settings->rests && (s->resting == 0 || s->t - first < CONVERGES * s->resting)) {
-        s->resting = fmax(s->t - first, DBL_MIN);
+        s->resting = max_of(s->t - first, DBL_MIN);
         s->n_instants = 0;
         return RESULT_OK;
     }
@@ -325,7 +351,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
    modes are in d_begun. */
 Result check_turned_back(Instance *c, const double *before) {
     const Model *m = c->model;
-    double step = LATER * TIME_RESOLUTION * fmax(1, fabs(c->state.t)), *now = c->guards_before;
+    double step = LATER * TIME_RESOLUTION * max_of(1, fabs(c->state.t)), *now = c->guards_before;
     double *rates = now + m->n_guards, *later = c->edge_guards + m->n_guards;
     values_now(c, &m->tapes.guards, now);
     look_ahead(c, &m->tapes.guards, step, c->edge_guards);

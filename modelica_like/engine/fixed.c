@@ -22,9 +22,9 @@ static double first_zero(const Instance *c, const double *first, int rates_known
     for (int g = 0; g < n; g++) {
         double g0, r0, r1 = isfinite(last[n + g]) ? h * last[n + g] : 0;
         if (!guard_active(c, g) || !(number_or_false(last[g]) > 0)) continue;
-        g0 = fmin(number_or_false(first[g]), 0);
+        g0 = min_of(number_or_false(first[g]), 0);
         r0 = rates_known ? h * first[n + g] : 2 * (last[g] - g0) - r1;
-        part = fmin(part, cubic_guess(g0, isfinite(r0) ? r0 : 0, last[g], r1) + BEHIND);
+        part = min_of(part, cubic_guess(g0, isfinite(r0) ? r0 : 0, last[g], r1) + BEHIND);
     }
     memcpy(c->looks + 2 * n, first, (size_t)n * sizeof(double));
     return part;
@@ -36,13 +36,13 @@ static double next_zero(Instance *c, double before, double part, double behind) 
     int n = c->model->n_guards;
     double *last = c->looks, *first = last + 2 * n, *now = c->guards, next = 1;
     for (int g = 0; g < n; g++) {
-        double v0 = fmin(number_or_false(first[g]), 0), v1 = fmin(number_or_false(now[g]), 0), slope, bend, zero;
+        double v0 = min_of(number_or_false(first[g]), 0), v1 = min_of(number_or_false(now[g]), 0), slope, bend, zero;
         if (!guard_active(c, g) || !(number_or_false(last[g]) > 0)) continue;
         slope = (v1 - v0) / (part - before);
         bend = ((last[g] - v1) / (1 - part) - slope) / (1 - before);
         slope += bend * (part - before);
-        zero = -2 * v1 / (slope + sqrt(fmax(slope * slope - 4 * bend * v1, 0)));
-        if (zero > 0) next = fmin(next, part + zero + behind);
+        zero = -2 * v1 / (slope + sqrt(max_of(slope * slope - 4 * bend * v1, 0)));
+        if (zero > 0) next = min_of(next, part + zero + behind);
     }
     memcpy(first, now, (size_t)n * sizeof(double));
     return next;
@@ -103,7 +103,7 @@ static Result one_step(Instance *c, double end) {
     if (!take_changes(c) || (s->at_event && !fire_here(c, &fired))) return RESULT_ERROR;
     while (s->t < end && !s->ended) {
         double moment = c->budget >= 2 ? next_moment(c, 1) : INFINITY;
-        if (!go_on(c, fmin(end, moment), &fired)) return RESULT_ERROR;
+        if (!go_on(c, min_of(end, moment), &fired)) return RESULT_ERROR;
         if (fired || s->at_event || !is_due(c)) continue;
         if (!fire_here(c, &fired)) return RESULT_ERROR;
         c->budget -= s->t < end;
@@ -119,7 +119,7 @@ Arrival step_fixed(Instance *c, double target) {
     c->bounded = 1;
     for (int k = 1; k <= n && done && c->state.t < until && !c->state.ended; k++) {
         done = one_step(c, k < n ? begin + k * h : target);
-        if (done && c->step_finished != NULL) until = fmin(until, c->step_finished(c));
+        if (done && c->step_finished != NULL) until = min_of(until, c->step_finished(c));
     }
     c->bounded = 0;
     return done ? REACHED : FAILED;

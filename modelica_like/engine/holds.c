@@ -24,7 +24,7 @@ void find_held(Instance *c, Terms *terms, unsigned char *held) {
 double largest_like(const Model *m, const double *values, int node) {
     double largest = 0;
     for (int n = 0; n < m->n_nodes; n++)
-        if (m->units[n] == m->units[node]) largest = fmax(largest, fabs(values[n]));
+        if (m->units[n] == m->units[node]) largest = max_of(largest, fabs(values[n]));
     return largest;
 }
 
@@ -45,7 +45,7 @@ void rest(Instance *c) {
  * a Jacobian, and what is nothing but rounding then counts as very stiff. */
 void rest_rates(Instance *c, double *rates) {
     const Model *m = c->model;
-    double largest = fmax(largest_of(m->n_x, rates), largest_of(m->n_z, c->z));
+    double largest = max_of(largest_of(m->n_x, rates), largest_of(m->n_z, c->z));
     if (m->n_holds == 0) return;
     find_held(c, c->terms, c->held);
     for (int k = 0; k < m->n_holds; k++) {
@@ -84,11 +84,11 @@ static void eliminate(Instance *c, const Circuit *one, int rows, int n, double *
 static void weigh(const Model *m, const Terms *terms, double *weights) {
     double largest = 0;
     for (int k = 0; k < m->n_holds; k++) {
-        weights[k] = fmax(terms[k].forward, terms[k].backward);
-        if (weights[k] < UNLIMITED) largest = fmax(largest, weights[k]);
+        weights[k] = max_of(terms[k].forward, terms[k].backward);
+        if (weights[k] < UNLIMITED) largest = max_of(largest, weights[k]);
     }
     if (largest == 0) largest = 1;
-    for (int k = 0; k < m->n_holds; k++) weights[k] = 1 / fmin(fmax(weights[k], largest / LARGE), largest * LARGE);
+    for (int k = 0; k < m->n_holds; k++) weights[k] = 1 / min_of(max_of(weights[k], largest / LARGE), largest * LARGE);
 }
 
 /* Dependences among n held motions of a circuit become the rows of `silent`; returns their number. */
@@ -145,7 +145,7 @@ static void yield_to_contradiction(Instance *c, const Circuit *one) {
         variables_now(c);
         for (int k = 0; k < one->n_members; k++) {
             double now = c->variables[m->holds[member[k]].reaction];
-            if (asked && other[k]) inertia = fmax(inertia, fabs(now - reaction[k]));
+            if (asked && other[k]) inertia = max_of(inertia, fabs(now - reaction[k]));
             reaction[k] = now;
         }
     }
@@ -153,9 +153,9 @@ static void yield_to_contradiction(Instance *c, const Circuit *one) {
     memcpy(c->z, z, (size_t)m->n_z * sizeof(double));
     stiff = solved && isfinite(inertia) ? STIFF * inertia : 0;
     /* The larger of the two sides has coefficients of about one. */
-    for (int k = 0; k < one->n_members * one->n_members; k++) c->d[one->first + one->n_members + k] /= fmax(stiff, 1);
+    for (int k = 0; k < one->n_members * one->n_members; k++) c->d[one->first + one->n_members + k] /= max_of(stiff, 1);
     for (int k = 0; k < one->n_members; k++)
-        if (c->d[one->first + k] == 1) c->d[one->first + k] += fmin(stiff, 1);
+        if (c->d[one->first + k] == 1) c->d[one->first + k] += min_of(stiff, 1);
 }
 
 /* Writes switches and shares of a circuit; tells whether anything is shared. */
@@ -193,7 +193,7 @@ static double use_of(Instance *c, const Terms *terms, double *use) {
             double limit = reaction > 0 ? terms[k].forward : terms[k].backward;
             if (!shares_in(c, &m->circuits[i], place) || !(limit > 0) || limit >= UNLIMITED) continue;
             use[k] = fabs(reaction) / limit;
-            worst = fmax(worst, use[k]);
+            worst = max_of(worst, use[k]);
         }
     memcpy(c->z, z, (size_t)m->n_z * sizeof(double));
     return worst;
@@ -220,7 +220,7 @@ void share(Instance *c) {
         if (worst < least) least = worst;
         if (worst <= BEARABLE || !isfinite(worst)) break;
         for (int k = 0; k < m->n_holds; k++)
-            weights[k] = use[k] > 0 ? fmin(fmax(weights[k] * use[k], base[k] / TURNED), base[k] * TURNED) : base[k];
+            weights[k] = use[k] > 0 ? min_of(max_of(weights[k] * use[k], base[k] / TURNED), base[k] * TURNED) : base[k];
     }
     memcpy(c->d, best, (size_t)m->n_d * sizeof(double));
 }

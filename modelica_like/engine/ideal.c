@@ -28,7 +28,7 @@ static int zero_of(const Instance *c, int element) {
 /* By how much that variable is other than zero beyond a part of its size. */
 static double excess(const Instance *c, int element, const double *values, double part) {
     int node = zero_of(c, element);
-    return fabs(values[node]) - part * fmax(c->model->ideals[element].nominal, largest_like(c->model, values, node));
+    return fabs(values[node]) - part * max_of(c->model->ideals[element].nominal, largest_like(c->model, values, node));
 }
 
 static int moved(Instance *c, int element) { return row_of(c, element)[0] != 0 && row_of(c, element)[HEAD - 1] == 0; }
@@ -53,7 +53,7 @@ static void eliminate_rows(Instance *c, int second, double *turns, double *sizes
         }
     for (int j = 0; j < n; j++) {
         double largest = 0;
-        for (int i = 0; i < n; i++) largest = fmax(largest, fabs(a[i + n * j] /= sizes[i] > 0 ? sizes[i] : 1));
+        for (int i = 0; i < n; i++) largest = max_of(largest, fabs(a[i + n * j] /= sizes[i] > 0 ? sizes[i] : 1));
         for (int i = 0; i < n && largest > 0; i++) a[i + n * j] /= largest;
     }
     for (int place = 0; place < 3 * n; place++) {
@@ -123,7 +123,7 @@ void replace_dependent(Instance *c) {
         if (row != NULL) least[i] = any = row[0] = 1;
         for (int j = 0; j < n && row != NULL; j++) row[HEAD + j] = turns[i + n * j];
         for (int j = 0; j < n && row != NULL; j++)
-            least[i] = fmax(j > 0 ? least[i] : 0, SLOW * fabs(row[HEAD + j]) * sizes[j]);
+            least[i] = max_of(j > 0 ? least[i] : 0, SLOW * fabs(row[HEAD + j]) * sizes[j]);
     }
     if (!any) return;
     eliminate_rows(c, 1, turns, least, dependent);

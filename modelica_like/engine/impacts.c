@@ -43,15 +43,15 @@ static Result respond(Instance *c, Strike *strike) {
 
 /* Lets go what cannot bear its impulse for an instant; tells whether anything is. */
 static int let_go_unbearable(const Instance *c, Strike *strike, const Terms *terms) {
-    double instant = 10 * TIME_RESOLUTION * fmax(1, fabs(c->state.t)), scale = 0;
+    double instant = 10 * TIME_RESOLUTION * max_of(1, fabs(c->state.t)), scale = 0;
     int any = 0;
     for (int k = 0; k < c->model->n_holds; k++)
-        if (strike->held[k]) scale = fmax(scale, fabs(strike->impulse[k]));
+        if (strike->held[k]) scale = max_of(scale, fabs(strike->impulse[k]));
     for (int k = 0; k < c->model->n_holds; k++) {
         double sign = strike->impulse[k] > 0 ? 1 : -1, margin;
         double capacity = sign > 0 ? terms[k].forward : terms[k].backward;
         if (!strike->held[k] || capacity >= UNLIMITED || c->model->holds[k].loose < 0) continue;
-        margin = fmax(capacity - sign * strike->reaction[k], 0) * instant;
+        margin = max_of(capacity - sign * strike->reaction[k], 0) * instant;
         if (fabs(strike->impulse[k]) > margin + WEIGHS_NOTHING * scale) any = strike->loose[k] = 1;
     }
     return any;
@@ -83,7 +83,7 @@ static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
     const double *after = variables_now(c);
     double largest = 0;
     mark_held(c, terms, c->held);
-    for (int k = 0; k < m->n_holds; k++) largest = fmax(largest, fabs(after[m->holds[k].motion] - strike->before[k]));
+    for (int k = 0; k < m->n_holds; k++) largest = max_of(largest, fabs(after[m->holds[k].motion] - strike->before[k]));
     for (int k = 0; k < m->n_holds; k++) {
         double now = after[m->holds[k].motion];
         if (c->held[k] && !strike->loose[k] && now == 0) continue; /* it stays */
@@ -141,9 +141,9 @@ static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
     for (int k = 0; k < c->model->n_holds; k++) {
         const Held *one = &c->model->holds[k];
         double size = fabs(strike->before[k] = values[one->motion]);
-        int limited = fmax(terms[k].forward, terms[k].backward) < UNLIMITED;
+        int limited = max_of(terms[k].forward, terms[k].backward) < UNLIMITED;
         if (strike->entering[k] && !limited &&
-            size > ROUNDING * fmax(largest_like(c->model, values, one->motion), one->nominal))
+            size > ROUNDING * max_of(largest_like(c->model, values, one->motion), one->nominal))
             strike->hard = 1;
     }
 }
@@ -163,8 +163,8 @@ static int find_jolted(Instance *c, const Terms *terms, const double *before, un
     memset(c->jolted, 0, (size_t)m->n_holds);
     for (int k = 0; k < m->n_holds; k++) {
         const Held *one = &m->holds[k];
-        double limit = ROUNDING * fmax(largest_like(m, values, one->motion), one->nominal);
-        int limited = fmax(terms[k].forward, terms[k].backward) < UNLIMITED;
+        double limit = ROUNDING * max_of(largest_like(m, values, one->motion), one->nominal);
+        int limited = max_of(terms[k].forward, terms[k].backward) < UNLIMITED;
         if (!entering[k] || before[one->mode] != one->number) continue;
         entering[k] = fabs(values[one->motion]) > limit && fabs(values[one->motion] - c->motions[k]) > limit;
         if (!entering[k] || !limited || one->loose < 0) continue;

@@ -166,6 +166,7 @@ void instance_reset(Instance *c) {
     s->tolerance = m->settings->default_tolerance;
     s->absolute = s->tolerance * m->settings->absolute_to_relative;
     c->variables_valid = c->look_valid = c->edges_valid = 0;
+    c->next_by = 0;
     gradient_end(c);
     memcpy(c->p, m->parameters, m->n_p * sizeof(double));
     memcpy(c->u, m->inputs, m->n_u * sizeof(double));
@@ -197,6 +198,7 @@ Instance *instance_new(Instance bare, const char *token) {
     memcpy(c->values, values, sizeof values);
     memset(c->every, 1, (size_t)m->n_guards);
     c->altered = 1;
+    c->fixed_moments = has_fixed_moments(m);
     memcpy(c->slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
     return c;
@@ -260,6 +262,7 @@ Result state_copy_in(Instance *c, const void *copy) {
     memcpy(&c->state, copy, sizeof(State));
     memcpy(c->numbers, (const char *)copy + sizeof(State), c->n_numbers * sizeof(double));
     c->variables_valid = c->look_valid = c->edges_valid = 0;
+    c->next_by = 0;
     gradient_lose(c, FAILURE_LOST_BY_COPY);
     return RESULT_OK;
 }

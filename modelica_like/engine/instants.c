@@ -35,13 +35,13 @@ static void list_numbers(Instance *c, const Record *at) {
             int state = k >= x && k < x + m->n_x, entry = k >= d && k < d + m->n_d;
             int mode = entry && k - d < m->n_modes && m->modes[k - d].n_names > 0;
             int impulse = k > ideal && k < ideal + m->n_ideals * width && (k - ideal) % width == 1;
-            double size = fmax(fabs(before[k]), fabs(behind[k]));
+            double size = max_of(fabs(before[k]), fabs(behind[k]));
             g->sizes[k] = state ? size + m->nominals[k - x] : size == 0 ? 1 : size;
             if (class != (g->marks[k] && !at->start ? 0 : size == 0 ? 2 : 1)) continue;
             if (!g->asked[k] && (at->start || !(state || (entry && !mode && !impulse)))) continue;
-            double later = at->start || g->speed == 0 ? 0 : fabs(g->moment[k] / g->speed * g->sizes[k]) / fmax(1, t);
+            double later = at->start || g->speed == 0 ? 0 : fabs(g->moment[k] / g->speed * g->sizes[k]) / max_of(1, t);
             double random = 0.5 + 0.5 * fmod(0.6180339887498949 * g->n_listed, 1);
-            g->motions[g->n_listed] = (g->n_listed % 2 ? -random : random) * NEARBY * g->sizes[k] / fmax(1, later);
+            g->motions[g->n_listed] = (g->n_listed % 2 ? -random : random) * NEARBY * g->sizes[k] / max_of(1, later);
             g->listed[g->n_listed++] = k;
         }
         if (class == 0) g->n_marked = g->n_listed;
@@ -249,7 +249,7 @@ static int matters(Instance *c, const Record *at, const double *before, const do
     const double *x = copied(c, at->behind, c->x), *d = copied(c, at->behind, c->d);
     int any = 0;
     for (int k = 0; k < m->n_x; k++) {
-        double change = fmax(fabs(c->x[k] - x[k]), fabs(before[k] - behind[k]));
+        double change = max_of(fabs(c->x[k] - x[k]), fabs(before[k] - behind[k]));
         any |= !(change <= FELT_CHANGE * (fabs(x[k]) + fabs(before[k]) + m->nominals[k]));
     }
     for (int k = 0; k < m->n_modes; k++) any |= d[k] != c->d[k] && m->modes[k].n_names == 0;

@@ -1,6 +1,7 @@
 /* Co-Simulation: steps that run as far as accuracy allows, events located inside them, results interpolated. A step
  * does not end where a communication step ends: the importer's points are read from the dense output. Only where inputs
  * move does a step end there, so that their jumps fall between steps. */
+#include "core.h"
 #include "rodas.h"
 
 #define MAX_REJECTIONS 60
@@ -11,15 +12,6 @@
 #define SAME_POINT 1e-9    /* rounding of the importer's communication points */
 #define SAME_PART 1e-6     /* of a fixed step */
 #define LEAST_STEPS 50     /* per run, where time itself is in the equations: a pulse could hide between longer ones */
-
-static const double RODAS_DENSE[3][STAGES] = {
-    {25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
-        1.1241088310450404, 0.4272876194431874, -0.17202221070155493},
-    {-9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796, 20.176138334709044,
-        15.98066361424651, -6.789040303419874, -6.710236069923372},
-    {11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643, -52.072871366152654,
-        -59.78993625266729, -0.15582684282751913, 4.883087185713722},
-};
 
 /* The right hand side, its partial derivatives by time, with inputs on their straight lines, and its Jacobian. */
 static void linearize(Instance *c, double t, const double *y, double *slope) {
@@ -58,47 +50,56 @@ double error_norm(const Instance *c, const double *first, const double *last, co
     double sum = 0, rtol = c->state.tolerance, atol = c->state.absolute;
     if (c->model->n_x == 0) return 0;
     for (int k = 0; k < c->model->n_x; k++) {
-        double weight = rtol * fmax(fabs(first[k]), fabs(last[k])) + atol * c->model->nominals[k];
+        double weight = rtol * max_of(fabs(first[k]), fabs(last[k])) + atol * c->model->nominals[k];
         sum += (error[k] / weight) * (error[k] / weight);
     }
     return sqrt(sum / c->model->n_x);
+}
+
+/* The stages of a step, and what its piece has of them; returns 0 if the equations gave values that are not finite.
+ * straight_step.py writes the same. */
+static int take_stages(Instance *c, const Step *a) {
+    int n = c->model->n_unknowns;
+    double *y = c->point, factors[STAGES], one = 1;
+    for (int i = 0; i < STAGES; i++) {
+        double *stage = a->stages + (size_t)i * n, by_time = a->h * RODAS_D_TIME[i];
+        if (i < LAST_POINTS) combine(n, a->first, i, RODAS_A[i], a->stages, n, y);
+        else combine(n, y, 1, &one, stage - n, n, y);
+        if (i == 0) memcpy(stage, a->rates, (size_t)n * sizeof(double));
+        else {
+            load_point(c, a->t + RODAS_TIME[i] * a->h, y);
+            run_special(c, &c->model->tapes.rates, stage);
+        }
+        for (int j = 0; j < i; j++) factors[j] = RODAS_C[i][j] / a->h;
+        combine(c->model->n_x, stage, i, factors, a->stages, n, stage);
+        combine(n, stage, 1, &by_time, a->slope, n, stage);
+        if (!all_finite(n, stage)) return 0;
+        solve_step(c, stage);
+    }
+    combine(n, y, 1, &one, a->stages + (size_t)(STAGES - 1) * n, n, a->last);
+    memset(a->last + n, 0, 3 * (size_t)n * sizeof(double));
+    for (size_t k = 0; k < 3; k++) {
+        double *row = a->last + (k + 1) * (size_t)n;
+        combine(n, row, STAGES, RODAS_DENSE[k], a->stages, n, row);
+    }
+    return all_finite(n, a->last);
 }
 
 /* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
  * Returns the error in tolerances, or -1 if the equations gave values that are not finite, or a singular matrix. */
 double rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece) {
     int n = c->model->n_unknowns;
-    size_t size = (size_t)n * sizeof(double);
-    double *last = last_of(c->model, piece), *slope = c->stages + (size_t)STAGES * (size_t)n, *y = c->point,
-           factors[STAGES], one = 1;
+    double *last = last_of(c->model, piece), *slope = c->stages + (size_t)STAGES * (size_t)n;
+    Step step = {t, h, c->state.u_time, first, c->first_rates, slope, c->u, c->u_rate, c->lu, c->lu_pivots, c->lu_last,
+        c->last_order, c->stages, last};
     piece->begin = t;
     piece->end = t + h;
-    memcpy(piece->points, first, size);
+    memcpy(piece->points, first, (size_t)n * sizeof(double));
     if (!keep_jacobian) linearize(c, t, first, slope);
     if (!factor_step(c, step_diagonal(h))) return -1;
     c->state.n_evaluations += STAGES - keep_jacobian;
-    for (int i = 0; i < STAGES; i++) {
-        double *stage = c->stages + (size_t)i * n, by_time = h * RODAS_D_TIME[i];
-        if (i < LAST_POINTS) combine(n, first, i, RODAS_A[i], c->stages, n, y);
-        else combine(n, y, 1, &one, stage - n, n, y);
-        if (i == 0) memcpy(stage, c->first_rates, size);
-        else {
-            load_point(c, t + RODAS_TIME[i] * h, y);
-            run_special(c, &c->model->tapes.rates, stage);
-        }
-        for (int j = 0; j < i; j++) factors[j] = RODAS_C[i][j] / h;
-        combine(c->model->n_x, stage, i, factors, c->stages, n, stage);
-        combine(n, stage, 1, &by_time, slope, n, stage);
-        if (!all_finite(n, stage)) return -1;
-        solve_step(c, stage);
-    }
-    combine(n, y, 1, &one, c->stages + (size_t)(STAGES - 1) * n, n, last);
-    if (!all_finite(n, last)) return -1;
-    memset(last + n, 0, 3 * size);
-    for (size_t k = 0; k < 3; k++) {
-        double *row = last + (k + 1) * (size_t)n;
-        combine(n, row, STAGES, RODAS_DENSE[k], c->stages, n, row);
-    }
+    int finite = take_stages_by_code(c, &step);
+    if (!(finite < 0 ? take_stages(c, &step) : finite)) return -1;
     return error_norm(c, first, last, c->stages + (STAGES - 1) * n);
 }
 
@@ -114,7 +115,7 @@ double first_step(Instance *c) {
     speed = error_norm(c, c->x, c->x, rates);
     if (!isfinite(speed) || c->model->n_x == 0) return 1e-3;
     if (size < 1e-5 || speed < 1e-5) return 1e-6;
-    return fmax(0.01 * size / speed, TIME_RESOLUTION * fmax(1, fabs(c->state.t)));
+    return max_of(0.01 * size / speed, TIME_RESOLUTION * max_of(1, fabs(c->state.t)));
 }
 
 static void clear_pending(Instance *c) {
@@ -131,12 +132,12 @@ static double largest_step(const Instance *c) {
     double span = c->state.stop_time - c->state.start_time,
            longest = c->state.longest > 0 ? c->state.longest : INFINITY;
     if (c->model->n_x > 0 && !c->model->settings->rates_depend_on_time) return longest;
-    if (!c->state.stop_time_defined || !(span > 0)) return c->model->n_x == 0 ? fmin(longest, 1e-3) : longest;
-    return fmin(longest, span / LEAST_STEPS);
+    if (!c->state.stop_time_defined || !(span > 0)) return c->model->n_x == 0 ? min_of(longest, 1e-3) : longest;
+    return min_of(longest, span / LEAST_STEPS);
 }
 
 /* Below this, two times are the same. */
-double least_step(const State *s) { return 1e-15 * fmax(1, fabs(s->t)); }
+double least_step(const State *s) { return 1e-15 * max_of(1, fabs(s->t)); }
 
 static void take_piece(Instance *c) {
     c->state.n_steps++;
@@ -148,7 +149,7 @@ static void take_piece(Instance *c) {
  * that is long beside the growth or the swing of a state ends where these are balanced, and its errors look small. */
 static int is_against_rate(const Instance *c, double h, const double *first, const double *last) {
     for (int k = 0; k < c->model->n_x; k++) {
-        double moved = last[k] - first[k], asked = h * c->first_rates[k], size = fmax(fabs(first[k]), fabs(last[k]));
+        double moved = last[k] - first[k], asked = h * c->first_rates[k], size = max_of(fabs(first[k]), fabs(last[k]));
         if (asked * moved < 0 && fabs(asked) > 100 * size &&
             fabs(moved) > c->state.tolerance * size + c->state.absolute * c->model->nominals[k])
             return 1;
@@ -163,7 +164,7 @@ static Result take_step(Instance *c, double limit) {
     double least = least_step(s), most = INFINITY;
     int rejected = 0, landings = 0;
     memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
-    wished = fmin(wished, largest_step(c));
+    wished = min_of(wished, largest_step(c));
     for (int n = 0; n < MAX_REJECTIONS; n++) {
         double error, factor, h = wished;
         int cut = s->t + 1.0001 * h >= limit;
@@ -175,7 +176,7 @@ static Result take_step(Instance *c, double limit) {
         if (!(error >= 0 && isfinite(error)) || is_against_rate(c, h, first, last_of(c->model, c->piece))) error = 1e30;
         else if (error > 1 && h < LEAST_OVER_EDGE * least && is_over_edge(c)) error = 1;
         if (cut) c->piece->end = limit;
-        factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
+        factor = 0.9 * pow(max_of(error, 1e-10), -0.2);
         int solved = error <= 1 && solve_implicit(c, c->piece->end, last_of(c->model, c->piece), 1);
         double seen = solved && c->model->tapes.edges.n_outputs > 0 ? seen_length(c, least, &most) : INFINITY;
         if (seen < h && landings++ < MAX_LANDINGS) {
@@ -186,11 +187,11 @@ static Result take_step(Instance *c, double limit) {
         if (!solved || (c->model->n_guards > 0 && !search_events(c))) {
             rejected++;
             s->n_rejected++;
-            wished = h * (error > 1 ? fmax(0.1, factor) : 0.25);
+            wished = h * (error > 1 ? max_of(0.1, factor) : 0.25);
             continue;
         }
-        factor = fmin(factor, rejected ? 1 : 6);
-        s->step = fmin(cut ? fmax(wished, h * factor) : h * factor, most);
+        factor = min_of(factor, rejected ? 1 : 6);
+        s->step = min_of(cut ? max_of(wished, h * factor) : h * factor, most);
         take_piece(c);
         if (c->log_enabled & LOG_INTEGRATOR)
             report(c, LOG_INTEGRATOR, RESULT_OK, "t = %.12g s: step %.3e s, error %.2e of the tolerance, %d rejected",
@@ -305,8 +306,6 @@ Result finish(Instance *c) {
     return handle_event(c);
 }
 
-int is_due(Instance *c) { return delays_due(c) || (c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0)); }
-
 /* Fixed steps go to whole numbers of them only. */
 Result check_whole(Instance *c, double size) {
     double fixed = c->model->settings->fixed_step;
@@ -318,7 +317,7 @@ Result check_whole(Instance *c, double size) {
 /* Checks what the importer asks for and says where the step ends. */
 Result check_step(Instance *c, double point, double size, double *target) {
     State *s = &c->state;
-    double slack = SAME_POINT * fmax(1, fabs(s->t));
+    double slack = SAME_POINT * max_of(1, fabs(s->t));
     *target = point + size;
     if (!isfinite(point) || fabs(point - s->t) > slack)
         return refuse(c, "The communication point is %.12g s, but the instance is at %.12g s.", point, s->t);
@@ -349,9 +348,9 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
         }
         if (!s->piece_valid) {
             double far = s->stop_time_defined && s->stop_time >= target ? s->stop_time : INFINITY;
-            if (held) far = fmin(far, target);
-            double limit = fmin(far, next_moment(c, 1));
-            if (c->integrator != NULL) far = fmin(far, next_moment(c, 0));
+            if (held) far = min_of(far, target);
+            double limit = min_of(far, next_moment(c, 1));
+            if (c->integrator != NULL) far = min_of(far, next_moment(c, 0));
             if (!(c->integrator != NULL ? take_given(c, limit, far) : take_step(c, limit))) return FAILED;
         }
         if (c->piece->end > target) return move_to(c, target) ? REACHED : FAILED;
@@ -360,6 +359,6 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
         s->piece_valid = 0;
         s->at_event = s->event_pending || is_due(c);
         if (s->at_event && (stop_at_events || !handle_event(c))) return stop_at_events ? AT_EVENT : FAILED;
-        if (c->step_finished != NULL) target = fmin(target, fmax(c->step_finished(c), s->t));
+        if (c->step_finished != NULL) target = min_of(target, max_of(c->step_finished(c), s->t));
     }
 }

@@ -93,18 +93,6 @@ void combine(int n, const double *from, int count, const double *weights, const 
     }
 }
 
-int all_finite(int n, const double *values) {
-    int finite = 1;
-    for (int k = 0; k < n; k++) finite &= fabs(values[k]) <= DBL_MAX;
-    return finite;
-}
-
-static void swap(double *a, double *b) {
-    double kept = *a;
-    *a = *b;
-    *b = kept;
-}
-
 /* LU with partial pivoting of a matrix stored by columns. Returns 0 if it is singular to working precision. */
 int lu_factor(int n, double *m, int *order) {
     double largest = 0, smallest = DBL_MAX;
@@ -123,16 +111,6 @@ int lu_factor(int n, double *m, int *order) {
             for (int i = j + 1; i < n; i++) m[i + n * k] -= m[i + n * j] * m[j + n * k];
     }
     return n == 0 || smallest > largest * n * DBL_EPSILON;
-}
-
-void lu_solve(int n, const double *m, const int *order, double *x) {
-    for (int j = 0; j < n; j++) swap(&x[j], &x[order[j]]);
-    for (int j = 0; j < n; j++)
-        for (int i = j + 1; i < n; i++) x[i] -= m[i + n * j] * x[j];
-    for (int j = n - 1; j >= 0; j--) {
-        x[j] /= m[j + n * j];
-        for (int i = 0; i < j; i++) x[i] -= m[i + n * j] * x[j];
-    }
 }
 
 void lu_solve_transposed(int n, const double *m, const int *order, double *x) {
@@ -206,9 +184,7 @@ void solve_step(const Instance *c, double *x) {
         return;
     }
     if (codes != NULL && codes->factor != NULL) {
-        codes->lower(c->lu, x, y);
-        lu_solve(n - first, c->lu_last, c->last_order, y + first);
-        codes->upper(c->lu, c->lu_pivots, y, x);
+        codes->solve(c->lu, c->lu_pivots, c->lu_last, c->last_order, x);
         return;
     }
     for (int k = 0; k < n; k++) y[lu->row_place[k]] = x[k];
@@ -279,7 +255,8 @@ double make_orthogonal(int rows, int columns, double *a, double *turns, double *
             }
         if (!rotated) break;
     }
-    for (const double *p = a; p < a + (size_t)rows * columns; p += columns) largest = fmax(largest, dot(columns, p, p));
+    for (const double *p = a; p < a + (size_t)rows * columns; p += columns)
+        largest = max_of(largest, dot(columns, p, p));
     return largest;
 }
 

@@ -72,7 +72,7 @@ static inline double cubic(double s, double g0, double r0, double g1, double r1)
 static int is_hump(double g0, double r0, double g1, double r1) {
     double top = -INFINITY;
     if (!(g0 <= 0 && g1 <= 0 && r0 > NOISE && r1 < -NOISE)) return 0;
-    for (int k = 1; k < 20; k++) top = fmax(top, cubic(k / 20.0, g0, r0, g1, r1));
+    for (int k = 1; k < 20; k++) top = max_of(top, cubic(k / 20.0, g0, r0, g1, r1));
     return top > -NEAR * (fabs(g0) + fabs(g1));
 }
 
@@ -119,7 +119,7 @@ static int newton(const Instance *c, const Look *look, double *step) {
     EACH_ACTIVE (g) {
         if (c->kinds[g] == QUIET) continue;
         positive |= look->values[g] > 0;
-        if (look->rates[g] > 0) *step = fmin(*step, -look->values[g] / look->rates[g]);
+        if (look->rates[g] > 0) *step = min_of(*step, -look->values[g] / look->rates[g]);
     }
     return positive;
 }
@@ -138,7 +138,7 @@ static double positive_top(Instance *c, const Look *before, const Look *after, L
             t = 0.5 * (low + high);
         }
         if (c->kinds[g] == HUMP && isinf(top)) c->kinds[g] = QUIET;
-        first = fmin(first, top);
+        first = min_of(first, top);
     }
     return first;
 }
@@ -146,13 +146,13 @@ static double positive_top(Instance *c, const Look *before, const Look *after, L
 /* Finds the earliest zero of a candidate between two looks, first roughly; the piece then ends there, `look` tells the
  * guards there. */
 static int locate(Instance *c, const Look *before, const Look *after, Look *look) {
-    double step, t = after->t, last = t, tolerance = LOCATED * fmax(1, fabs(before->t));
+    double step, t = after->t, last = t, tolerance = LOCATED * max_of(1, fabs(before->t));
     int positive = newton(c, after, &step);
-    last = fmin(positive ? last : INFINITY, positive_top(c, before, after, look));
+    last = min_of(positive ? last : INFINITY, positive_top(c, before, after, look));
     if (!isfinite(last)) return 0;
     EACH_ACTIVE (g)
-        if (c->kinds[g] != QUIET) t = fmin(t, guess(before, after, g));
-    t = fmin(t, last);
+        if (c->kinds[g] != QUIET) t = min_of(t, guess(before, after, g));
+    t = min_of(t, last);
     for (int rough = 1; rough >= 0; rough--) {
         double low = before->t, high = last;
         for (int n = 0; n < MAX_TRIALS; n++) {
@@ -193,7 +193,7 @@ static const double *guards_moved(Instance *c, const Piece *piece, double t, con
         for (int k = 0; k < m->n_x; k++) point[k] += k & (bit / 2) ? -changes[k] : changes[k];
         evaluate_part(c, t, point, shaken);
         EACH_ACTIVE (g)
-            if (c->kinds[g] != QUIET) moved[g] = fmax(moved[g], fabs(shaken[g] - here[g]));
+            if (c->kinds[g] != QUIET) moved[g] = max_of(moved[g], fabs(shaken[g] - here[g]));
     }
     return moved;
 }
@@ -215,14 +215,14 @@ const double *rounding_of_guards(Instance *c, const Piece *piece, double t) {
 static int is_within_tolerance(Instance *c, const Look *before, const Look *after) {
     const double *moved = moved_relatively(c, c->whole, after->t, c->state.tolerance, c->state.absolute);
     EACH_ACTIVE (g)
-        if (c->kinds[g] != QUIET && fmax(fabs(before->values[g]), fabs(after->values[g])) <= moved[g]) return 1;
+        if (c->kinds[g] != QUIET && max_of(fabs(before->values[g]), fabs(after->values[g])) <= moved[g]) return 1;
     return 0;
 }
 
 /* Is a guard positive by less than the error of the step, which is more than rounding? What decays does not change its
  * sign, but long steps swing about zero. */
 static int is_within_error(Instance *c, const Look *after) {
-    double begin = c->whole->begin, least = 4 * TIME_RESOLUTION * fmax(1, fabs(begin));
+    double begin = c->whole->begin, least = 4 * TIME_RESOLUTION * max_of(1, fabs(begin));
     if (c->doubts >= MOST_DOUBTS || c->whole->end - begin < least) return 0;
     const double *moved = guards_moved(c, c->whole, after->t, c->step_error);
     int any = 0;
@@ -239,10 +239,10 @@ typedef enum { NOTHING, ENDED, TOO_LONG } Found;
 
 /* Go on by the time resolution; what crossed and is still positive then wants to fire, else the search begins anew. */
 static Found look_behind(Instance *c, Look *look) {
-    double due = c->piece->end + TIME_RESOLUTION * fmax(1, fabs(c->piece->end));
-    if (!step_to(c, fmin(due, c->whole->end), look)) return TOO_LONG;
+    double due = c->piece->end + TIME_RESOLUTION * max_of(1, fabs(c->piece->end));
+    if (!step_to(c, min_of(due, c->whole->end), look)) return TOO_LONG;
     EACH_ACTIVE (g)
-        if (c->kinds[g] == CROSSING && fmin(look->values[g], look->values[g] + (due - look->t) * look->rates[g]) > 0)
+        if (c->kinds[g] == CROSSING && min_of(look->values[g], look->values[g] + (due - look->t) * look->rates[g]) > 0)
             c->state.event_pending = c->wanting[c->model->guard_transition[g]] = 1;
     return ENDED;
 }
@@ -260,7 +260,7 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
         return TOO_LONG;
     }
     if (locate(c, before, after, &found)) {
-        c->state.event_pending = mark_wanting(c, &found, LOCATED * fmax(1, fabs(after->t)));
+        c->state.event_pending = mark_wanting(c, &found, LOCATED * max_of(1, fabs(after->t)));
         if (c->state.event_pending) return ENDED;
         /* Positive for less than the time resolution: what the last event left is on its way down. */
         if (memchr(c->kinds, CROSSING, (size_t)c->model->n_guards) != NULL) return look_behind(c, &found);
@@ -274,7 +274,7 @@ static int behave(const Instance *c, const Look *before, const Look *middle, con
     double h = after->t - before->t;
     EACH_ACTIVE (g) {
         double g0 = before->values[g], g1 = after->values[g], value = middle->values[g];
-        double size = fmax(fabs(value), fmax(fabs(g0), fabs(g1)));
+        double size = max_of(fabs(value), max_of(fabs(g0), fabs(g1)));
         if (fabs(value - cubic(MIDDLE, g0, before->rates[g] * h, g1, after->rates[g] * h)) > BEHAVES * size) return 0;
     }
     return 1;
@@ -296,7 +296,7 @@ double soonest_zero(Instance *c) {
     memcpy(point, c->x, (size_t)c->model->n_unknowns * sizeof(double));
     if (c->model->n_guards == 0 || !look_at(c, c->state.t, point, 0, &now)) return soon;
     EACH_ACTIVE (g)
-        if (now.values[g] < 0 && now.rates[g] > 0) soon = fmin(soon, -now.values[g] / now.rates[g]);
+        if (now.values[g] < 0 && now.rates[g] > 0) soon = min_of(soon, -now.values[g] / now.rates[g]);
     return soon;
 }
 
@@ -308,7 +308,7 @@ int search_events(Instance *c) {
     c->look_valid = 1;
     before.t = whole->begin;
     /* What the last event left positive did not want to fire: it is on its way down. */
-    EACH_ACTIVE (g) before.values[g] = fmin(before.values[g], 0);
+    EACH_ACTIVE (g) before.values[g] = min_of(before.values[g], 0);
     if (!look_inside(c, whole->end, 0, &after)) return 0;
     Found found = look_into(c, &before, &after, DEPTH);
     if (found == NOTHING) memcpy(before.values, after.values, 2 * (size_t)c->model->n_guards * sizeof(double));

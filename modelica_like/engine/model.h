@@ -2,7 +2,6 @@
 #ifndef MODEL_H
 #define MODEL_H
 
-#include <float.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -366,7 +366,7 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
         }
         if (s->n_steps >= n->pause) return NATIVE_PAUSED;
         if (r->n_points == r->room_points || steps_full(r)) return NATIVE_MORE;
-        if (r->next++ < results && t <= s->t + fmin(0.5 * NEAR_EVENT * width, SAME * fmax(1, fabs(s->t)))) continue;
+        if (r->next++ < results && t <= s->t + min_of(0.5 * NEAR_EVENT * width, SAME * max_of(1, fabs(s->t)))) continue;
         t = r->next <= results ? t : end;
         Arrival arrival = integrate_to(n->c, t, 1);
         if (arrival == FAILED) return NATIVE_FAILED;

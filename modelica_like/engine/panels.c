@@ -73,7 +73,7 @@ static double error_of_looks(const Model *m, const double *rows, double relative
             double between = 0;
             for (size_t j = 0; j <= PARTS_OF_PIECE; j++) between += weights[part][j] / 128 * y[2 * j * n];
             double error = fabs(between - y[(2 * part + 1) * n]);
-            most = isnan(error) ? INFINITY : fmax(most, error);
+            most = isnan(error) ? INFINITY : max_of(most, error);
         }
         sum += (most / size) * (most / size);
     }
@@ -85,7 +85,7 @@ void take_looks(Instance *c, Looks *looks) {
     const Model *m = c->model;
     size_t n = (size_t)m->n_unknowns, n_x = (size_t)m->n_x, n_z = n - n_x, row = n * sizeof(double);
     double *rows = memcpy(c->stages, c->x, row), *knot = memcpy(looks->knots, rows, row), begin = 0;
-    double resolution = TIME_RESOLUTION * fmax(1, fabs(c->state.t));
+    double resolution = TIME_RESOLUTION * max_of(1, fabs(c->state.t));
     c->panel = (Panel){c->state.t, c->panel.longest, c->panel.soon, 0, 0, looks->ends, looks->knots};
     for (looks->precise = 0; (looks->precise + 1) * LOOKS <= looks->results; looks->precise++) {
         size_t first = (size_t)looks->precise * LOOKS;
@@ -95,7 +95,7 @@ void take_looks(Instance *c, Looks *looks) {
         }
         double end = looks->shares[first + LOOKS - 1], length = looks->span * (end - begin);
         double error = error_of_looks(m, rows, looks->relative, looks->absolute);
-        double change = fmin(fmax(pow(AIM / error, 1.0 / ORDER), SHRINKS_AT_MOST), GROWS_AT_MOST);
+        double change = min_of(max_of(pow(AIM / error, 1.0 / ORDER), SHRINKS_AT_MOST), GROWS_AT_MOST);
         int halves = error > PRECISE ? 2 : 1, rough = error > HALVED && length > resolution; /* shorter: a jump */
         for (int half = 1; half <= halves; half++) {
             int64_t piece = c->panel.pieces;
@@ -158,7 +158,7 @@ static int new_panel(Instance *c, double far) {
         if (!c->integrator(far, panel)) return 0;
         double end = c->model->tapes.edges.n_outputs > 0 ? judge_panel(c) : INFINITY;
         if (isinf(end)) break;
-        if (panel->longest == longest) far = fmin(far, end);
+        if (panel->longest == longest) far = min_of(far, end);
     }
     panel->number = 0;
     return c->state.panel_valid = 1;
@@ -176,6 +176,6 @@ int next_piece(Instance *c, double limit, double far) {
     load_piece(c);
     if (s->t == c->piece->begin && c->piece->end <= limit) return 1;
     memcpy(c->whole, c->piece, piece_size(c->model));
-    piece_between(c, c->whole, s->t, fmin(c->piece->end, limit), c->piece);
+    piece_between(c, c->whole, s->t, min_of(c->piece->end, limit), c->piece);
     return 1;
 }

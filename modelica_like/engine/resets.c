@@ -45,7 +45,8 @@ Result move_targets(Instance *c, int count) {
     for (int k = 0; k < count; k++) missing[k] = c->target_values[k] - c->variables[c->targets[k]];
     move_states(c, c->targets, c->target_values, count);
     for (int k = 0; k < count; k++) {
-        double *slope = c->square, size = fmax(largest_like(m, c->variables, c->targets[k]), fabs(c->target_values[k]));
+        double *slope = c->square,
+               size = max_of(largest_like(m, c->variables, c->targets[k]), fabs(c->target_values[k]));
         slope_of_node(c, c->targets[k], 0, slope);
         size += sqrt(dot(m->n_x, slope, slope) * dot(m->n_x, c->point, c->point));
         if (fabs(missing[k] - dot(m->n_x, slope, c->point)) <= REACHED * size) continue;

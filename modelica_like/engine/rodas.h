@@ -1,8 +1,8 @@
-/* The method of integrate.c and, transposed, of adjoint.c. */
+/* The method of integrate.c, of compiled code and, transposed, of adjoint.c. */
 #ifndef RODAS_H
 #define RODAS_H
 
-#include "core.h"
+#include "code.h"
 
 /* One step of RODAS5P: a stiffly accurate, L-stable Rosenbrock method of order 5(4) for index-1 systems with dense
  * output of order 4 (G. Steinebach, BIT Numerical Mathematics 63:27, 2023). Notation as in Hairer & Wanner II, ch.
@@ -36,5 +36,13 @@ static const double RODAS_TIME[STAGES] = {
     0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1, 1, 1};
 static const double RODAS_D_TIME[STAGES] = {
     0.21193756319429014, -0.42387512638858027, -0.3384627126235924, 1.8046452872882734, 2.325825639765069, 0, 0, 0};
+static const double RODAS_DENSE[3][STAGES] = {
+    {25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
+        1.1241088310450404, 0.4272876194431874, -0.17202221070155493},
+    {-9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796, 20.176138334709044,
+        15.98066361424651, -6.789040303419874, -6.710236069923372},
+    {11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643, -52.072871366152654,
+        -59.78993625266729, -0.15582684282751913, 4.883087185713722},
+};
 
 #endif

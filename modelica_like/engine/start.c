@@ -95,7 +95,7 @@ static Result solve_start_system(Instance *c) {
         for (int k = 0; k < n; k++) {
             double *unknown = start_unknown(c, k);
             *unknown -= step[k];
-            change = fmax(change, fabs(step[k]) / (1 + fabs(*unknown)));
+            change = max_of(change, fabs(step[k]) / (1 + fabs(*unknown)));
         }
         measure_rows(c, sizes);
         if (change <= 1e-13) break;
@@ -223,7 +223,7 @@ static Result lead(Instance *c) {
     begin_start(c);
     if (!(steady ? start_steady(c) : find_start(c))) return RESULT_ERROR;
     while (place >= 0 && led < 1) {
-        double next = fmin(led + step, 1);
+        double next = min_of(led + step, 1);
         keep_start(c, KEPT_LED, 0);
         c->d[place] = next;
         share(c);

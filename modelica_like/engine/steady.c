@@ -56,7 +56,7 @@ static int solve_sparse(Instance *c, double inverse, double *values) {
     double least = INFINITY, largest = 0, *x = c->point, size;
     for (int k = 0; k < m->n_x; k++) c->matrix[m->step_diagonal[k]] += c->steady_places[k] < 0 ? 1 : -inverse;
     if (!qr_factor(&m->step, c->matrix, c)) return 0;
-    for (int j = 0; j < m->n_unknowns; j++, least = fmin(least, size), largest = fmax(largest, size))
+    for (int j = 0; j < m->n_unknowns; j++, least = min_of(least, size), largest = max_of(largest, size))
         size = fabs(c->qr_r[m->step.r_colind[j + 1] - 1]);
     if (inverse == 0 && least <= REGULAR * largest) return 0;
     memset(x, 0, (size_t)m->n_unknowns * sizeof(double));
@@ -95,7 +95,7 @@ static double move_unknowns(Instance *c, const double *values) {
     for (int j = 0; j < c->model->n_steady; j++) {
         double *x = &c->x[c->model->steady[j]];
         *x -= values[j];
-        change = fmax(change, isfinite(*x) ? fabs(values[j]) / (1 + fabs(*x)) : INFINITY);
+        change = max_of(change, isfinite(*x) ? fabs(values[j]) / (1 + fabs(*x)) : INFINITY);
     }
     return change;
 }
@@ -149,7 +149,7 @@ static int stays(Instance *c, const double *before, double step) {
  * does. Where all is after the last tick tells what changes, though nothing moves with it. */
 Result check_ticks(Instance *c) {
     const Model *m = c->model;
-    int rounds = (int)fmin(m->n_updates + m->n_resets + 1, MOST_TICKS), rests = 1;
+    int rounds = (int)min_of(m->n_updates + m->n_resets + 1, MOST_TICKS), rests = 1;
     double step;
     if (m->n_steady == 0 || count_clocks(c) == 0) return RESULT_OK;
     for (int k = 0; k < rounds && rests; k++) {
@@ -237,8 +237,8 @@ static Result settle_down(Instance *c) {
             step /= SHRINKAGE;
             if (step < LEAST_STEP) return RESULT_ERROR;
         } else if (fired) {
-            step = fmin(step, STEP_AFTER_EVENT);
-            growth = fmax(growth * CAUTION, LEAST_GROWTH);
+            step = min_of(step, STEP_AFTER_EVENT);
+            growth = max_of(growth * CAUTION, LEAST_GROWTH);
         } else if (step >= LAST_STEP) return RESULT_OK;
         else step *= growth;
     }

@@ -107,10 +107,10 @@ void load_point(Instance *c, double t, const double *point) {
     for (int k = 0; k < m->n_u; k++) c->slots[m->slot_u + k] = input_at(c, k, t);
 }
 
-void load(Instance *c, double t, const double *point) {
+/* Parameters and modes, which decide about tapes. */
+void load_decided(Instance *c) {
     const Model *m = c->model;
     double *slots = c->slots;
-    load_point(c, t, point);
     if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) != 0) {
         c->altered++;
         for (int k = 0; k < m->n_p; k++) {
@@ -123,6 +123,11 @@ void load(Instance *c, double t, const double *point) {
         c->decided_by++;
         c->altered++;
     }
+}
+
+void load(Instance *c, double t, const double *point) {
+    load_point(c, t, point);
+    load_decided(c);
 }
 
 void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
@@ -145,7 +150,7 @@ int any_of(const unsigned char *marks, int n) {
 
 double largest_of(int n, const double *values) {
     double largest = 0;
-    for (int k = 0; k < n; k++) largest = fmax(largest, fabs(values[k]));
+    for (int k = 0; k < n; k++) largest = max_of(largest, fabs(values[k]));
     return largest;
 }
 
@@ -179,7 +184,7 @@ Result solve_implicit(Instance *c, double t, double *point, int quiet) {
         change = 0;
         for (int k = 0; k < m->n_z; k++) {
             z[k] -= step[k];
-            change = fmax(change, fabs(step[k]) / (1 + fabs(z[k])));
+            change = max_of(change, fabs(step[k]) / (1 + fabs(z[k])));
         }
         /* What the largest unknown leaves of a small one when it is rounded does not get smaller. */
         if (change < most || largest_of(m->n_z, step) <= 1e-14 * largest_of(m->n_z, z)) return RESULT_OK;

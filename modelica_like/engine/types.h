@@ -185,6 +185,9 @@ typedef struct Instance {
     uint64_t altered;           /* counts all changes of these, those of tuned parameters, too */
     uint64_t known_by[N_CODES]; /* at which of the latter what compiled tapes know was worked out */
     uint64_t active_by;         /* behind which of the former guards were marked `active` */
+    int fixed_moments;          /* parameters and modes alone decide when time events come */
+    double next_moment;         /* of these, behind the time when it was looked up */
+    uint64_t next_by;           /* at which count of `altered` that was */
     int n_active;               /* of `active_guard` */
 
     const char *name;

@@ -194,6 +194,7 @@ Result set_time(Instance *c, double time) {
     if (!isfinite(time)) return refuse(c, "The time is not a finite number.");
     c->state.t = time;
     c->state.z_valid = c->variables_valid = 0;
+    c->next_by = 0;
     return RESULT_OK;
 }
 

@@ -18,7 +18,7 @@ from modelica_like.fmi.tables import Tables
 from modelica_like.native.straight import straight
 from modelica_like.writing import write_bytes
 
-_HEADERS = ("code.h", "operations.h")
+_HEADERS = ("code.h", "operations.h", "rodas.h")
 
 
 def compiled_code(tables: Tables) -> tuple[Any, str]:

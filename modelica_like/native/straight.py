@@ -14,6 +14,7 @@ from itertools import accumulate
 from modelica_like.fmi.tables import Tables
 from modelica_like.fmi.tape import ARGUMENTS, Tape
 from modelica_like.native.straight_lu import straight_lu
+from modelica_like.native.straight_step import straight_step
 
 TAPES = {"rates": 0, "jacobian": 1, "alg": 2, "alg_jacobian": 3, "guards": 5, "edges": 6, "guards_soon": 7}
 """Tapes that are compiled, with their numbers in model.h."""
@@ -30,11 +31,11 @@ Path = tuple[str | int, ...]
 
 
 def straight(tables: Tables) -> str:
-    """Write the tapes that runs evaluate most as C text, which includes code.h of the run-time."""
+    """Write the tapes that runs evaluate most as C text, which includes rodas.h of the run-time."""
     guards = sorted((one.index, one.mode, one.sources) for one in tables.model.events.transitions if not one.timed)
     first = {group: guard for guard, *group in reversed(guards) for group in [tuple(group)]}
     marks: list[Path] = [(f"w[{first[tuple(group)]}]",) for _, *group in guards]
-    parts, table, count = ['#include "code.h"\n'], "", 0
+    parts, table, count = ['#include "rodas.h"\n'], "", 0
     for name, number in TAPES.items():
         writer = _Writer(tables, tables.tapes[name], 2 * marks if name == "guards" else ())
         parts += writer.functions(number, moving=name == "rates")
@@ -42,7 +43,8 @@ def straight(tables: Tables) -> str:
         table += f"    [{number}] = {{{len(writer.kept)}, {count}, known_{number}, run_{number}, {slopes}}},\n"
         count += len(writer.kept)
     solver = straight_lu(tables)
-    names = ", ".join(("factor", "lower", "upper") if solver else 3 * "0")
+    solver += straight_step(tables) if solver else ""
+    names = ", ".join(("factor", "solve", "stages") if solver else 3 * "0")
     return "\n".join([*parts, solver, f"CODES {{{{\n{table}}}, {names}}};\n"])
 
 

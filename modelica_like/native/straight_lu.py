@@ -16,16 +16,15 @@ _MOST = 600
 
 
 def straight_lu(tables: Tables) -> str:
-    """Write `factor`, `lower` and `upper` as C text; "" for a pattern that is too large."""
+    """Write `factor` and `solve` as C text; "" for a pattern that is too large."""
     if len(tables.lu["rows"]) > _MOST:
         return ""
     writer = _Lu(tables)
     texts = (
         ("int factor(const double *restrict j, double d, double *restrict l, double *restrict p, double *restrict q)",
          [*writer.factor(), "return 1;"]),
-        ("void lower(const double *restrict l, const double *restrict x, double *restrict y)", writer.lower()),
-        ("void upper(const double *restrict l, const double *restrict p, const double *restrict y, double *restrict x)",
-         writer.upper()),
+        ("void solve(const double *restrict l, const double *restrict p, const double *q, const int *o, double *x)",
+         writer.solve()),
     )  # fmt: skip
     return "".join(f"static {head} {{\n" + "".join(f"    {line}\n" for line in body) + "}\n" for head, body in texts)
 
@@ -81,16 +80,16 @@ class _Lu:
             yield f"const double l{k} = l[{k}] = x{row}_{column} * p{column};"
             yield f"raise_to(&s{column}, w{row} * fabs(l{k}));"
 
-    def lower(self) -> Iterator[str]:
-        """Lines of `solve_step` up to the last block."""
+    def solve(self) -> Iterator[str]:
+        """Lines of `solve_step`."""
         yield from (f"double y{place} = x[{row}];" for row, place in enumerate(self.row_place))
         for column, below in enumerate(self.lower_columns):
             yield from (f"y{row} -= l[{k}] * y{column};" for k, row in below)
-        yield from (f"y[{row}] = y{row};" for row in range(self.size))
-
-    def upper(self) -> Iterator[str]:
-        """Lines of `solve_step` behind the last block."""
-        yield from (f"double y{row} = y[{row}];" for row in range(self.size))
+        last = range(self.first, self.size)
+        if last:
+            yield f"double last[] = {{{', '.join(f'y{row}' for row in last)}}};"
+            yield f"lu_solve({len(last)}, q, o, last);"
+            yield from (f"y{row} = last[{k}];" for k, row in enumerate(last))
         for column in reversed(range(self.size)):
             solved = f"y{column} *= p[{column}]" if column < self.first else f"y{column}"
             yield f"x[{self.column_order[column]}] = {solved};"

@@ -263,4 +263,4 @@ def test_the_text_has_only_numbers_and_operations(monkeypatch):
     text = straight(tables[0])
     assert len(text) > 10_000
     assert not [one.path for one in drive.flat_variables if one.path in text]
-    assert set(text) <= set('abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_ \n;=()[]{},.*+-/<!&|#"')
+    assert set(text) <= set('abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_ \n;=()[]{},.*+-/<>!&|#"')
