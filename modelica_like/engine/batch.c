@@ -169,12 +169,23 @@ static int is_top(const double *v, int i, double before, double now, double afte
     return now >= before && now >= after;
 }
 
+/* May the quartic come near a value: by Lebesgue's constant of its nodes, which is 1.64? */
+static int may_come_near(const double *v, double value) {
+    double least = v[0], most = v[0];
+    for (int i = 1; i < READ_NODES; i++) {
+        least = min_of(least, v[i]);
+        most = max_of(most, v[i]);
+    }
+    return !(most + 0.5 * (most - least) < value);
+}
+
 /* Takes what is extreme between the nodes of a stretch. */
 static void search_stretch(Batch *b, int64_t k, double begin, double h) {
     const double *v = b->nodes + k * READ_NODES, width = h / QUARTIC_LOOKS;
     double before = -INFINITY, now = v[0];
     const Reading *one = &b->asked->readings[k];
     int first = is_condition(one), last = QUARTIC_LOOKS;
+    if (!first && !may_come_near(v, b->values[k] - BENT * b->sizes[k])) return;
     for (int i = 0; i <= last; i++) {
         double after = i < last ? quartic(v, (i + 1.) / last) : -INFINITY;
         if (first && i > 0 && isnan(b->values[k]) && is_met(one, now))
@@ -220,7 +231,7 @@ static void read_along(Batch *b, double t, double end) {
 /* From edge to edge: a polynomial has no kinks. The instants at an edge are looked at on both of its sides. */
 static void read_windows(Batch *b, double begin, double end) {
     double t = begin;
-    for (int windows = 0; windows < MOST_EDGES && t < end; windows++) {
+    for (int windows = 0; windows < MOST_EDGES && t < end && !b->c->edgeless; windows++) {
         double behind, edge = edge_ahead(b->c, t, &behind);
         if (!(edge < end && behind > t)) break;
         read_along(b, t, edge);

@@ -278,6 +278,7 @@ double seen_length(Instance *c, double least, double *most) {
     int n = m->tapes.edges.n_outputs, n_edges = m->settings->n_edges, of_slopes, of_guards;
     double begin = c->piece->begin, h = c->piece->end - begin, advance = 0;
     double *first = c->edges, *last = c->edges + n, *middle = c->edges_middle;
+    c->edgeless = n_edges == 0;
     if (!c->edges_valid) edges_at(c, begin, c->piece->points, first), c->edges_kept = 0;
     c->edges_valid = 1;
     edges_at(c, c->piece->end, last_of(m, c->piece), last);
@@ -288,7 +289,7 @@ double seen_length(Instance *c, double least, double *most) {
     /* What advances in a shorter time jumps. */
     if (advance > 1 && h > TIME_RESOLUTION * max_of(1, fabs(begin))) return *most;
     if (n_edges == 0) return INFINITY;
-    if (out_of_reach(c, h)) return explained_length(c);
+    if (out_of_reach(c, h)) return c->edgeless = 1, explained_length(c);
     if (n == n_edges) edges_inside(c, begin + 0.5 * h, middle);
     of_slopes = any_edge(0, m->settings->n_slope_edges, first, middle, last);
     of_guards = any_edge(m->settings->n_slope_edges, n_edges, first, middle, last);

@@ -213,6 +213,7 @@ typedef struct Instance {
     int look_valid;      /* the last look at the guards was at the present point */
     int implicit_kept;   /* there are factors of `implicit_matrix` */
     int by_lu;           /* what the step matrix was factorised by; otherwise by QR */
+    int edgeless;        /* the piece is out of reach of edges */
     int edges_valid;     /* the first third of `edges` belongs to the present point */
     double edges_kept;   /* the last third to the beginning of a step of this length, which ended there; or 0 */
     Gradient *gradient;  /* or NULL */
