@@ -106,6 +106,9 @@ def sweep(
     processes: Annotated[int | None, Option(metavar="N", help="Parallel runs; default: one per core.")] = None,
     scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask scheduler, e.g. tcp://host:8786.")] = None,
     solver: Annotated[Literal["native", "idas"], Option(help="The compiled run-time of FMUs, or IDAS.")] = "native",
+    compiled: Annotated[
+        bool, Option("--compiled", help="Equations as machine code; long sweeps have that by themselves.")
+    ] = False,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help=TABLE)] = None,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw lines, a map, or parallel coordinates.")] = None,
     json: Json = False, debug: Debug = False,
@@ -123,7 +126,7 @@ def sweep(
         with Bar(title="runs") as bar:
             dataset = run(
                 assembly, by_name(map(read_range, over), "--over"), of, until=until, checkpoint=checkpoint,
-                processes=processes, scheduler=scheduler, progress=bar, solver=solver,
+                processes=processes, scheduler=scheduler, progress=bar, solver=solver, compiled=compiled or None,
             )  # fmt: skip
         page.print(sweep_report(dataset))
         if output:

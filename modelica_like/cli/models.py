@@ -42,6 +42,9 @@ Solver = Annotated[
     Option(help="IDAS only, or the compiled run-time of FMUs; by default that run-time if IDAS fails."),
 ]
 
+Compiled = Annotated[
+    bool, Option("--compiled", help="Machine code of the equations, where the compiled run-time does the run.")
+]
 OnChattering = Annotated[
     Literal["stop", "slide", "rest"] | None,
     Option(help="Where events never end: an error (stop), sliding between two modes, rest after ever faster impacts."),
@@ -84,7 +87,8 @@ def check(
 
 def simulate(
     netlist: Netlist, assignments: Assignments = None, *,
-    until: Until = None, start: Start = None, solver: Solver = None, rtol: Tolerance = None, points: Points = None,
+    until: Until = None, start: Start = None, solver: Solver = None, compiled: Compiled = False,
+    rtol: Tolerance = None, points: Points = None,
     on_chattering: OnChattering = None, csv: Csv = None, units: Units = False, plot: Plot = None, show: Curves = None,
     compare: Compare = None, display: Shown = None, inputs: Inputs = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw the energies as a flow diagram.")] = None,
@@ -117,6 +121,7 @@ def simulate(
         shown = assigned(display, "--display")
         Display(model, shown)
         how: dict[str, Any] = {"start": start, "rtol": rtol, "points": points, "on_chattering": on_chattering}
+        how["compiled"] = compiled or None
         with Bar(until or model.settings.get("until")) as bar:
             outcome = Outcome(lambda: run(model, until, progress=bar, solver=solver, **how), debug=debug)
         energy = energy and outcome.stopped is None and outcome.attempt("The energy balance", outcome.solution.energy)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import os
 import subprocess
+import time
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,6 +22,12 @@ from modelica_like.native.straight import straight
 from modelica_like.writing import write_bytes
 
 _HEADERS = ("code.h", "operations.h", "rodas.h")
+_MOST_BYTES = 200_000_000
+"""All libraries together: some thousand models, as one has about 70 kB."""
+_MOST_AGE = 90 * 86_400.0
+"""Time in s since the last use: other versions of the run-time and of the compiler have left what is so old."""
+_TOUCHED = 3600.0
+"""Age in s from which on a use is noted: not at every start of many processes."""
 
 
 def compiled_code(tables: Tables) -> tuple[Any, str]:
@@ -42,7 +51,29 @@ def _library(text: str) -> Path:
         files = {f"{name}.c": "#define CODE_ONLY\n" + text} | {header: sources[header] for header in _HEADERS}
         with TemporaryDirectory(prefix="modelica_like_") as place:
             write_bytes(library, build(files, platform, Path(place), name).read_bytes())
+        _tidy(library)
+    elif time.time() - library.stat().st_mtime > _TOUCHED:
+        with suppress(OSError):  # the folder may be for reading only
+            os.utime(library)
     return library
+
+
+def _tidy(newest: Path) -> None:
+    """Remove libraries beside the newest one that nobody has used for long, and the oldest of those that are too many.
+
+    Who has loaded one keeps it; on Windows that one also stays in the folder.
+    """
+    ages: list[tuple[float, int, Path]] = []
+    for file in newest.parent.glob("code-*"):
+        with suppress(FileNotFoundError):  # other processes tidy up, too
+            status = file.stat()
+            ages.append((time.time() - status.st_mtime, status.st_size, file))
+    total = 0
+    for age, size, file in sorted(ages):
+        total += size
+        if file != newest and (age > _MOST_AGE or total > _MOST_BYTES):
+            with suppress(FileNotFoundError, PermissionError):
+                file.unlink()
 
 
 @cache

@@ -257,7 +257,7 @@ def test_the_module_is_the_command() -> None:
 
 def test_the_native_solver(tmp_path: Path) -> None:
     table = tmp_path / "run.csv"
-    result = called(["simulate", DIRECT, "--solver", "native", "--csv", str(table)])
+    result = called(["simulate", DIRECT, "--solver", "native", "--compiled", "--csv", str(table)])
     assert result.exit_code == 0
     assert "1 mode change" in result.stdout + result.stderr
     rows = list(csv.DictReader(table.read_text().splitlines()))

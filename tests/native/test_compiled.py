@@ -1,7 +1,9 @@
 """Equations as machine code: the same runs to the bit, compiled once, and tapes where there is no compiler."""
 
+import os
 import shutil
 import subprocess
+import time
 import tomllib
 from pathlib import Path
 
@@ -153,6 +155,29 @@ def test_it_is_compiled_once(cache, monkeypatch):
     ]
 
 
+def test_what_is_old_or_too_much_goes(cache, monkeypatch):
+    """The newest files stay, up to a size; a use makes one new."""
+    build(STARTUP).native(compiled=True)
+    (library,) = cache.rglob("code-*")
+    now, day = time.time(), 86_400
+
+    def stored(name, size, days):
+        file = library.parent / name
+        file.write_bytes(size * b"x")
+        os.utime(file, (now, now - days * day))
+        return file
+
+    old, large, small, other = (
+        stored(*one) for one in (("code-a", 1, 100), ("code-b", 9000, 3), ("code-c", 1, 2), ("runtime-d", 1, 100))
+    )
+    monkeypatch.setattr(code, "_MOST_BYTES", library.stat().st_size + 5000)
+    os.utime(library, (now, now - 50 * day))
+    build(STARTUP).native(compiled=True)
+    assert library.stat().st_mtime > now - day
+    code._tidy(library)
+    assert [file.exists() for file in (library, old, large, small, other)] == [True, False, False, True, True]
+
+
 def test_twins_share_the_code(cache, monkeypatch):
     made, drive = counted(monkeypatch), build(STARTUP)
     for inertia in (1.5, 1.9):
@@ -170,6 +195,20 @@ def test_a_sweep_uses_it(cache, monkeypatch):
     assert len(made) == 1
     assert first.equals(second)
     assert second.attrs["notice"] == ""
+
+
+def test_long_sweeps_have_it_by_themselves(cache, monkeypatch, tmp_path):
+    """A checkpoint does not ask for it: what is resumed may have it or not."""
+    made, values = counted(monkeypatch), {"J1.J": np.linspace(1.5, 1.7, 100)}
+    short = sweep(build(STARTUP), values, ["J3.w"], until=0.05, compiled=None, checkpoint=tmp_path / "kept")
+    assert made == []
+    monkeypatch.setattr("modelica_like.analyse.sweeps.sweep._WORTH_CODE", 0.0)
+    assert short.equals(sweep(build(STARTUP), values, ["J3.w"], until=0.05))
+    assert len(made) == 1
+    assert short.equals(sweep(build(STARTUP), values, ["J3.w"], until=0.05, checkpoint=tmp_path / "kept"))
+    sweep(build(STARTUP), {"J1.J": [1.5, 1.6]}, ["J3.w"], until=0.06)
+    sweep(build(STARTUP), values, ["J3.w"], until=0.05, compiled=False)
+    assert len(made) == 1
 
 
 def test_without_a_compiler_tapes_run(cache, monkeypatch):

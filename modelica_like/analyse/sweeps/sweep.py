@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.analyse.sweeps.checkpoint import Checkpoint
+from modelica_like.analyse.sweeps.native_runs import NativeRuns
 from modelica_like.analyse.sweeps.plan import Plan, Sampling, make_plan
 from modelica_like.analyse.sweeps.workers import (
     ONE_IN,
@@ -40,6 +42,8 @@ _TOLD = 3
 _WORTH_PROCESSES = 100
 """Fewer runs finish before processes have started."""
 _POINTS = 50
+_WORTH_CODE = 20.0
+"""CPU time of all runs in s from which on machine code is made: it saves a fifth, and takes a compiler 1 to 5 s."""
 
 Told = Callable[[int, int], None]
 """Called with the number of finished runs and of all runs."""
@@ -72,7 +76,8 @@ def sweep(
         chunk: runs that a worker does at a time; by default a 200th of all, from 25 to 1000.
         solver: `native`, the compiled run-time, or `idas`. IDAS does the runs that fail in the run-time. For
             comparison it repeats the first run, one in a hundred and those with the smallest and largest outputs.
-        settings: further arguments of `simulate`, such as rtol, points or start.
+        settings: further arguments of `simulate`, such as rtol, points or start. Without `compiled`, long sweeps have
+            machine code where there is a compiler; results are the same.
 
     Returns:
         A dataset over the parameters (a grid) or over `sample`: the outputs with their units, and `failure`, the
@@ -91,7 +96,7 @@ def sweep(
     _check_names(plan, outputs, parameters or {})
     chunks = _chunks(plan, outputs, processes, chunk)
     job = Job.of(model, plan.names, outputs, {"until": until, "points": _POINTS, **settings, "solver": solver})
-    job, why = _solvable(job) if scheduler is None else (job, "")
+    job, why = _solvable(job, plan.points) if scheduler is None else (job, "")
     done = _collect(job, plan, chunks, checkpoint, progress, _workers(job, processes, scheduler, len(plan)))
     _check_extremes(job, plan, done)
     return _dataset(model, plan, job, done, why)
@@ -120,16 +125,29 @@ def _chunks(plan: Plan, outputs: Sequence[str], processes: int | None, chunk: in
     return [(first, plan.points[first : first + count]) for first in range(0, len(plan), count)]
 
 
-def _solvable(job: Job) -> tuple[Job, str]:
+def _solvable(job: Job, points: Any) -> tuple[Job, str]:
     """Return the job, for IDAS if the run-time cannot do it, and what to tell about that."""
     try:
         if job.settings["solver"] == "native":
-            return job, Reference(job).native().notice
+            runs = Reference(job).native()
+            return (job, runs.notice) if job.settings.get("compiled") is not None else (_coded(job, runs, points), "")
     except ExportError:
         raise  # there is no run-time: IDAS has its events, too
     except ModelicaLikeError as error:
         return replace(job, settings={**job.settings, "solver": "idas"}), f"IDAS did all runs: {error.what}"
     return job, ""
+
+
+def _coded(job: Job, runs: NativeRuns, points: Any) -> Job:
+    """Return the job with machine code, which is made here for all workers, if a run tells that this pays."""
+    if len(points) >= ONE_IN:  # or the run would be a large part of all
+        begin = time.thread_time()
+        runs.run(points[:1])
+        coded = replace(job, settings={**job.settings, "compiled": True})
+        pays = (time.thread_time() - begin) * len(points) >= _WORTH_CODE
+        if pays and not Reference(coded).native().notice:
+            return coded
+    return job
 
 
 def _check_extremes(job: Job, plan: Plan, done: Done) -> None:
