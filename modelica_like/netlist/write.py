@@ -5,10 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast
-
-import tomlkit
-from tomlkit.items import Item
+from typing import Any
 
 from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component
@@ -17,6 +14,7 @@ from modelica_like.language.formula import Formula
 from modelica_like.language.inside import declarations, inside
 from modelica_like.language.scopes import scope_for, scopes_of
 from modelica_like.language.tables import frozen_rows
+from modelica_like.netlist import spell
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.read import load, new_component
 from modelica_like.netlist.registry import type_name
@@ -38,8 +36,19 @@ def dumps(component: Component, *, folder: str | Path = ".") -> str:
     Raises:
         NetlistError: the component has something a netlist cannot contain, such as equations of its own.
     """
+    data = sections(component, folder)
+    top = _lines(data.pop(""))
+    return "\n".join([top, *(f"[{name}]\n{_lines(some)}" for name, some in data.items() if some)])
+
+
+def _lines(entries: Mapping[str, Any]) -> str:
+    return "".join(f"{spell.key(name)} = {spell.value(entry)}\n" for name, entry in entries.items())
+
+
+def sections(component: Component, folder: str | Path) -> dict[str, dict[str, Any]]:
+    """Return what `dumps` writes as plain data, by section; what stands at the top has the name ""."""
     assembly = component if isinstance(component, Assembly) else as_assembly(component)
-    return _Writer(Path(folder)).document(assembly)
+    return _Writer(Path(folder)).sections(assembly)
 
 
 class _Writer:
@@ -50,15 +59,15 @@ class _Writer:
         self.start: dict[str, Any] = {}
         self.guess: dict[str, Any] = {}
 
-    def document(self, assembly: Assembly) -> str:
+    def sections(self, assembly: Assembly) -> dict[str, dict[str, Any]]:
         parts = {name: self.part(name, part) for name, part in inside(assembly).parts.items()}
-        sections: dict[str, Mapping[str, Any]] = {
+        sections: dict[str, dict[str, Any]] = {
             "parameters": {
                 name: plain(_given(assembly, name).given)
                 for name, field in assembly.fields.items()
                 if isinstance(field, Parameter)
             },
-            "parts": {name: _inline(entry) for name, entry in parts.items()},
+            "parts": parts,
             "series": {name: list(ends) for name, ends in assembly.chains.items()},
             "connect": {name: list(ends) for name, ends in assembly.wires.items()},
             "expose": dict(assembly.exposed),
@@ -66,8 +75,8 @@ class _Writer:
             "guess": self.guess,
             "simulate": inside(assembly).simulate,
             "display": inside(assembly).display,
-            "optimize": {key: _inline(_as_written(entry)) for key, entry in inside(assembly).optimize.items()},
-            "tolerances": {key: _inline(_as_written(entry)) for key, entry in inside(assembly).tolerances.items()},
+            "optimize": _as_written(inside(assembly).optimize),
+            "tolerances": _as_written(inside(assembly).tolerances),
         }
         top: dict[str, Any] = {"name": inside(assembly).name}
         if inside(assembly).description:
@@ -76,7 +85,7 @@ class _Writer:
             top["sizing"] = Path(os.path.relpath(inside(assembly).sizing, self.folder.resolve())).as_posix()
         if assembly.free_ends:
             top["free"] = list(assembly.free_ends)
-        return "\n".join([_lines(top), *(f"[{name}]\n{_lines(some)}" for name, some in sections.items() if some)])
+        return {"": top, **sections}
 
     def part(self, path: str, part: Component | list[Component]) -> Any:
         if not isinstance(part, list):
@@ -174,34 +183,7 @@ def plain(value: Any) -> Any:
 
 
 def _as_written(value: Any) -> Any:
-    """Return the values of [optimize] as TOML has them."""
+    """Return the values of [optimize] and [tolerances] as TOML has them."""
     if isinstance(value, dict):
         return {key: _as_written(entry) for key, entry in value.items()}
     return [_as_written(entry) for entry in value] if isinstance(value, list | tuple) else value
-
-
-def _lines(entries: Mapping[str, Any]) -> str:
-    """Return a section; a document of tomlkit looks through all its lines for each one that is added."""
-    return "".join(f"{tomlkit.key(name).as_string()} = {_text(entry)}\n" for name, entry in entries.items())
-
-
-def _text(entry: Any) -> str:
-    if isinstance(entry, Item):
-        return entry.as_string()
-    if isinstance(entry, list):  # an array of tomlkit counts all its elements for each one that is added
-        return f"[{', '.join(map(_text, cast('list[Any]', entry)))}]"
-    return tomlkit.item(entry).as_string()
-
-
-def _inline(entry: Any) -> Any:
-    if isinstance(entry, list):
-        array = tomlkit.array()
-        for element in entry:
-            array.append(_inline(element))
-        return array.multiline(True) if entry and isinstance(entry[0], dict) else array
-    if not isinstance(entry, dict):
-        return entry
-    table = tomlkit.inline_table()
-    for name, value in entry.items():
-        table.append(tomlkit.key(name), _inline(value))
-    return table

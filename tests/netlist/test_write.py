@@ -154,14 +154,14 @@ def test_a_part_with_parts_is_written_by_what_differs_from_its_class() -> None:
     drive.set("loads[2].w", 1.5)
     kind = f"{Drive.__module__}:Drive"
     text = dumps(Assembly("a", parts={"d": drive}))
-    assert f'd = {{is = "{kind}", inertia = "1 kg.m2", motor = {{w_fixed = 5}}, gear = {{ratio = 7}}}}' in text
+    assert f'd = {{ is = "{kind}", inertia = "1 kg.m2", motor = {{ w_fixed = 5 }}, gear = {{ ratio = 7 }} }}' in text
     assert '"d.loads[2].w" = 1.5' in text
     assert_same(loads(text).find("d"), drive)
 
 
 def test_arrays_of_equal_parts_are_counted_and_others_listed() -> None:
     same = Assembly("a", parts={"m": [Inertia(J=1)] * 3})
-    assert 'm = {is = "Inertia", count = 3, J = 1}' in dumps(same)
+    assert 'm = { is = "Inertia", count = 3, J = 1 }' in dumps(same)
     mixed = Assembly("a", parts={"m": [Inertia(J=1), Spring(c=2)]})
     assert_same(loads(dumps(mixed)), mixed)
 
@@ -182,7 +182,7 @@ def test_netlists_inside_are_named_by_file(tmp_path: Path) -> None:
     outer = Assembly("outer", parts={"b": box})
     (tmp_path / "sub").mkdir()
     save(outer, tmp_path / "sub" / "outer.toml")
-    assert 'b = {is = "../box.toml", k = 3, shaft = {J = 4}}' in (tmp_path / "sub" / "outer.toml").read_text()
+    assert 'b = { is = "../box.toml", k = 3, shaft = { J = 4 } }' in (tmp_path / "sub" / "outer.toml").read_text()
     assert_same(load(tmp_path / "sub" / "outer.toml"), outer)
 
 
@@ -192,11 +192,11 @@ def test_formulas_keep_the_names_they_use(tmp_path: Path) -> None:
     text = '[parameters]\ni = 7\n[parts]\nq = { is = "./box.toml", a.J = "i * J" }\n[start]\n"q.a.w" = "i * 1 rad/s"\n'
     drive = loads(text, file=str(tmp_path / "bench.toml"))
     written = dumps(drive, folder=tmp_path)
-    assert 'a = {J = "i * J"}' in written
+    assert 'a = { J = "i * J" }' in written
     assert '"q.a.w" = "i * 1 rad/s"' in written
     drive.find("q").set("a.J", "i * J")  # the i of the box
     written = dumps(drive, folder=tmp_path)
-    assert 'a = {J = "q.i * q.J"}' in written
+    assert 'a = { J = "q.i * q.J" }' in written
     read = loads(written, file=str(tmp_path / "bench.toml"))
     assert {p.path: p.value for p in flatten(read).derived}["q.a.J"] == 3 * 2.0
 
