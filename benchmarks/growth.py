@@ -41,6 +41,7 @@ from modelica_like import (
     steady,
     sweep,
 )
+from modelica_like.edit import apply
 from modelica_like.netlist import dumps, loads, save
 from modelica_like.netlist.modelica.write import modelica_text
 from modelica_like.show.report.plausible import notes
@@ -137,6 +138,16 @@ def of_run(drive: Any, model: Any, run: Any, folder: Path) -> Iterator[Call]:
     yield "check of start values", lambda: shown(start_report(drive, model))
     yield "netlist as text", lambda: dumps(drive)
     yield "save", lambda: save(drive, folder / "saved.toml")
+    text = (folder / "chain.toml").read_text(encoding="utf-8")
+    for request in (
+        {"op": "insert", "name": "new", "kind": "Inertia", "after": "m1"}, {"op": "remove", "name": "s1"},
+        {"op": "connect", "first": "m1.flange_b", "second": "m3.flange_b"},
+        {"op": "disconnect", "first": "m1", "second": "s2"},
+        {"op": "rename", "old": "m1", "new": "new"}, {"op": "replace", "name": "s1", "kind": "Damper"},
+        {"op": "set", "path": "m1.J", "value": 2}, {"op": "duplicate", "name": "m1", "new": "new"},
+        {"op": "group", "names": ["m1", "s2"], "name": "new"},
+    ):  # fmt: skip
+        yield f"edit: {request['op']}", lambda request=request: apply(text, request, file=folder / "chain.toml")
     yield "as Modelica", lambda: modelica_text(drive)
     yield "schematic", lambda: schematic(drive)
     yield "plot", lambda: run.plot()

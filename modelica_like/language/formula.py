@@ -44,6 +44,7 @@ CONSTANTS = {"pi": math.pi}
 _QUANTITY = re.compile(
     r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[ \t]+)((?:[^\W\d_]|[%°])[^\s+*,()-]*(?:\([\w.]+\)[\w.]*)?)"
 )
+_NAME = re.compile(r"(?<![\w.])[^\W\d]\w*(?:\[\d+\])?(?:\.[^\W\d]\w*(?:\[\d+\])?)*")
 _NO_SYNTAX = (SyntaxError, ValueError, MemoryError, RecursionError)
 _PLACEHOLDER = "_quantity_{}_"
 _SAME, _ALIKE = ("neg", "abs"), ("+", "-", "min", "max")
@@ -255,6 +256,18 @@ def _without_quantities(text: str) -> tuple[str, dict[str, str]]:
         return placeholder
 
     return _QUANTITY.sub(name, text), quantities
+
+
+def name_places(text: str) -> list[tuple[int, int]]:
+    """Return where the paths of parameters stand in the text of a formula."""
+    quantities = [match.span() for match in _QUANTITY.finditer(text) if _is_unit(match.group(2))]
+    return [
+        match.span()
+        for match in _NAME.finditer(text)
+        if match.group() not in CONSTANTS
+        and not text[match.end() :].lstrip().startswith("(")
+        and not any(start <= match.start() < end for start, end in quantities)
+    ]
 
 
 def _is_unit(text: str) -> bool:

@@ -148,6 +148,7 @@ class InsideAssembly(InsideComponent):
         simulate: arguments of a run.
         display: units of pictures and tables.
         origin: path of its file.
+        text: of this file, as it was read.
         sizing: path of its sizing file.
         optimize: what is optimised, as written in the netlist.
         tolerances: how parameters scatter, as written there.
@@ -163,6 +164,7 @@ class InsideAssembly(InsideComponent):
     simulate: dict[str, Any] = field(default_factory=_empty)
     display: dict[str, str] = field(default_factory=_empty)
     origin: str = ""
+    text: str = ""
     sizing: str = ""
     optimize: dict[str, Any] = field(default_factory=_empty)
     tolerances: dict[str, Any] = field(default_factory=_empty)

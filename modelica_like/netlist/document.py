@@ -41,6 +41,7 @@ class Document:
 
     Attributes:
         lines: of its keys.
+        text: as written.
         parts: tables with `is`, or lists of such tables, by name.
         start: fixed start values by path.
         guess: guessed start values by path.
@@ -54,6 +55,7 @@ class Document:
 
     lines: Lines
     name: str
+    text: str = ""
     description: str = ""
     parameters: dict[str, Any] = field(default_factory=dict)
     parts: dict[str, Any] = field(default_factory=dict)
@@ -70,8 +72,12 @@ class Document:
     tolerances: dict[str, Any] = field(default_factory=dict)
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path, *, as_written: bool = False) -> str:
     """Return the text of a netlist file.
+
+    Args:
+        path: of the file.
+        as_written: whether line breaks of Windows, and a mark of the byte order, are left in it.
 
     Raises:
         NetlistError: the file is missing, not text, or too large.
@@ -94,10 +100,15 @@ def read_text(path: Path) -> str:
             advice="An FMU is run by run_fmu(…) in Python, and by `compare` and `report` on the command line.",
         )
     try:
-        return data.decode("utf-8-sig").replace("\r\n", "\n")
+        return data.decode() if as_written else plain(data.decode())
     except UnicodeDecodeError as error:
         place = Source(str(path), data.count(b"\n", 0, error.start) + 1)
         raise NetlistError(f"'{path.name}' is not a text file (UTF-8).", where=place) from None
+
+
+def plain(text: str) -> str:
+    """Return a text without the line breaks of Windows and a mark of the byte order."""
+    return text.removeprefix("\ufeff").replace("\r\n", "\n")
 
 
 def _neighbours(path: Path) -> str:
@@ -112,7 +123,7 @@ def parse(text: str, file: str) -> Document:
     """Read the text of a netlist and check its form.
 
     Args:
-        text: TOML.
+        text: TOML; see `plain`.
         file: path of the file, for messages.
 
     Raises:
@@ -120,6 +131,7 @@ def parse(text: str, file: str) -> Document:
         DuplicateName: a name is used twice.
         WiringErrors: several errors.
     """
+    written, text = text, plain(text)
     lines = locate(text, file)
     if not text.strip():
         raise NetlistError(
@@ -127,8 +139,8 @@ def parse(text: str, file: str) -> Document:
         )
     data = parse_toml(text, lines)
     errors: list[ModelicaLikeError] = []
-    sections = read_sections(data, "A netlist", _READERS, lines, errors)
-    document = Document(lines, **{"name": Path(lines.file).stem, **sections})
+    sections = read_sections(data, "A netlist", READERS, lines, errors)
+    document = Document(lines, text=written, **{"name": Path(lines.file).stem, **sections})
     for name in document.parts.keys() & document.parameters.keys():
         places = (lines.source("parameters", name), lines.source("parts", name))
         errors.append(DuplicateName(f"'{name}' is both a parameter and a part.", where=places))
@@ -357,7 +369,7 @@ _OPTIONS: Mapping[str, Check] = {
     "until": duration, "start": _one_of(StartKind), "rtol": _rtol, "points": _whole(1_000_000),
     "on_chattering": _one_of(OnChattering),
 }  # fmt: skip
-_READERS: Mapping[str, Reader] = {
+READERS: Mapping[str, Reader] = {
     "name": whole(as_text),
     "description": whole(as_text),
     "parameters": each(_value),
@@ -374,3 +386,4 @@ _READERS: Mapping[str, Reader] = {
     "optimize": options(OPTIMIZE),
     "tolerances": whole(tolerances),
 }
+"""Of the sections of a netlist."""

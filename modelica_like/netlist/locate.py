@@ -13,9 +13,10 @@ _MAX_TEXT = 120
 Path = tuple[str, ...]
 
 # No possessive quantifier (`*+`) of a group: it is broken in Python before 3.11.5.
-_STRING = r"""(?P<string>\"{3}(?:[^"\\]++|\\.|"(?!""))*(?:\"{3,5}|\Z) | '{3}(?:[^']++|'(?!''))*(?:'{3,5}|\Z)
+STRING = r"""(?P<string>\"{3}(?:[^"\\]++|\\.|"(?!""))*(?:\"{3,5}|\Z) | '{3}(?:[^']++|'(?!''))*(?:'{3,5}|\Z)
         |"(?:[^"\\\n]++|\\.)*"? | '[^'\n]*+'?)"""
-_COMMON = rf"""(?P<comment>\#[^\n]*+) | {_STRING} | (?P<open>[\[{{]) | (?P<close>[\]}}]) | (?P<newline>\n)"""
+"""A text in quotes, also one that does not end."""
+_COMMON = rf"""(?P<comment>\#[^\n]*+) | {STRING} | (?P<open>[\[{{]) | (?P<close>[\]}}]) | (?P<newline>\n)"""
 _KEY = re.compile(
     rf"""{_COMMON} | (?P<equals>=) | (?P<dot>\.) | (?P<space>[ \t\r]++) | (?P<word>[^"'\#\[\]{{}}\n=.\s]++)
         | (?P<other>.)""",

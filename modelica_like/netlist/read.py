@@ -74,9 +74,15 @@ def loads(text: str, file: str = "netlist.toml", *, trust: bool = False) -> Asse
         return _Loader().build(parse(text, file), (Path(file).resolve(),))
 
 
-def assemble(document: Document, file: Path) -> Assembly:
-    """Build the assembly of an already read netlist; see `load`."""
-    return _Loader().build(document, (file.resolve(),))
+def assemble(document: Document, file: Path, texts: Mapping[Path, str] | None = None) -> Assembly:
+    """Build the assembly of an already read netlist; see `load`.
+
+    Args:
+        document: what was read.
+        file: its path.
+        texts: of netlists used as parts that are not written yet, by absolute path.
+    """
+    return _Loader(texts).build(document, (file.resolve(),))
 
 
 class _Reported(Exception):
@@ -86,7 +92,8 @@ class _Reported(Exception):
 class _Loader:
     """Builds assemblies; every file is read once."""
 
-    def __init__(self) -> None:
+    def __init__(self, texts: Mapping[Path, str] | None = None) -> None:
+        self.texts = texts or {}
         self.assemblies: dict[Path, Assembly] = {}
         self.failed: set[Path] = set()
         self.parts = 0
@@ -102,7 +109,8 @@ class _Loader:
             raise _Reported
         if key not in self.assemblies:
             self.failed.add(key)
-            self.assemblies[key] = self.build(parse(read_text(path), str(path)), (*chain, key))
+            text = self.texts[key] if key in self.texts else read_text(path, as_written=True)
+            self.assemblies[key] = self.build(parse(text, str(path)), (*chain, key))
             self.failed.remove(key)
         return self.assemblies[key]
 
@@ -116,7 +124,8 @@ class _Loader:
             description=document.description,
         )  # fmt: skip
         record = inside(assembly)
-        record.origin, record.simulate, record.display = str(chain[-1]), document.simulate, document.display
+        record.origin, record.text = str(chain[-1]), document.text
+        record.simulate, record.display = document.simulate, document.display
         if document.sizing:
             record.sizing = str(chain[-1].parent / document.sizing)
         record.optimize, record.tolerances = document.optimize, document.tolerances

@@ -1,0 +1,55 @@
+"""Whatever is done to a netlist: the text is TOML, what is wrong is told, and everything can be undone.
+
+`RANDOM_EDITS=5000 pytest tests/edit` does more sequences; the slow suite has a thousand.
+"""
+
+import os
+import random
+import tomllib
+from pathlib import Path
+
+import pytest
+from random_edits import Chooser
+
+from modelica_like.edit import Document
+from modelica_like.errors import ModelicaLikeError
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+NETLISTS = sorted(path for path in EXAMPLES.rglob("*.toml") if "sizing" not in path.parts)
+SLOW = int(os.environ.get("RANDOM_EDITS", "1000"))
+STEPS = 30
+
+
+def edited(path: Path, seed: int) -> int:
+    """Do random operations, undo and do them again; return how many were not refused."""
+    document = Document(path)
+    chooser, texts = Chooser(document, seed), [document.text]
+    for _ in range(STEPS):
+        request = chooser.request()
+        refusal = ""
+        try:
+            document.apply(request)
+        except ModelicaLikeError as error:
+            refusal = str(error)
+        else:
+            texts.append(document.text)
+        # A refusal for the text that an operation would write is a fault of the operation.
+        assert not any(words in refusal for words in ("is not TOML", "declared twice")), request
+        assert document.text == texts[-1]
+        tomllib.loads(document.text)
+        assert all(isinstance(problem, ModelicaLikeError) and str(problem) for problem in document.problems())
+    for text in reversed(texts[:-1]):
+        assert document.undo().text == text
+    for text in texts[1:]:
+        assert document.redo().text == text
+    assert path.read_bytes().decode() == texts[0]
+    return len(texts) - 1
+
+
+@pytest.mark.parametrize(
+    "seeds", [pytest.param(range(12), id="some"), pytest.param(range(12, SLOW), id="all", marks=pytest.mark.slow)]
+)
+def test_random_edits(seeds: range) -> None:
+    order = random.Random(1).sample(NETLISTS, len(NETLISTS))
+    done = sum(edited(order[seed % len(order)], seed) for seed in seeds)
+    assert done > 0.3 * STEPS * len(seeds)
