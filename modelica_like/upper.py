@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from modelica_like.analyse.operating.steady import unstable as unstable
     from modelica_like.analyse.sensitivity.function import simulation_function as simulation_function
+    from modelica_like.edit.saving import rewritten as rewritten
     from modelica_like.native.handle import Native as Native
     from modelica_like.native.run import EngineLoop as EngineLoop
     from modelica_like.native.start import initialize as initialize
@@ -31,6 +32,7 @@ _HOME = {
     "icon": "show.draw",
     "mathematics": "show.report.mathematics",
     "plot": "show.plot",
+    "rewritten": "edit.saving",
     "sankey": "show.sankey",
     "save_plot": "show.plot",
     "schematic": "show.draw",

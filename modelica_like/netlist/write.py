@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from modelica_like import upper
 from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component
 from modelica_like.language.fields import Field, Parameter, Value
@@ -22,8 +23,12 @@ from modelica_like.writing import write_text
 
 
 def save(component: Component, path: str | Path) -> None:
-    """Write a component as a netlist file; see `dumps`."""
-    write_text(path, dumps(component, folder=Path(path).parent))
+    """Write a component as a netlist file; see `dumps`.
+
+    What was read from a file keeps its comments, order and layout: only what has changed is written anew.
+    """
+    kept = upper.rewritten(component, path) if isinstance(component, Assembly) and inside(component).text else None
+    write_text(path, kept or dumps(component, folder=Path(path).parent))
 
 
 def dumps(component: Component, *, folder: str | Path = ".") -> str:
