@@ -42,8 +42,8 @@ version. `modelica-like --install-completion` makes the shell of `$SHELL` (bash,
 fish) complete commands, options, values and component types.
 
 Options can stand anywhere behind the command. Those marked with … can be given as often as needed. Times are numbers in
-seconds or quantities: `2s`, `0.1ms`. `--json` prints tables as data. `--trust`, with any command, runs Python modules
-beside the netlists: [security](security.md). Errors are sentences on standard error; `--debug`
+seconds or quantities: `2s`, `0.1ms`. `--json` prints tables and problems as data. `--trust`, with any command, runs
+Python modules beside the netlists: [security](security.md). Errors are sentences on standard error; `--debug`
 shows where in the code they were raised. Exit codes and files: [scripts](how_to/scripts.md)."""
 
 
@@ -63,7 +63,7 @@ def _about(name: str) -> Iterator[str]:
     rows = (f"| {_written(one)} | {_meaning(one)} |" for one in known if one.name not in ("debug", "json"))
     yield "\n".join(["| argument or option | meaning |", "|---|---|", *rows])
     if any(one.name == "json" for one in known):
-        yield "With `--json`: the tables as JSON."
+        yield "With `--json`: tables and problems as JSON."
     if name in MORE:
         yield f"More: [{MORE[name][1]}]({MORE[name][0]})."
 

@@ -3,37 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
-_SHOWN = 160
+from modelica_like.places import SHOWN
+from modelica_like.places import Source as Source
+
 _SHORT = 3
 """A part of a name that is not longer does not suggest the name."""
 _ENDLESS = re.compile(r"\S{500,}")
 """A word of this length is not repeated in a message."""
-
-
-@dataclass(frozen=True, slots=True)
-class Source:
-    """A place in a source file: a line of Python or of a netlist.
-
-    Attributes:
-        file: path of the file, as it was opened.
-        line: line number, counted from one; zero if it is not known.
-        text: the source text of the statement, on one line.
-    """
-
-    file: str
-    line: int = 0
-    text: str = ""
-
-    def __str__(self) -> str:
-        place = Path(self.file).name + (f":{self.line}" if self.line else "")
-        text = self.text if len(self.text) <= _SHOWN else f"{self.text[: _SHOWN - 1]}…"
-        return f"{place} `{text}`" if text else place
 
 
 class ModelicaLikeError(Exception):
@@ -44,16 +24,25 @@ class ModelicaLikeError(Exception):
         where: source places, most relevant first.
         why: one sentence with the reason, where it is not obvious.
         advice: one sentence that says what to do.
+        word: the wrong word, as it stands in the file.
+        instead: what is meant by it, if that is clear.
+        operation: a change of the file that does what the advice says: `operation` is its kind, the others say what.
     """
 
-    def __init__(self, what: str, *, where: Source | Iterable[Source] = (), why: str = "", advice: str = "") -> None:
-        what = _ENDLESS.sub(lambda word: f"{word[0][:_SHOWN]}…", what)
+    def __init__(
+        self, what: str, *, where: Source | Iterable[Source] = (), why: str = "", advice: str = "",
+        word: str = "", instead: str = "", operation: Mapping[str, Any] | None = None,
+    ) -> None:  # fmt: skip
+        what = _ENDLESS.sub(lambda word: f"{word[0][:SHOWN]}…", what)
         super().__init__(what)
         self.what = what
         places = (where,) if isinstance(where, Source) else tuple(where)
         self.where: tuple[Source, ...] = tuple(place for place in places if place.file)
         self.why = why
         self.advice = advice
+        self.word = word
+        self.instead = instead
+        self.operation = operation
 
     def __str__(self) -> str:
         lines = [self.what]
@@ -61,8 +50,35 @@ class ModelicaLikeError(Exception):
         lines += [text for text in (self.why, self.advice) if text]
         return "\n".join(lines)
 
+    def problems(self) -> Sequence[ModelicaLikeError]:
+        """Return the errors that are told together: this one alone, or several."""
+        return (self,)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the error as data for JSON; what is not known is None, or an empty text.
+
+        Returns:
+            `kind`, the name of its class; `file`, `line`, `column`, `length` and `path` (of the key) of its first
+            place; `what`, `why` and `advice`; `places`, the others with the same keys; `suggestion`, a change of the
+            file that does exactly what the advice says: its `operation` is `replace` (the text `old` at a place by
+            `new`), `set` (give the parameter `path` a value in `unit`) or `free` (add `end` to the list `free`).
+        """
+        first, *others = self.where or (Source(""),)
+        place = first.as_json(self.word)
+        # Only a file of data can be changed by an operation; a place in Python has no statement.
+        suggestion = {**self.operation, "file": first.file} if self.operation and first.statement else None
+        if self.instead and first.has(self.word):
+            spot = {key: place[key] for key in ("file", "line", "column", "length")}
+            suggestion = {"operation": "replace", **spot, "old": self.word, "new": self.instead}
+        texts = {"what": self.what, "why": self.why, "advice": self.advice}
+        return {
+            "kind": type(self).__name__, **place, **texts,
+            "places": [other.as_json(self.word) for other in others], "suggestion": suggestion,
+        }  # fmt: skip
+
     def __reduce__(self) -> tuple[object, ...]:
-        return _rebuild, (type(self), self.what, self.where, self.why, self.advice)
+        further = {"word": self.word, "instead": self.instead, "operation": self.operation}
+        return _rebuild, (type(self), self.what, self.where, self.why, self.advice), further
 
 
 def _rebuild(
@@ -140,6 +156,14 @@ class WiringErrors(ModelicaLikeError):
     ) -> None:  # fmt: skip
         super().__init__(what, where=where, why=why, advice=advice)
         self.errors = tuple(errors)
+
+    def problems(self) -> Sequence[ModelicaLikeError]:
+        """Return the errors."""
+        return tuple(inner for error in self.errors for inner in error.problems())
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the number of errors as data for JSON, with each of them in `problems`."""
+        return {**super().as_json(), "problems": [error.as_json() for error in self.problems()]}
 
     def __str__(self) -> str:
         return "\n\n".join(str(error) for error in self.errors)
@@ -291,12 +315,41 @@ def extra_module(module: str, extra: str, package: str = "") -> Any:
         raise missing_extra(package or module.partition(".")[0], extra) from None
 
 
+def unknown_name(
+    what: str, name: object, candidates: Iterable[str], more: str = "", *, advice: str = "",
+    where: Source | Iterable[Source] = (),
+) -> UnknownName:  # fmt: skip
+    """Return the error about a name that does not exist, with the known one that is meant.
+
+    Args:
+        what: begin of a sentence that ends in the name.
+        name: as it stands in the file.
+        candidates: names that exist.
+        more: further sentences.
+        advice: what to do.
+        where: source places.
+    """
+    near = nearest(name, candidates)
+    what = f"{what}{question(near) or '.'}{more}"
+    return UnknownName(what, where=where, advice=advice, word=str(name), instead=near)
+
+
 def did_you_mean(name: object, candidates: Iterable[str]) -> str:
     """Return `; did you mean 'sun'?` for the known name nearest to `name` (of any type), or an empty string."""
+    return question(nearest(name, candidates))
+
+
+def question(name: str) -> str:
+    """Return `; did you mean 'sun'?` for a name, or an empty string for none."""
+    return f"; did you mean '{name}'?" if name else ""
+
+
+def nearest(name: object, candidates: Iterable[str]) -> str:
+    """Return the known name nearest to `name` (of any type), or an empty string."""
     import difflib  # slow to import
 
     name, names = str(name), list(candidates)
     within = sorted((other for other in names if len(name) > _SHORT and name.lower() in other.lower()), key=len)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.58 if not within else 0.8)
     near = near or within or [other for other in names if other in name.split("_")]
-    return f"; did you mean '{near[0]}'?" if near else ""
+    return near[0] if near else ""

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from modelica_like.cli.reader import Argument, Option
-from modelica_like.cli.shared import Assignments, Debug, Json, Netlist, load_netlist, note, say, told
+from modelica_like.cli.shared import Assignments, Debug, Json, Netlist, load_netlist, say, slips, told, warn
 from modelica_like.writing import write_text
 
 Fmi = Annotated[Literal["2.0", "3.0"], Option(help="Version of FMI.")]
@@ -114,7 +114,8 @@ def from_modelica(
 
         model, notes = read_modelica(text, name)
         write_text(target, netlist_text(model, target.parent, notes))
-        note(*notes)
+        if notes:
+            warn(slips(*notes))
         say(f"{target}: {len(model.parts)} parts; next, modelica-like simulate {target}")
 
 

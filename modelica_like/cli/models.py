@@ -21,7 +21,6 @@ from modelica_like.cli.shared import (
     Until,
     assigned,
     load_netlist,
-    note,
     told,
 )
 from modelica_like.errors import NetlistError
@@ -68,19 +67,21 @@ def check(
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms.
 
     Units, wiring, structure, start values and what happens at the start are checked without a run. What looks like a
-    slip is told on stderr; the exit code stays 0.
+    slip is told on stderr; the exit code stays 0. All mistakes that do not follow from each other are told at once.
     """
     with told(debug, json=json) as page:
-        assembly = load_netlist(netlist, assignments)
+        assembly = load_netlist(netlist, assignments, thorough=True)
+        from modelica_like.netlist.further import thoroughly
         from modelica_like.show.report.plausible import drive_notes
         from modelica_like.show.report.start import start_notes, start_report
         from modelica_like.show.report.structure import structure_report
         from modelica_like.simulation import build
 
-        structure, model = structure_report(assembly), build(assembly)
+        with thoroughly(assembly):
+            structure, model = structure_report(assembly), build(assembly)
         missing = start_notes(model)  # before the report, which says that the drive can be simulated
         page.print(structure)
-        note(*drive_notes(assembly), *(missing if not start_values else ()))
+        page.note(assembly, *drive_notes(assembly), *(missing if not start_values else ()))
         if start_values:
             page.print("", start_report(assembly, model))
 
@@ -128,7 +129,7 @@ def simulate(
         outcome.tell(
             lambda result: run_report(result, energy=energy, debug=debug, display=shown, show=show or ()), page
         )
-        outcome.attempt("The notes", lambda: note(*notes(assembly, outcome.solution, energy=energy)))
+        outcome.attempt("The notes", lambda: page.note(assembly, *notes(assembly, outcome.solution, energy=energy)))
         again = partial(run, model, until, **how)
         curves = (plot, lambda result: _drawn(result, variants, files, again, show or (), shown))
         pictures = curves, (sankey, lambda result: result.energy().sankey(model.name))

@@ -146,6 +146,7 @@ class Reader(argparse.ArgumentParser):
             formatter_class=_Page, add_help=False, allow_abbrev=False,
         )  # fmt: skip
         self.color = False  # of newer Pythons
+        self._json = False
 
     def read(self, words: Sequence[str]) -> dict[str, Any]:
         """Return the values by name.
@@ -153,6 +154,7 @@ class Reader(argparse.ArgumentParser):
         Raises:
             SystemExit: help is shown (0), or the words are wrong (2).
         """
+        self._json = "--json" in words
         given = [*self._ordered(words)]
         return vars(self.parse_args(["--help"] if "--help" in given else given))
 
@@ -179,12 +181,16 @@ class Reader(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Tell what is wrong with the words, and how they should be."""
-        from modelica_like.cli.shared import BAD_INPUT, warn
+        from modelica_like.cli.shared import BAD_INPUT, Page, warn
+        from modelica_like.errors import ModelicaLikeError
 
         for begin, ours in _SAID.items():
             message = ours + message.removeprefix(begin) if message.startswith(begin) else message
         what = message if message[-1] in ".?" else f"{message}."
         warn(f"{what}\n{self.format_usage()}More about it: {self.prog} --help", "red")
+        page = Page(json=self._json)
+        page.problems.append({**ModelicaLikeError(what).as_json(), "kind": "Usage"})
+        page.close()
         raise SystemExit(BAD_INPUT)
 
 

@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from modelica_like.cli.reader import Argument, Option
-from modelica_like.errors import InitializationError, ModelicaLikeError, NetlistError, SolveError
+from modelica_like.errors import InitializationError, ModelicaLikeError, NetlistError, SolveError, Source
 from modelica_like.writing import check_writable
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from modelica_like.language import Component
 
 BAD_INPUT = 2
 SOLVE_FAILED = 1
@@ -25,6 +27,9 @@ DEFECTS = (
     ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, MemoryError, RuntimeError, StopIteration,
     SyntaxError, TypeError, ValueError,
 )  # fmt: skip
+
+TOLD = (KeyboardInterrupt, ModelicaLikeError, OSError, *DEFECTS)
+"""What ends a command with a text."""
 
 Netlist = Annotated[Path, Argument(metavar="NETLIST", help="Netlist, a TOML file.")]
 Debug = Annotated[bool, Option("--debug", help="Show where in the code errors are raised and events declared.")]
@@ -46,9 +51,14 @@ Json = Annotated[bool, Option("--json", help="Print the tables as JSON, with all
 
 
 class Page:
-    """What a command prints: at once, or as JSON when it is complete; on stderr if stdout gets a table."""
+    """What a command prints: at once, or as JSON when it is complete; on stderr if stdout gets a table.
 
-    def __init__(self, *, json: bool, stderr: bool) -> None:
+    Attributes:
+        problems: errors and notes as data for JSON.
+    """
+
+    def __init__(self, *, json: bool, stderr: bool = False) -> None:
+        self.problems: list[dict[str, Any]] = []
         self._stderr = stderr
         self._parts: list[Any] | None = [] if json else None
 
@@ -60,14 +70,30 @@ class Page:
         else:
             self._parts += parts
 
+    def warn(self, message: str, colour: str = "yellow") -> None:
+        """Print a block of text on stderr, unless JSON stands there."""
+        if self._parts is None or not self._stderr:
+            warn(message, colour)
+
+    def note(self, drive: Component, *sentences: str) -> None:
+        """Tell what looks like a slip in a drive, on stderr and among the problems."""
+        from modelica_like.show.report.problems import note_problem
+
+        self.problems += (note_problem(drive, sentence) for sentence in sentences)
+        if sentences:
+            self.warn(slips(*sentences))
+
     def close(self) -> None:
         """Print what is kept as JSON."""
-        if self._parts:
+        if self._parts or (self._parts is not None and self.problems):
             from json import dumps
 
             from modelica_like.show.report.tables import as_data
 
-            text = dumps(as_data(*self._parts), indent=1, ensure_ascii=False, allow_nan=False)
+            data = {"problems": self.problems, **as_data(*self._parts)}
+            text = dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
+            # What is half a character in UTF-16, as a name of a file can have it, is no text.
+            text = text.encode(errors="replace").decode()
             (sys.stderr if self._stderr else sys.stdout).write(f"{text}\n")
 
 
@@ -86,21 +112,33 @@ def told(
         files: of any kind, to be written.
     """
     tables = [table for table in tables if table is not None]
+    page = Page(json=json, stderr=Path("-") in tables)
     try:
-        _check(tables, filter(None, pictures), filter(None, files))
-        page = Page(json=json, stderr=Path("-") in tables)
         try:
+            _check(tables, filter(None, pictures), filter(None, files))
             yield page
+        except TOLD as error:
+            page.problems += _problems(error)
+            raise
         finally:
             page.close()
     except BrokenPipeError:
         raise  # main() ends the program
-    except (KeyboardInterrupt, ModelicaLikeError, OSError, *DEFECTS) as error:
+    except TOLD as error:
         if debug:
             raise
         message, code = _explained(error)
-        warn(message, "red")
+        page.warn(message, "red")
         raise SystemExit(code) from None
+
+
+def _problems(error: BaseException) -> Iterable[dict[str, Any]]:
+    """Return errors as data for JSON."""
+    if isinstance(error, ModelicaLikeError):
+        return (problem.as_json() for problem in error.problems())
+    name = getattr(error, "filename", None)
+    place = Source("" if name is None else str(name))
+    return [{**ModelicaLikeError(_explained(error)[0], where=place).as_json(), "kind": type(error).__name__}]
 
 
 def _explained(error: BaseException) -> tuple[str, int]:
@@ -162,10 +200,9 @@ def say(text: str) -> None:
     out().print(escape(text), soft_wrap=True)
 
 
-def note(*sentences: str) -> None:
-    """Tell what looks like a slip, on stderr."""
-    if sentences:
-        warn("\n".join(["Please look at this:", *(f"- {sentence}" for sentence in sentences)]))
+def slips(*sentences: str) -> str:
+    """Return the block of text about what looks like a slip."""
+    return "\n".join(["Please look at this:", *(f"- {sentence}" for sentence in sentences)])
 
 
 def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
@@ -178,12 +215,11 @@ def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
     return {before.strip(): after.strip() for before, _, after in pairs}
 
 
-def load_netlist(netlist: Path, assignments: list[str] | None) -> Any:
-    """Load a netlist and give it the values of `--set`."""
-    from modelica_like.netlist import load
-    from modelica_like.netlist.read import assign
+def load_netlist(netlist: Path, assignments: list[str] | None, *, thorough: bool = False) -> Any:
+    """Load a netlist and give it the values of `--set`; see `load` and `load_thoroughly`."""
+    from modelica_like.netlist.read import assign, load, load_thoroughly
 
-    assembly = load(netlist)
+    assembly = (load_thoroughly if thorough else load)(netlist)
     assign(assembly, values(assignments), "--set")
     return assembly
 

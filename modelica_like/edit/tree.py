@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from modelica_like.netlist.locate import STRING
+from modelica_like.netlist.outline import STRING
 
 Path = tuple[str | int, ...]
 """Names of tables and keys from the top; the place in an array of tables as a number, from zero."""

@@ -246,7 +246,11 @@ class _Flattener:
             flag = ca.SX.sym(f"{owner.path}.{name}")
             self.flags.append((flag, self.variable_of[id(owner), motion]))
             return self.parameters.add(flag)
-        return self.parameters.position(owner, name)
+        try:
+            return self.parameters.position(owner, name)
+        except MissingValue as error:  # told with the others
+            self.errors.append(error)
+            return 0
 
     def _node(self, variable: int, order: int) -> int:
         node = variable

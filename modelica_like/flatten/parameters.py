@@ -14,6 +14,7 @@ from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.dimensions import expect_unit
 from modelica_like.flatten.model import FlatParameter
 from modelica_like.flatten.template import column
+from modelica_like.language.assembly import Assembly
 from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
 from modelica_like.language.fields import Input, Parameter, Value
@@ -156,9 +157,12 @@ class Parameters:
         position = self.declare(component, name, label)
         if position is None:
             kind = type(component).__name__
+            part, unit = inside(component), component.fields[name].unit_text
+            operation = {"operation": "set", "path": f"{part.name}.{name}", "unit": unit}
             raise MissingValue(
-                f"{label} ({kind}) has no value.", where=component.place_of(), advice=f"Give it one: {name} = …"
-            )
+                f"{label} ({kind}) has no value.", where=component.place_of(), advice=f"Give it one: {name} = …",
+                operation=operation if isinstance(part.owner, Assembly) else None,
+            )  # fmt: skip
         return position
 
     def q(self, position: int) -> Any:

@@ -144,11 +144,13 @@ class Wiring:
             idle = f"{label} ({type(component).__name__})" if len(alike) < _SHAFTS_OF_TWO_SETS else "it"
             listed = isinstance(inside(component).owner, Assembly)
             say = f'list it: free = ["{end}"]' if listed else f"yield free(self.{end})"
+            operation = {"operation": "free", "end": end} if listed else None
             self.errors.append(
                 FreeFlange(
                     f"{label}.{name} is free, so {idle} carries no {flow}.",
                     where=component.place_of(),
                     advice=f"Connect it, or {say}." if inside(component).owner else "Connect it in a drive.",
+                    operation=operation,
                 )
             )
 
@@ -187,19 +189,20 @@ def _different_kinds(first: Connector, second: Connector, source: Source) -> Wro
     between = f"{converter} goes between." if converter else "Join connectors of one kind."
     first_one, second_one = kinds
     article = "an" if first_one.startswith(tuple("AEIOU")) else "a"
+    advice, word, instead = _fitting(first, second)
     return WrongConnection(
         f"connect({first.label}, {second.label}): {article} {first_one} cannot join a {second_one}. {between}",
-        where=source, advice=_fitting(first, second),
+        where=source, advice=advice, word=word, instead=instead,
     )  # fmt: skip
 
 
-def _fitting(first: Connector, second: Connector) -> str:
-    """Return the connection that is meant where a part has one other end of the kind."""
+def _fitting(first: Connector, second: Connector) -> tuple[str, str, str]:
+    """Return the connection that is meant where a part has one other end of the kind; the wrong end, the right one."""
     for end, other in ((first, second), (second, first)):
         owner = inside(other).owner
         connectors = owner.connectors.values() if isinstance(owner, Component) else ()
         ends = [connector for connector in connectors if type(connector) is type(end) and not connector.optional]
         if len(ends) == 1:
             meant = [end.label, ends[0].label] if end is first else [ends[0].label, end.label]
-            return f'To join them, write in [connect]: joint = ["{meant[0]}", "{meant[1]}"]'
-    return ""
+            return f'To join them, write in [connect]: joint = ["{meant[0]}", "{meant[1]}"]', other.label, ends[0].label
+    return "", "", ""

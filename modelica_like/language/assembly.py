@@ -202,6 +202,23 @@ def declare(of: Assembly, name: str, field: Field) -> None:
     record.own_fields = {**record.own_fields, name: field}
 
 
+def refused_wiring(of: Assembly) -> list[ModelicaLikeError]:
+    """Take the connections away that have errors; return these."""
+    record, errors = inside(of), list[ModelicaLikeError]()
+    for key, make in [*Assembly._wiring(of)]:  # pyright: ignore[reportPrivateUsage]
+        try:
+            make()
+        except ModelicaLikeError as error:
+            error.where = error.where or (Assembly._told(of, key),)  # pyright: ignore[reportPrivateUsage]
+            errors.append(error)
+            section, _, name = key.partition(".")
+            record.wires = {k: ends for k, ends in record.wires.items() if section != "connect" or k != name}
+            record.chains = {k: names for k, names in record.chains.items() if section != "series" or k != name}
+            record.free = tuple(end for end in record.free if section != "free" or end != name)
+            record.exposed = tuple(pair for pair in record.exposed if section != "expose" or pair[0] != name)
+    return errors
+
+
 def end_at(of: Assembly, path: str) -> Connector | Symbol:
     """Find the connector or signal at a path."""
     owner_path, _, name = path.rpartition(".")

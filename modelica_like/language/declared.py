@@ -7,7 +7,7 @@ from copy import copy
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, Self, cast
 
-from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
+from modelica_like.errors import LanguageError, Source, UnknownName, unknown_name
 from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Field, Variable
 from modelica_like.language.icon import Stroke
@@ -193,10 +193,12 @@ def unknown(
         renamed: what to write instead of names of earlier versions.
     """
     if renamed and renamed.get(name):
-        return UnknownName(f"{label} has no {kind} '{name}' any more.", advice=f"Write {renamed[name]}.")
+        now = renamed[name] if renamed[name].isidentifier() else ""  # others are formulas and sentences
+        what = f"{label} has no {kind} '{name}' any more."
+        return UnknownName(what, advice=f"Write {renamed[name]}.", word=name, instead=now)
     names = list(existing)
     listing = f" It has {', '.join(names)}." if names else " It has none."
-    return UnknownName(f"{label} has no {kind} '{name}'{did_you_mean(name, names) or '.'}{listing}")
+    return unknown_name(f"{label} has no {kind} '{name}'", name, names, listing)
 
 
 def refuse_collection(label: str, value: object, where: Callable[[], Source] | None = None) -> None:

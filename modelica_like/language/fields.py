@@ -138,7 +138,8 @@ class Field:
             if _CALCULATES.search(text):
                 return None
             advice = in_brackets(text) or error.advice
-            raise UnitError(f"{self.label} = '{text}': {error.what}", advice=advice) from None
+            what = f"{self.label} = '{text}': {error.what}"
+            raise UnitError(what, advice=advice, word=error.word, instead=error.instead) from None
 
     def _checked(self, number: float, given: Any) -> float:
         return in_range(number, given, self.label, str(coherent(self.unit)), self.bounds)

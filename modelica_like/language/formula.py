@@ -13,7 +13,7 @@ from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import NetlistError, UnitError, did_you_mean
+from modelica_like.errors import NetlistError, UnitError, nearest, question
 from modelica_like.language.units import (
     ANY,
     ONE,
@@ -349,7 +349,10 @@ def _convert(node: ast.expr, text: str, quantities: dict[str, str]) -> Formula:
 
 def _call(node: ast.Call, name: str, text: str, quantities: dict[str, str]) -> Formula:
     if name not in _FUNCTIONS:
-        raise _not_a_formula(text, f"there is no function '{name}'{did_you_mean(name, _FUNCTIONS).rstrip('?')}")
+        near = nearest(name, _FUNCTIONS)
+        error = _not_a_formula(text, f"there is no function '{name}'{question(near).rstrip('?')}")
+        error.word, error.instead = name, near
+        raise error
     wanted = 2 if name in ("min", "max") else 1
     if len(node.args) != wanted:
         raise _not_a_formula(text, f"{name} takes {wanted} argument{'s' if wanted > 1 else ''}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self, cast, overload
 
 import casadi as ca
 
-from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
+from modelica_like.errors import LanguageError, Source, unknown_name
 from modelica_like.language.discrete import eventful, marker
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
 from modelica_like.language.holding import Hold
@@ -95,9 +95,8 @@ class Mode:
             UnknownName: there is no such mode.
         """
         if name not in self.names:
-            raise UnknownName(
-                f"{self.label} has no mode '{name}'{did_you_mean(name, self.names) or '.'} "
-                f"It has {', '.join(self.names)}."
+            raise unknown_name(
+                f"{self.label} has no mode '{name}'", name, self.names, f" It has {', '.join(self.names)}."
             )
         return self.names.index(name)
 

@@ -15,9 +15,9 @@ from modelica_like.errors import (
     NetlistError,
     Source,
     UnitError,
-    UnknownName,
     did_you_mean,
     raise_together_or_one,
+    unknown_name,
 )
 from modelica_like.language.units import parse_unit, to_si
 from modelica_like.netlist.locate import Lines, locate
@@ -51,6 +51,7 @@ class Document:
         sizing: path of a sizing file, whose checks stand in reports.
         optimize: what is optimised, as written.
         tolerances: how parameters scatter, by path.
+        errors: of entries that have another form, and are left out.
     """
 
     lines: Lines
@@ -70,6 +71,7 @@ class Document:
     sizing: str = ""
     optimize: dict[str, Any] = field(default_factory=dict)
     tolerances: dict[str, Any] = field(default_factory=dict)
+    errors: list[ModelicaLikeError] = field(default_factory=list)
 
 
 def read_text(path: Path, *, as_written: bool = False) -> str:
@@ -131,6 +133,18 @@ def parse(text: str, file: str) -> Document:
         DuplicateName: a name is used twice.
         WiringErrors: several errors.
     """
+    document = survey(text, file)
+    if document.errors:
+        raise raise_together_or_one(document.errors)
+    return document
+
+
+def survey(text: str, file: str) -> Document:
+    """Read what has the form of a netlist in a text, and collect the errors of the rest; see `parse`.
+
+    Raises:
+        NetlistError, DuplicateName: the text is not TOML.
+    """
     written, text = text, plain(text)
     lines = locate(text, file)
     if not text.strip():
@@ -140,16 +154,15 @@ def parse(text: str, file: str) -> Document:
     data = parse_toml(text, lines)
     errors: list[ModelicaLikeError] = []
     sections = read_sections(data, "A netlist", READERS, lines, errors)
-    document = Document(lines, text=written, **{"name": Path(lines.file).stem, **sections})
+    document = Document(lines, text=written, **{"name": Path(lines.file).stem, **sections}, errors=errors)
     for name in document.parts.keys() & document.parameters.keys():
         places = (lines.source("parameters", name), lines.source("parts", name))
         errors.append(DuplicateName(f"'{name}' is both a parameter and a part.", where=places))
+        del document.parts[name]
     if not document.parts and not errors:
         errors.append(
             NetlistError(f"{document.name} has no parts.", where=Source(lines.file), advice="Declare them in [parts].")
         )
-    if errors:
-        raise raise_together_or_one(errors)
     return document
 
 
@@ -208,7 +221,7 @@ def read_sections(
         try:
             if key not in readers:
                 sections = ", ".join(readers)
-                raise UnknownName(f"{what} has no entry '{key}'{did_you_mean(key, readers) or '.'} It has {sections}.")
+                raise unknown_name(f"{what} has no entry '{key}'", key, readers, f" It has {sections}.")
             read[key] = readers[key](key, value, lines, errors)
         except ModelicaLikeError as error:
             errors.append(_placed(error, lines.source(key)))
@@ -311,8 +324,7 @@ def options(checks: Mapping[str, Check]) -> Reader:
     def check(key: str, value: Any) -> Any:
         section, _, name = key.partition(".")
         if name not in checks:
-            hint = did_you_mean(name, checks) or "."
-            raise UnknownName(f"[{section}] has no '{name}'{hint} It has {', '.join(checks)}.")
+            raise unknown_name(f"[{section}] has no '{name}'", name, checks, f" It has {', '.join(checks)}.")
         return checks[name](key, value)
 
     return each(check)
@@ -362,7 +374,8 @@ def _unit_text(key: str, value: Any) -> str:
     try:
         return str(parse_unit(as_text(key, value)))
     except UnitError as error:
-        raise UnitError(f"{key}: {error.what}", advice=error.advice) from None
+        what = f"{key}: {error.what}"
+        raise UnitError(what, advice=error.advice, word=error.word, instead=error.instead) from None
 
 
 _OPTIONS: Mapping[str, Check] = {

@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from modelica_like.errors import NetlistError, Source
+from modelica_like.netlist.outline import COMMON, Outline, Path, outline
 
 _MAX_DEPTH = 20
 _MAX_TEXT = 120
-Path = tuple[str, ...]
 
-# No possessive quantifier (`*+`) of a group: it is broken in Python before 3.11.5.
-STRING = r"""(?P<string>\"{3}(?:[^"\\]++|\\.|"(?!""))*(?:\"{3,5}|\Z) | '{3}(?:[^']++|'(?!''))*(?:'{3,5}|\Z)
-        |"(?:[^"\\\n]++|\\.)*"? | '[^'\n]*+'?)"""
-"""A text in quotes, also one that does not end."""
-_COMMON = rf"""(?P<comment>\#[^\n]*+) | {STRING} | (?P<open>[\[{{]) | (?P<close>[\]}}]) | (?P<newline>\n)"""
 _KEY = re.compile(
-    rf"""{_COMMON} | (?P<equals>=) | (?P<dot>\.) | (?P<space>[ \t\r]++) | (?P<word>[^"'\#\[\]{{}}\n=.\s]++)
+    rf"""{COMMON} | (?P<equals>=) | (?P<dot>\.) | (?P<space>[ \t\r]++) | (?P<word>[^"'\#\[\]{{}}\n=.\s]++)
         | (?P<other>.)""",
     re.VERBOSE | re.DOTALL,
 )
-_VALUE = re.compile(rf"""{_COMMON} | (?P<other>[^"'\#\[\]{{}}\n]++)""", re.VERBOSE | re.DOTALL)
+_VALUE = re.compile(rf"""{COMMON} | (?P<other>[^"'\#\[\]{{}}\n]++)""", re.VERBOSE | re.DOTALL)
 
 
 @dataclass
@@ -34,25 +30,43 @@ class Lines:
         text: its lines.
         numbers: line, counted from one, of every path of keys.
         repeated: paths that occur twice, with both lines.
+        ends: last line of the statements that have several, by the first.
     """
 
     file: str
     text: list[str] = field(default_factory=list)
     numbers: dict[Path, int] = field(default_factory=dict)
     repeated: list[tuple[Path, int, int]] = field(default_factory=list)
+    ends: dict[int, int] = field(default_factory=dict)
 
     def source(self, *path: str) -> Source:
         """Return the place of a key (a last one with dots may also be several), or of the nearest table around it."""
+        wanted = ".".join(path)
         if path and path not in self.numbers:
             path = (*path[:-1], *path[-1].split("."))
         while path and path not in self.numbers:
             path = path[:-1]
-        return self.line(self.numbers[path]) if path else Source(self.file)
+        return self.line(self.numbers[path], wanted) if path else Source(self.file, path=wanted)
 
-    def line(self, number: int) -> Source:
-        """Return a line as a place, with its text."""
-        exists = 0 < number <= len(self.text)
-        return Source(self.file, number, _shortened(self.text[number - 1].strip()) if exists else "")
+    def within(self, *path: str) -> Source:
+        """Return the place of a key that may be in a table in braces; see `source`."""
+        source, entry = self.source(*path), self.outline.entry(path)
+        line, column, length = self.outline.span(entry) if entry else (0, 0, 0)
+        return replace(source, column=column, length=length) if line == source.line else source
+
+    @cached_property
+    def outline(self) -> Outline:
+        """All keys of the text, with their places."""
+        return outline("\n".join(self.text))
+
+    def line(self, number: int, path: str = "") -> Source:
+        """Return a line as a place, with its text, and the path of a key in it."""
+        if not 0 < number <= len(self.text):
+            return Source(self.file, number, path=path)
+        line = self.text[number - 1]
+        text, column = line.strip(), len(line) - len(line.lstrip()) + 1
+        statement = "\n".join(self.text[number - 1 : self.ends.get(number, number)])
+        return Source(self.file, number, _shortened(text), column, len(text), path, statement)
 
     def add(self, path: Path, number: int, *, table: bool = False) -> None:
         """Store a key.
@@ -85,7 +99,9 @@ def locate(text: str, file: str) -> Lines:
     lines = Lines(file, text.split("\n"))
     table: Path = ()
     closed: set[Path] = set()  # tables that cannot be opened again: headers, and keys with a value
-    for number, tokens in _statements(text, lines):
+    for number, end, tokens in _statements(text, lines):
+        if end > number:
+            lines.ends[number] = end
         kinds = [kind for kind, _ in tokens]
         if kinds[:1] == ["open"]:
             table = _keys(tokens)
@@ -103,8 +119,8 @@ def _keys(tokens: list[tuple[str, str]]) -> Path:
     return tuple(text.strip("\"'") for kind, text in tokens if kind in ("word", "string"))
 
 
-def _statements(text: str, lines: Lines) -> Iterator[tuple[int, list[tuple[str, str]]]]:
-    """Yield the first line of each statement with the tokens of its header, or of its key and the `=` after it."""
+def _statements(text: str, lines: Lines) -> Iterator[tuple[int, int, list[tuple[str, str]]]]:
+    """Yield first and last line of each statement, and the tokens of its header, or of its key and the `=` after it."""
     number, first, depth, position = 1, 1, 0, 0
     tokens: list[tuple[str, str]] = []
     in_value = False
@@ -114,7 +130,7 @@ def _statements(text: str, lines: Lines) -> Iterator[tuple[int, list[tuple[str, 
         depth = max(depth + (kind == "open") - (kind == "close"), 0)
         if kind == "newline" and depth == 0:
             if tokens:
-                yield first, tokens
+                yield first, number, tokens
             tokens, in_value = [], False
         elif not in_value and kind not in ("space", "comment", "newline"):
             first = first if tokens else number
@@ -126,4 +142,4 @@ def _statements(text: str, lines: Lines) -> Iterator[tuple[int, list[tuple[str, 
             )
         number += token.count("\n")
     if tokens:
-        yield first, tokens
+        yield first, number, tokens

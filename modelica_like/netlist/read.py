@@ -23,7 +23,8 @@ from modelica_like.language import Assembly, Component, Variable, guess
 from modelica_like.language.fields import Discrete
 from modelica_like.language.inside import declarations, inside
 from modelica_like.language.scopes import give_by_path
-from modelica_like.netlist.document import Document, check_part, parse, read_text
+from modelica_like.netlist.document import Document, check_part, read_text, survey
+from modelica_like.netlist.further import further, head
 from modelica_like.netlist.registry import find_type
 from modelica_like.trust import trusting
 
@@ -71,7 +72,24 @@ def loads(text: str, file: str = "netlist.toml", *, trust: bool = False) -> Asse
         trust: run Python modules in that folder.
     """
     with trusting() if trust else nullcontext():
-        return _Loader().build(parse(text, file), (Path(file).resolve(),))
+        return _Loader().build(survey(text, file), (Path(file).resolve(),))
+
+
+@without_garbage_search()
+def load_thoroughly(path: Path, text: str | None = None) -> Assembly:
+    """Read a netlist; its errors are told with those that are only seen in a whole drive.
+
+    Args:
+        path: see `load`.
+        text: what the file will be, if it is being written.
+
+    Raises:
+        ModelicaLikeError: see `load`.
+    """
+    if is_modelica(path):
+        return _modelica(path)
+    loader = _Loader(thorough=True)
+    return loader.load(path, ()) if text is None else loader.build(survey(text, str(path)), (path.resolve(),))
 
 
 def assemble(document: Document, file: Path, texts: Mapping[Path, str] | None = None) -> Assembly:
@@ -90,10 +108,16 @@ class _Reported(Exception):
 
 
 class _Loader:
-    """Builds assemblies; every file is read once."""
+    """Builds assemblies; every file is read once.
 
-    def __init__(self, texts: Mapping[Path, str] | None = None) -> None:
+    Args:
+        texts: of netlists that are not written yet, by absolute path.
+        thorough: also tell what is wrong with the connections and values of a netlist with errors.
+    """
+
+    def __init__(self, texts: Mapping[Path, str] | None = None, *, thorough: bool = False) -> None:
         self.texts = texts or {}
+        self.thorough = thorough
         self.assemblies: dict[Path, Assembly] = {}
         self.failed: set[Path] = set()
         self.parts = 0
@@ -110,7 +134,7 @@ class _Loader:
         if key not in self.assemblies:
             self.failed.add(key)
             text = self.texts[key] if key in self.texts else read_text(path, as_written=True)
-            self.assemblies[key] = self.build(parse(text, str(path)), (*chain, key))
+            self.assemblies[key] = self.build(survey(text, str(path)), (*chain, key))
             self.failed.remove(key)
         return self.assemblies[key]
 
@@ -134,6 +158,8 @@ class _Loader:
             Assembly.place(assembly, f"optimize.{key}", document.lines.source("optimize", key))
         task = _Task(document, assembly, chain, self)
         task.run()
+        if task.errors and self.thorough and len(chain) == 1:
+            task.errors += further(assembly, task.broken(), task.refused)
         if task.errors:
             raise raise_together_or_one(task.errors)
         if task.incomplete:
@@ -158,22 +184,34 @@ class _Task:
         self.assembly = assembly
         self.chain = chain
         self.loader = loader
-        self.errors: list[ModelicaLikeError] = []
+        self.errors = [*document.errors]
+        self.refused: set[str] = set()
+        """Paths of values that were not understood."""
         self.incomplete = False
 
     def run(self) -> None:
         """Go through the sections, in an order in which each finds its references."""
         self._each("parameters", self.document.parameters, partial(Assembly.add_parameter, self.assembly))
         self._each("parts", self.document.parts, self._add_part)
-        if not (self.errors or self.incomplete):
-            self._each("start", self.document.start, self._start)
-            self._each("guess", self.document.guess, lambda path, value: self._start(path, guess(value)))
-            self._each("expose", self.document.expose, partial(Assembly.expose, self.assembly))
+        broken = self.broken()
+
+        def whole(section: str) -> dict[str, Any]:
+            entries = getattr(self.document, section).items()
+            return {key: value for key, value in entries if head(value if section == "expose" else key) not in broken}
+
+        self._each("start", whole("start"), self._start)
+        self._each("guess", whole("guess"), lambda path, value: self._start(path, guess(value)))
+        self._each("expose", whole("expose"), partial(Assembly.expose, self.assembly))
         for section in ("parameters", "start", "guess", "connect", "series", "expose"):
             for name in getattr(self.document, section):
                 Assembly.place(self.assembly, f"{section}.{name}", self.document.lines.source(section, name))
         for end in self.document.free:
             Assembly.place(self.assembly, f"free.{end}", self.document.lines.source("free"))
+
+    def broken(self) -> set[str]:
+        """Return the names of the parts that could not be made."""
+        declared = {path[1] for path in self.document.lines.numbers if path[0] == "parts" and len(path) > 1}
+        return declared - inside(self.assembly).parts.keys()
 
     def _each(self, section: str, entries: Mapping[str, Any], action: Callable[[str, Any], None]) -> None:
         for name, entry in entries.items():
@@ -185,6 +223,7 @@ class _Task:
                 error.where = (self.document.lines.source(section, name), *error.where)
                 raise
             except ModelicaLikeError as error:
+                self.refused.add(name)
                 self._collect(error, self.document.lines.source(section, name))
 
     def _collect(self, error: ModelicaLikeError, source: Source) -> None:
@@ -223,11 +262,22 @@ class _Task:
         elif kind.endswith(".toml"):
             part = self._copied(self.loader.load(folder / kind, self.chain), number)
         else:
-            part = new_component(find_type(kind, folder), values)
+            part = new_component(self._type(kind, folder, name), values)
             self.loader.count(number * sum(1 for _ in part.walk()))
         for key, value in values.items():
-            self._give(part, key, value, f"{name}.{key}", levels)
+            try:
+                self._give(part, key, value, f"{name}.{key}", levels)
+            except ModelicaLikeError as error:
+                self.refused |= {f"{name}.{key}", f"{name}.{error.instead}"}
+                self._collect(error, self.document.lines.within("parts", *name.split("."), key))
         return part
+
+    def _type(self, name: str, folder: Path, part: str) -> type[Component]:
+        try:
+            return find_type(name, folder)
+        except ModelicaLikeError as error:
+            error.where = (self.document.lines.within("parts", *part.split("."), "is"),)
+            raise
 
     def _copied(self, part: Component, number: int) -> Component:
         """Copy a part, if netlists in netlists do not multiply it without bounds."""

@@ -14,7 +14,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 
-from modelica_like.errors import NetlistError, UnknownName, UntrustedModule, did_you_mean
+from modelica_like.errors import NetlistError, UntrustedModule, unknown_name
 from modelica_like.language import Component
 from modelica_like.language.inside import declarations
 from modelica_like.trust import may_run
@@ -160,11 +160,10 @@ def find_type(name: str, folder: Path | None = None) -> type[Component]:
     kind = _library_type(name)
     if kind is None:
         types = library_types()
-        hint = did_you_mean(name, types) or "."
         advice = "`modelica-like library` lists all types." if types else "No component library is installed."
         module, _, last = name.rpartition(".")
         advice += f" A class of a module is written '{module}:{last}'." if module else ""
-        raise UnknownName(f"There is no component type '{name}'{hint}", advice=advice)
+        raise unknown_name(f"There is no component type '{name}'", name, types, advice=advice)
     return kind
 
 
@@ -176,9 +175,7 @@ def _class_of_module(name: str, folder: Path) -> type[Component]:
     kind = vars(module).get(class_name)
     if kind is None:
         names = [key for key, value in vars(module).items() if isinstance(value, type) and issubclass(value, Component)]
-        raise UnknownName(
-            f"Module {module_name} has no component '{class_name}'{did_you_mean(class_name, names) or '.'}"
-        )
+        raise unknown_name(f"Module {module_name} has no component '{class_name}'", class_name, names)
     if not (isinstance(kind, type) and issubclass(kind, Component)):
         raise NetlistError(f"'{name}' is not a component class.")
     return kind

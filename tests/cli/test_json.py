@@ -47,7 +47,8 @@ def test_all_commands_with_the_option_are_here():
 def test_a_command_says_it_as_json(command):
     words, names = TABLES[command]
     found = said(command, *words)
-    assert set(found) == {"tables", "text"}
+    assert set(found) == {"problems", "tables", "text"}
+    assert {problem["kind"] for problem in found["problems"]} <= {"note"}
     assert names <= set(found["tables"])
     assert all(rows and isinstance(rows, list) for rows in found["tables"].values())
 
@@ -82,5 +83,7 @@ def test_a_check_that_fails_says_it_too(tmp_path):
     wrong = tmp_path / "drive.toml"
     wrong.write_text('[parts]\na = { is = "Inertja" }\n', encoding="utf-8")
     result = called(["simulate", str(wrong), "--json"])
-    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.exit_code == 2
+    (problem,) = json.loads(result.stdout)["problems"]
+    assert problem["what"] == "There is no component type 'Inertja'; did you mean 'Inertia'?"
     assert "Inertia" in result.stderr

@@ -11,7 +11,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType, ModuleType
 from typing import Any, get_args
 
-from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.errors import NetlistError, unknown_name
 from modelica_like.language.results import Result, hints, quantity, quantity_of
 from modelica_like.language.units import Unit, parse_unit
 from modelica_like.netlist.registry import GROUP, imported, library_module
@@ -52,8 +52,8 @@ def find_check(name: str) -> Check:
     """Return the design check of an `is` in a sizing file."""
     checks = design_checks()
     if name not in checks:
-        hint = did_you_mean(name, checks) or "."
-        raise UnknownName(f"There is no design check '{name}'{hint}", advice="`modelica-like size` lists all checks.")
+        advice = "`modelica-like size` lists all checks."
+        raise unknown_name(f"There is no design check '{name}'", name, checks, advice=advice)
     return checks[name]
 
 

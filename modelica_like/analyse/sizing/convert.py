@@ -17,8 +17,7 @@ from modelica_like.errors import (
     NetlistError,
     Source,
     UnitError,
-    UnknownName,
-    did_you_mean,
+    unknown_name,
 )
 from modelica_like.language.units import Unit, coherent, read_quantity, same_dimension, to_si
 
@@ -48,8 +47,9 @@ class Converter:
         expected = arguments_of(target)
         for name in table:
             if name not in expected:
-                hint = did_you_mean(name, expected) or "."
-                raise UnknownName(f"{where} has no argument '{name}'{hint} It has {', '.join(expected)}.")
+                raise unknown_name(
+                    f"{where} has no argument '{name}'", name, expected, f" It has {', '.join(expected)}."
+                )
         missing = [argument.name for argument in expected.values() if argument.required and argument.name not in table]
         if missing:
             raise MissingValue(f"{where} needs {' and '.join(missing)}.")

@@ -17,7 +17,15 @@ from modelica_like.analyse.sizing.convert import Converter
 from modelica_like.analyse.sizing.document import SizingDocument, placed, read_document
 from modelica_like.analyse.sizing.formulas import Value, read_value
 from modelica_like.analyse.sizing.simulated import Simulations
-from modelica_like.errors import CyclicAssembly, ModelicaLikeError, NetlistError, Source, UnknownName, did_you_mean
+from modelica_like.errors import (
+    CyclicAssembly,
+    ModelicaLikeError,
+    NetlistError,
+    Source,
+    UnknownName,
+    did_you_mean,
+    unknown_name,
+)
 from modelica_like.language.units import ONE, to_si
 from modelica_like.upper import Shown
 
@@ -106,8 +114,7 @@ def size(path: str | Path, runs: Mapping[Path, Solution] | None = None) -> Sizin
         place = document.lines.source("compare", heading)
         for check in names:
             if check not in run.done:
-                hint = did_you_mean(check, run.done) or "."
-                raise UnknownName(f"compare.{heading}: there is no check '{check}'{hint}", where=place)
+                raise unknown_name(f"compare.{heading}: there is no check '{check}'", check, run.done, where=place)
         if len({type(run.done[check].result) for check in names}) != 1:
             raise NetlistError(f"compare.{heading} must name checks of one kind.", where=place)
     return Sizing(document.name, document.description, checks, document.compare)
@@ -131,7 +138,7 @@ class _Run:
         if dot and name in self.document.checks:
             return _line(self.checked(name).result, rest, path)
         names = [*self.document.parameters, *self.document.checks]
-        raise UnknownName(f"There is no parameter or check '{name}'{did_you_mean(name, names) or '.'}")
+        raise unknown_name(f"There is no parameter or check '{name}'", name, names)
 
     def result(self, name: str) -> Any:
         """Return the result of a check, None if there is no such check."""
@@ -226,7 +233,7 @@ class _Run:
         """Return a value in SI units to compare with a line of a result."""
         names = [line.name for line in result.lines()]
         if name not in names:
-            raise UnknownName(f"{where}: the result has no line '{name}'{did_you_mean(name, names) or '.'}")
+            raise unknown_name(f"{where}: the result has no line '{name}'", name, names)
         if isinstance(value, list) or isinstance(getattr(result, name), str | bool | tuple):
             raise NetlistError(f"{where}.{name} needs a line with a number, and a number to compare it with.")
         return self.converter.quantity(unit_of_line(result, name), value, f"{where}.{name}")
@@ -239,7 +246,7 @@ def _line(result: Any, rest: str, path: str) -> Value:
         match = _STEP.fullmatch(step)
         if match is None or not hasattr(value, match.group(1)):
             parameters = inspect.signature(type(value)).parameters
-            raise UnknownName(f"'{path}': the result has no line '{step}'{did_you_mean(step, parameters) or '.'}")
+            raise unknown_name(f"'{path}': the result has no line '{step}'", step, parameters)
         owner, last = value, match.group(1)
         value = getattr(value, last)
         if match.group(2):

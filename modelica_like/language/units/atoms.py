@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
-from modelica_like.errors import UnitError, did_you_mean
+from modelica_like.errors import UnitError, nearest, question
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 """Names of the base units, in the order of all exponent tuples; they are FMI's."""
@@ -96,7 +96,7 @@ def find_atom(name: str) -> Atom:
     if name in ATOMS:
         return ATOMS[name]
     if _meant(name):
-        raise UnitError(f"Unknown unit '{name}'{_suggestion(name)}")
+        raise _unknown(name)
     return _ask_pint(name)
 
 
@@ -117,7 +117,7 @@ def _ask_pint(name: str) -> Atom:
         unit = registry.Unit(PINT_NAMES.get(name, name))
         zero, unity = (registry.Quantity(value, unit).to_root_units() for value in (0.0, 1.0))
     except (pint.PintError, AttributeError, ValueError, TypeError, ArithmeticError):
-        raise UnitError(f"Unknown unit '{name}'{_suggestion(name)}") from None
+        raise _unknown(name) from None
     factor, offset = float(unity.magnitude - zero.magnitude), float(zero.magnitude)
     if registry.Quantity(2.0, unit).to_root_units().magnitude != 2 * factor + offset:
         raise UnitError(f"Unit '{name}' is logarithmic; give a plain number.")
@@ -160,11 +160,12 @@ def _meant(name: str) -> str:
     return f"{prefix}{meant}" if meant else ""
 
 
-def _suggestion(name: str) -> str:
+def _unknown(name: str) -> UnitError:
     parts = _meant(name) or _split(name)
     if name[:-1] in ATOMS and name.endswith("s"):
         parts = name[:-1]
-    return f"; did you mean '{parts}'?" if parts else did_you_mean(name, ATOMS) or "."
+    near = parts or nearest(name, ATOMS)
+    return UnitError(f"Unknown unit '{name}'{question(near) or '.'}", word=name, instead=near)
 
 
 def _split(name: str) -> str:

@@ -83,7 +83,8 @@ def _quantity(value: object, unit: Unit, name: str) -> tuple[float, Unit]:
         try:
             read = read_quantity(value)
         except UnitError as error:
-            raise UnitError(f"{name} = '{value}': {error.what}", advice=error.advice) from None
+            what = f"{name} = '{value}': {error.what}"
+            raise UnitError(what, advice=error.advice, word=error.word, instead=error.instead) from None
         if read is None:
             raise UnitError(f"{name} expects {unit}; '{value}' is not a quantity.")
         match = _NUMBER.fullmatch(plain_digits(value.strip()))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 
-from modelica_like.errors import UnitError
+from modelica_like.errors import UnitError, question
 from modelica_like.language.units.atoms import ATOMS, BASE, Exponent, find_atom, simplify
 
 _MAX_LENGTH = 200
@@ -173,10 +173,11 @@ def _check_name(name: str, text: str) -> None:
     except UnitError as error:
         if name == text:
             raise
+        near = text.replace(name, error.instead, 1) if error.instead else ""
+        near = "rpm" if near == "rev/min" else near
         what = error.what.replace(f"'{name}'", f"'{name}' in '{text}'", 1)
-        meant = re.sub(r"mean '(.*)'", lambda match: f"mean '{text.replace(name, match[1], 1)}'", what)
-        meant = meant.replace("'rev/min'", "'rpm'")
-        raise UnitError(meant) from None
+        what = what.replace(question(error.instead), question(near)) if near else what
+        raise UnitError(what, word=text, instead=near) from None
 
 
 class _Parser:

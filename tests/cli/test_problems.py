@@ -1,0 +1,258 @@
+"""Errors and notes as data, with their places and with suggestions that can be applied."""
+
+import json
+import pickle
+import unicodedata
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from calls import called
+
+from modelica_like import errors
+from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WiringErrors
+from modelica_like.netlist import loads
+
+KEYS = {"kind", "file", "line", "column", "length", "path", "what", "why", "advice", "places", "suggestion"}
+PLACE = {"file", "line", "column", "length", "path"}
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def problems(file: Path, command: str = "check") -> list[dict[str, Any]]:
+    result = called([command, str(file), "--json"])
+    return json.loads(result.stdout)["problems"]
+
+
+def marked(text: str, problem: dict[str, Any]) -> str:
+    line = text.split("\n")[problem["line"] - 1]
+    return line[problem["column"] - 1 :][: problem["length"]]
+
+
+def applied(text: str, suggestions: Sequence[dict[str, Any]]) -> str:
+    lines = text.split("\n")
+    for change in sorted(suggestions, key=lambda change: -change["column"]):
+        line, begin, end = lines[change["line"] - 1], change["column"] - 1, change["column"] - 1 + change["length"]
+        assert line[begin:end] == change["old"]
+        lines[change["line"] - 1] = line[:begin] + change["new"] + line[end:]
+    return "\n".join(lines)
+
+
+SLIPS = """
+[parts]
+motor = { is = "Torq", tau = "5 Nm" }
+n = { is = "Inertia", J = "0.02 kg.m2", n = 3 }
+  [parts.shaft]
+  is = "SpringDampr" # not SpringDamper
+  c = "400 N.m/rad"
+  d = "0.2 N.m.s/rad"
+J2 = "x"
+[series]
+drive = [
+  "motor", "n",
+  "shaft",  "J3" ]
+[start]
+"n.phii" = "0 rad"
+[simulte]
+until = "1 s"
+"""
+
+
+def test_places_and_suggestions(tmp_path: Path):
+    file = tmp_path / "slips.toml"
+    file.write_text(SLIPS, encoding="utf-8")
+    result = called(["check", str(file), "--json"])
+    listed = json.loads(result.stdout)["problems"]
+    assert result.exit_code == 2
+    assert all(set(problem) == KEYS and problem["file"] == str(file) for problem in listed)
+    assert [(marked(SLIPS, problem), problem["path"]) for problem in listed] == [
+        ("simulte", "simulte"), ("Torq", "parts.motor.is"), ("n", "parts.n.n"), ("SpringDampr", "parts.shaft.is"),
+        ("phii", "start.n.phii"), ("J3", "series.drive"),
+    ]  # fmt: skip
+    assert (listed[2]["line"], listed[2]["column"]) == (4, SLIPS.split("\n")[3].index("n = 3") + 1)
+    swaps = [problem["suggestion"] for problem in listed if problem["suggestion"]]
+    assert {(swap["old"], swap["new"]) for swap in swaps} == {
+        ("simulte", "simulate"), ("Torq", "Torque"), ("SpringDampr", "SpringDamper"), ("phii", "phi"),
+    }  # fmt: skip
+    again = applied(SLIPS, swaps)
+    assert '"5 Nm"' in again
+    file.write_text(again, encoding="utf-8")
+    left = [(problem["kind"], marked(again, problem)) for problem in problems(file)]
+    assert left == [("UnitError", "Nm"), ("UnknownName", "n"), ("UnknownName", "J2"), ("UnknownName", "J3")]
+
+
+UNITS = {
+    'a = { is = "Inertia", J = "2 kgm2" }': ("kgm2", "kg.m2"),
+    't = { is = "Torque", tau = "5 Nm" }': ("Nm", "N.m"),
+    'b = { is = "Brake", capacity = 1, mode = "stick" }': ("stick", "stuck"),
+    'a = { is = "Inertia", J = "sqr(4)" }': ("sqr", "sqrt"),
+}
+
+
+@pytest.mark.parametrize("line", UNITS)
+def test_a_word_in_a_value_is_replaced(line: str, tmp_path: Path):
+    file = tmp_path / "drive.toml"
+    file.write_text(f"[parts]\n{line}\n", encoding="utf-8")
+    first = problems(file)[0]
+    swap = first["suggestion"]
+    assert (swap["operation"], swap["old"], swap["new"], swap["line"]) == ("replace", *UNITS[line], 2)
+    assert line[swap["column"] - 1 :].startswith(swap["old"])
+
+
+def test_a_word_that_is_there_twice_is_not_replaced(tmp_path: Path):
+    file = tmp_path / "drive.toml"
+    file.write_text('[parts]\na = { is = "Inertia", J = 1 }\n[series]\nx = ["b", "a", "b"]\n', encoding="utf-8")
+    (problem,) = problems(file)
+    assert (problem["suggestion"], problem["line"], problem["column"]) == (None, 4, 1)
+
+
+def test_a_free_flange_and_a_missing_value(tmp_path: Path):
+    file = tmp_path / "drive.toml"
+    file.write_text('[parts]\na = { is = "Inertia" }\nb = { is = "IdealGear", ratio = 2 }\n'
+                    '[connect]\nx = ["a.flange_b", "b.flange_a"]\n', encoding="utf-8")  # fmt: skip
+    suggestions = [problem["suggestion"] for problem in problems(file)]
+    assert suggestions == [
+        {"operation": "set", "path": "a.J", "unit": "kg.m2", "file": str(file)},
+        {"operation": "free", "end": "b.flange_b", "file": str(file)},
+    ]
+
+
+def test_an_end_of_another_kind_is_replaced(tmp_path: Path):
+    file = tmp_path / "drive.toml"
+    text = (
+        '[parts]\na = { is = "Inertia", J = 1 }\ns = { is = "BallScrew", lead = "10 mm" }\n'
+        '[connect]\nx = ["a.flange_b", "s.flange_b"]\n'
+    )
+    file.write_text(text, encoding="utf-8")
+    for problem in problems(file):
+        if problem["kind"] == "WrongConnection":
+            swap = problem["suggestion"]
+            assert (swap["old"], swap["new"]) == ("s.flange_b", "s.flange_a")
+
+
+def test_notes_are_problems_of_a_kind(tmp_path: Path):
+    file = tmp_path / "drive.toml"
+    file.write_text("""[parts]
+a = { is = "Inertia", J = 1, phi = 0, w = 0 }
+s = { is = "SpringDamper", c = 1, d = 1 }
+b = { is = "Inertia", J = "1 g.cm2", phi = 0, w = 0 }
+[series]
+x = ["a", "s", "b"]
+""", encoding="utf-8")  # fmt: skip
+    result = called(["check", str(file), "--json"])
+    (note,) = json.loads(result.stdout)["problems"]
+    assert (result.exit_code, note["kind"], note["line"], note["path"]) == (0, "note", 2, "parts.a")
+    assert note["what"].startswith("a.J is 1e+07 times b.J")
+    assert note["what"] in result.stderr
+
+
+@pytest.mark.parametrize("command", ["simulate", "modes", "steady", "size", "describe"])
+def test_other_commands_that_fail(command: str, tmp_path: Path):
+    file = tmp_path / "drive.toml"
+    file.write_text('[parts]\na = { is = "Inertja" }\n', encoding="utf-8")
+    result, plain = called([command, str(file), "--json"]), called([command, str(file)])
+    assert (result.exit_code, result.stderr) == (plain.exit_code, plain.stderr)
+    assert plain.stdout == ""
+    listed = json.loads(result.stdout)["problems"]
+    assert listed
+    assert all(set(problem) == KEYS and problem["what"] in plain.stderr for problem in listed)
+
+
+def test_what_is_no_error_of_the_family(tmp_path: Path):
+    (tmp_path / "folder.csv").mkdir()
+    result = called(["simulate", str(EXAMPLES / "two_mass.toml"), "--csv", str(tmp_path / "folder.csv"), "--json"])
+    (problem,) = json.loads(result.stdout)["problems"]
+    assert (problem["kind"], problem["file"], result.exit_code) == (
+        "IsADirectoryError",
+        str(tmp_path / "folder.csv"),
+        2,
+    )
+    (problem,) = json.loads(called(["check", "x.toml", "--jsn", "--json"]).stdout)["problems"]
+    assert (problem["kind"], problem["what"]) == ("Usage", "No such option '--jsn'; did you mean '--json'?")
+
+
+def test_a_table_on_the_screen_leaves_stderr_to_json(tmp_path: Path):
+    result = called(["simulate", str(tmp_path / "none.toml"), "--csv", "-", "--json"])
+    assert result.stdout == ""
+    assert len(json.loads(result.stderr)["problems"]) == 1
+
+
+def test_every_error_is_data_also_of_another_process():
+    kinds = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, ModelicaLikeError)]
+    assert len(kinds) > 40
+    place = Source("f.toml", 3, "x = 1", 1, 5, "parts.x", "x = 1")
+    several = WiringErrors("2 errors", errors=[FreeFlange("a", where=place), FreeFlange("b")])
+    given: Any = {"where": [place, Source("g.py", 7)], "why": "why", "advice": "advice", "word": "x", "instead": "y"}
+    for kind in kinds:
+        error = several if kind is WiringErrors else kind("what", **given)
+        data = error.as_json()
+        assert json.loads(json.dumps(data)) == data
+        assert data["kind"] == kind.__name__
+        assert set(data) - {"problems"} == KEYS
+        assert all(set(other) == PLACE for other in data["places"])
+        assert [problem.as_json() for problem in pickle.loads(pickle.dumps(error)).problems()] == [
+            problem.as_json() for problem in error.problems()
+        ]
+
+
+PAYLOADS = (
+    "<script>alert(1)</script>", "<img src=x onerror=alert(1)>", "\"><svg onload=alert(1)>", "'-alert(1)-'", "{{7*7}}",
+    "${7*7}", "#{7*7}", "<%= 7*7 %>", "]]>", "<!--", "-->", "&lt;b&gt;", "&#x41;", "[bold]x[/]", "[/]",
+    "[link=file:///x]y[/link]", "](javascript:alert(1))", "![x](http://x.invalid)", "`x`",
+    "```\nx\n```", "$\\input{x}$", "\\write18{x}", "%s%n%x",
+    "{0}{x!r}", "\\u0000", "\u202egpj.exe", "\u2028",
+    "\u200b", "\ufeff", "e\u0301", "\U0001f600", "\x1b[31mred\x1b[0m",
+    "\x1b]0;t\x07", "\x7f", "\x9b31m", "a\tb", "a\rb", "file:///etc/passwd", "../../x", "; rm -rf x",
+)  # fmt: skip
+PART = '[parts]\na = {{ is = "Inertia", J = 1 }}\n'
+FIELDS = (
+    'name = {0}\ndescription = {0}\n[parts]\na = {{ is = "Inertja" }}\n', "[parts]\na = {{ is = {0} }}\n",
+    '[parts]\na = {{ is = "Inertia", J = {0} }}\n', '[parts]\na = {{ is = "Inertia", {0} = 1 }}\n',
+    '[parts]\n{0} = {{ is = "Inertia" }}\n', PART + '[series]\n{0} = ["a", {0}]\n',
+    PART + '[connect]\n{0} = ["a.flange_a", {0}]\n', "{0} = {0}\n", PART + "[start]\n{0} = {0}\n",
+    PART + "[simulate]\nuntil = {0}\n", PART + "[expose]\n{0} = {0}\n", "free = [{0}]\n" + PART,
+    '[parameters]\n{0} = {0}\n[parts]\na = {{ is = "Inertia", J = {0} }}\n', PART + "[display]\n{0} = {0}\n",
+)  # fmt: skip
+
+
+def told(text: str, file: Path) -> Sequence[ModelicaLikeError]:
+    try:
+        loads(text, str(file))
+    except ModelicaLikeError as error:
+        return error.problems()
+    return ()
+
+
+def test_hostile_texts_stay_texts(tmp_path: Path):
+    assert len(PAYLOADS) == 40
+    for payload in PAYLOADS:
+        for field in FIELDS:
+            text = field.format(json.dumps(payload, ensure_ascii="\x7f" in payload))
+            for problem in told(text, tmp_path / "drive.toml"):
+                data = problem.as_json()
+                assert json.loads(json.dumps(data)) == data
+                if data["column"]:
+                    assert marked(text, data)
+                if swap := data["suggestion"]:
+                    assert marked(text, swap) == swap["old"]
+
+
+@pytest.mark.parametrize("control", [chr(code) for code in range(32) if chr(code) not in "\t\n\r"] + ["\x7f", "\x00"])
+def test_control_characters_reach_no_terminal(control: str, tmp_path: Path):
+    assert unicodedata.category(control) == "Cc"
+    file = tmp_path / "drive.toml"
+    file.write_text(f'[parts]\na = {{ is = "Iner{control}tia" }}\n', encoding="utf-8", newline="")
+    result = called(["check", str(file), "--json"])
+    assert control not in result.stdout
+    assert result.exit_code == 2
+    assert json.loads(result.stdout)["problems"][0]["line"] == 2
+
+
+def test_a_huge_line_is_marked_where_it_is_wrong(tmp_path: Path):
+    file = tmp_path / "drive.toml"
+    parts = ", ".join(f'"p{k}"' for k in range(20_000))
+    text = f'[parts]\np = {{ is = "Inertia", J = 1 }}\n[series]\nx = [{parts}, "q"]\n'
+    file.write_text(text, encoding="utf-8")
+    (problem,) = problems(file)
+    assert marked(text, problem) == "p0"
+    assert len(json.dumps(problem)) < 5000
