@@ -14,6 +14,7 @@ MORE = {
     "new": ("tutorial.md", "tutorial"), "check": ("how_to/does_not_start.md", "a drive that does not start"),
     "draw": ("schematics.md", "schematics"), "describe": ("components/README.md", "components"),
     "schema": ("how_to/editor.md", "an editor that knows netlists"), "trust": ("security.md", "security"),
+    "lsp": ("how_to/editor.md", "an editor that knows netlists"),
     "simulate": ("plots.md", "pictures"),
     "report": ("reports.md", "reports"), "explore": ("explore.md", "explore"), "modes": ("analysis.md", "analysis"),
     "steady": ("analysis.md", "analysis"), "sweep": ("how_to/sweep.md", "sweeps"),

@@ -10,6 +10,11 @@ from typing import Any
 from modelica_like.places import SHOWN
 from modelica_like.places import Source as Source
 
+# Raised only by a defect of this package; every expected error is a ModelicaLikeError.
+DEFECTS = (
+    ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, MemoryError, RuntimeError, StopIteration,
+    SyntaxError, TypeError, ValueError,
+)  # fmt: skip
 _SHORT = 3
 """A part of a name that is not longer does not suggest the name."""
 _ENDLESS = re.compile(r"\S{500,}")

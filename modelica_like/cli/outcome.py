@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from modelica_like.cli.shared import DEFECTS, Page, warn
-from modelica_like.errors import Interrupted, ModelicaLikeError, SolveError
+from modelica_like.cli.shared import Page, warn
+from modelica_like.errors import DEFECTS, Interrupted, ModelicaLikeError, SolveError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from modelica_like.cli.reader import Argument, Option
-from modelica_like.errors import InitializationError, ModelicaLikeError, NetlistError, SolveError, Source
+from modelica_like.errors import DEFECTS, InitializationError, ModelicaLikeError, NetlistError, SolveError, Source
 from modelica_like.writing import check_writable
 
 if TYPE_CHECKING:
@@ -21,12 +21,6 @@ BAD_INPUT = 2
 SOLVE_FAILED = 1
 
 INTERRUPTED = 130
-
-# Raised only by a defect of this package; every expected error is a ModelicaLikeError.
-DEFECTS = (
-    ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, MemoryError, RuntimeError, StopIteration,
-    SyntaxError, TypeError, ValueError,
-)  # fmt: skip
 
 TOLD = (KeyboardInterrupt, ModelicaLikeError, OSError, *DEFECTS)
 """What ends a command with a text."""

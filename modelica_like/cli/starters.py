@@ -55,3 +55,16 @@ def trust(
             say(f"{trusted.distrust(folder)} is not trusted any more.")
         else:
             say(f"{trusted.trust(folder)} is trusted.")
+
+
+def lsp(*, debug: Debug = False) -> None:
+    """Answer an editor about netlists and sizing files, on standard input and output (extra `lsp`).
+
+    The editor starts it, and speaks the language server protocol. Modules of folders that are not trusted do not run.
+    """
+    with told(debug):
+        from modelica_like import __version__
+        from modelica_like.errors import extra_module
+
+        extra_module("pygls", "lsp")
+        extra_module("modelica_like.lsp.server", "lsp").serve(__version__)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
@@ -202,21 +203,33 @@ def declare(of: Assembly, name: str, field: Field) -> None:
     record.own_fields = {**record.own_fields, name: field}
 
 
-def refused_wiring(of: Assembly) -> list[ModelicaLikeError]:
-    """Take the connections away that have errors; return these."""
-    record, errors = inside(of), list[ModelicaLikeError]()
+def refused_wiring(of: Assembly, broken: Collection[str]) -> tuple[list[ModelicaLikeError], bool]:
+    """Take the connections away that have errors, or name broken parts.
+
+    Returns:
+        The errors, but those about broken parts; and whether something was taken away.
+    """
+    record, errors, bad = inside(of), list[ModelicaLikeError](), set[str]()
     for key, make in [*Assembly._wiring(of)]:  # pyright: ignore[reportPrivateUsage]
-        try:
-            make()
-        except ModelicaLikeError as error:
-            error.where = error.where or (Assembly._told(of, key),)  # pyright: ignore[reportPrivateUsage]
-            errors.append(error)
-            section, _, name = key.partition(".")
-            record.wires = {k: ends for k, ends in record.wires.items() if section != "connect" or k != name}
-            record.chains = {k: names for k, names in record.chains.items() if section != "series" or k != name}
-            record.free = tuple(end for end in record.free if section != "free" or end != name)
-            record.exposed = tuple(pair for pair in record.exposed if section != "expose" or pair[0] != name)
-    return errors
+        section, _, name = key.partition(".")
+        known = {"connect": record.wires, "series": record.chains, "free": {name: (name,)}}
+        known["expose"] = {outer: (end,) for outer, end in record.exposed}
+        ends = [*known[section][name]]
+        others = [end for end in ends if re.split(r"[.\[]", end)[0] not in broken]
+        find = Assembly._link if section == "series" else end_at  # pyright: ignore[reportPrivateUsage]
+        bad |= {key} if others != ends else set()
+        for attempt in [make] if others == ends else [partial(find, of, end) for end in others]:
+            try:
+                attempt()
+            except ModelicaLikeError as error:
+                error.where = error.where or (Assembly._told(of, key),)  # pyright: ignore[reportPrivateUsage]
+                errors.append(error)
+                bad.add(key)
+    record.wires = {name: ends for name, ends in record.wires.items() if f"connect.{name}" not in bad}
+    record.chains = {name: ends for name, ends in record.chains.items() if f"series.{name}" not in bad}
+    record.free = tuple(end for end in record.free if f"free.{end}" not in bad)
+    record.exposed = tuple(pair for pair in record.exposed if f"expose.{pair[0]}" not in bad)
+    return errors, bool(bad)
 
 
 def end_at(of: Assembly, path: str) -> Connector | Symbol:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Generator, Iterable, Iterator
+from collections.abc import Collection, Generator
 from contextlib import contextmanager
 
 from modelica_like.errors import (
@@ -15,11 +15,7 @@ from modelica_like.errors import (
 )
 from modelica_like.flatten.flatten import flatten
 from modelica_like.language import Assembly
-from modelica_like.language.assembly import end_at, refused_wiring
-from modelica_like.language.inside import inside
-
-_Wiring = tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]], tuple[tuple[str, str], ...]]
-"""Connections, series and outer connectors."""
+from modelica_like.language.assembly import refused_wiring
 
 
 @contextmanager
@@ -50,14 +46,8 @@ def further(drive: Assembly, broken: Collection[str], refused: Collection[str]) 
         broken: names of parts that it should have.
         refused: paths of values that it should have.
     """
-    record = inside(drive)
-    before = record.wires, record.chains, record.exposed
-    record.wires = {key: ends for key, ends in before[0].items() if _whole(ends, broken)}
-    record.chains = {key: names for key, names in before[1].items() if _whole(names, broken)}
-    record.exposed = tuple(pair for pair in before[2] if _whole(pair, broken))
-    record.free = tuple(end for end in record.free if _whole([end], broken))
-    errors = [*_names(drive, before, broken), *refused_wiring(drive)]
-    cut = bool(broken) or before != (record.wires, record.chains, record.exposed)
+    errors, cut = refused_wiring(drive, broken)
+    cut = cut or bool(broken)
     try:
         flatten(drive)
     except ModelicaLikeError as error:
@@ -65,26 +55,9 @@ def further(drive: Assembly, broken: Collection[str], refused: Collection[str]) 
     return errors
 
 
-def _names(drive: Assembly, wiring: _Wiring, broken: Collection[str]) -> Iterator[ModelicaLikeError]:
-    """Yield the errors of the other names in connections that name broken parts."""
-    for section, entries, find in ("connect", wiring[0], end_at), ("series", wiring[1], Assembly._link):
-        for key, ends in entries.items():
-            for end in ends if not _whole(ends, broken) else ():
-                try:
-                    if head(end) not in broken and end not in inside(drive).parts:
-                        find(drive, end)
-                except ModelicaLikeError as error:
-                    error.where = error.where or (Assembly.source_of(drive, f"{section}.{key}"),)
-                    yield error
-
-
 def head(path: str) -> str:
     """Return the name of the part in which a path begins."""
     return path.partition(".")[0].partition("[")[0]
-
-
-def _whole(paths: Iterable[str], broken: Collection[str]) -> bool:
-    return not any(head(path) in broken for path in paths)
 
 
 def _is_independent(error: ModelicaLikeError, refused: Collection[str], *, cut: bool) -> bool:

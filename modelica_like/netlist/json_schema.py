@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import Any, get_args
 
 from modelica_like.language import Component, Input, Parameter, Variable
@@ -46,9 +47,15 @@ def schema() -> dict[str, Any]:
         "type": "object",
         "additionalProperties": False,
         "required": ["parts"],
-        "properties": _sections(),
+        "properties": sections(),
         "definitions": {"part": chosen(components, _others()), **components, **quantities.definitions()},
     }
+
+
+@lru_cache(maxsize=512)
+def properties_of(kind: type[Component]) -> dict[str, Any]:
+    """Return the schemas of what a part of one type can be given, by name."""
+    return _component(kind, Quantities(()))["properties"]
 
 
 def chosen(types: Iterable[str], others: Iterable[dict[str, Any]] = ()) -> dict[str, Any]:
@@ -65,7 +72,8 @@ def _units(types: Iterable[type[Component]]) -> set[str]:
     return fields | columns
 
 
-def _sections() -> dict[str, Any]:
+def sections() -> dict[str, Any]:
+    """Return the schemas of the sections of a netlist, by name."""
     parts = {"anyOf": [_ANY_PART, {"type": "array", "items": _ANY_PART, "minItems": 1}]}
     free = {"type": "array", "items": _TEXT, "description": "connectors left free on purpose"}
     chain = "chains of parts: the outlet of each is joined to the inlet of the next"

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 _MAX_DEPTH = 20
-"""Of brackets, and half of the number of names in a key; what is deeper has no places."""
+"""Of brackets, and number of names in a key."""
 Path = tuple[str, ...]
 Span = tuple[int, int]
 """Begin and end in the text."""
@@ -17,10 +18,9 @@ Span = tuple[int, int]
 STRING = r"""(?P<string>\"{3}(?:[^"\\]++|\\.|"(?!""))*(?:\"{3,5}|\Z) | '{3}(?:[^']++|'(?!''))*(?:'{3,5}|\Z)
         |"(?:[^"\\\n]++|\\.)*"? | '[^'\n]*+'?)"""
 """A text in quotes, also one that does not end."""
-COMMON = rf"""(?P<comment>\#[^\n]*+) | {STRING} | (?P<open>[\[{{]) | (?P<close>[\]}}]) | (?P<newline>\n)"""
 _TOKEN = re.compile(
-    rf"""{COMMON} | (?P<equals>=) | (?P<comma>,) | (?P<space>[ \t\r.]++) | (?P<word>[^"'\#\[\]{{}}\n=.,\s]++)
-        | (?P<other>.)""",
+    rf"""[ \t\r.]*+(?:(?P<comment>\#[^\n]*+) | {STRING} | (?P<open>[\[{{]) | (?P<close>[\]}}]) | (?P<newline>\n)
+        | (?P<equals>=) | (?P<comma>,) | (?P<word>[^"'\#\[\]{{}}\n=.,\s]++) | (?P<other>.))""",
     re.VERBOSE | re.DOTALL,
 )
 _NEXT = re.compile(
@@ -29,8 +29,7 @@ _NEXT = re.compile(
 """A line that begins a statement, though a bracket before it is still open."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(NamedTuple):
     """A header, a key with its value, or an element of an array.
 
     Attributes:
@@ -39,6 +38,8 @@ class Entry:
         begin: of the key, or of the element.
         value: of the value, without quotes; empty for a header, and where there is none yet.
         end: of all.
+        is_header: whether it is one.
+        is_statement: whether it is a key with `=`, not within braces or brackets.
     """
 
     path: Path
@@ -46,14 +47,23 @@ class Entry:
     begin: int
     value: Span
     end: int
+    is_header: bool = False
+    is_statement: bool = False
 
 
 @dataclass
 class Outline:
-    """Keys of a text in their order."""
+    """Keys of a text in their order.
+
+    Attributes:
+        text: all of it.
+        entries: of the text, up to the place where it is nested too deeply.
+        deep: this place, or zero.
+    """
 
     text: str
-    entries: list[Entry] = field(default_factory=list)
+    entries: list[Entry]
+    deep: int = 0
 
     @cached_property
     def by_path(self) -> dict[Path, Entry]:
@@ -89,7 +99,7 @@ class Outline:
 
     def table(self, offset: int) -> Path:
         """Return the path of the last header before a place."""
-        headers = (entry for entry in reversed(self.entries) if entry.value == (0, 0) and entry.end <= offset)
+        headers = (entry for entry in reversed(self.entries) if entry.is_header and entry.end <= offset)
         return next((entry.path for entry in headers), ())
 
     def read(self, span: Span) -> str:
@@ -127,20 +137,22 @@ class _Walk:
         self.header = 0
         """Brackets of a header that is being read."""
 
-    def run(self) -> None:
-        """Go through the text; what is nested too deeply ends it."""
+    def run(self) -> int:
+        """Go through the text; return the place from which it is nested too deeply, or zero."""
         for match in _TOKEN.finditer(self.text):
             kind = match.lastgroup or "other"
             if kind == "newline":
                 if len(self.levels) == 1 or self.header or _NEXT.match(self.text, match.end()):
                     self._end_statement()
-            elif kind not in ("comment", "space"):
-                level = self.levels[-1]
-                level.begin = match.start() if level.begin < 0 and kind not in ("close", "comma") else level.begin
-                getattr(self, f"_{kind}")(match.span(), level)
-            if len(self.levels) > _MAX_DEPTH or len(self.levels[-1].names) > 2 * _MAX_DEPTH:
-                return
+            elif kind != "comment":
+                level, span = self.levels[-1], match.span(kind)
+                if level.begin < 0 and kind not in ("close", "comma"):
+                    level.begin = span[0]
+                getattr(self, f"_{kind}")(span, level)
+                if max(len(self.levels), self.header, len(level.names)) > _MAX_DEPTH:
+                    return span[0]
         self._end_statement()
+        return 0
 
     def _word(self, span: Span, level: _Level) -> None:
         (level.value if level.valued else level.names).append(span)
@@ -187,8 +199,9 @@ class _Walk:
         """Store the entry of a level."""
         if level.names or level.value:
             value = (level.value[0][0], level.value[-1][1]) if level.value else (level.end, level.end)
-            value = (0, 0) if self.header else value
-            self.entries.append(Entry(self._path(level), tuple(level.names), level.begin, value, level.end))
+            kinds = self.header > 0, level.valued and not level.kind
+            path, names = self._path(level), tuple(level.names)
+            self.entries.append(Entry(path, names, level.begin, (0, 0) if self.header else value, level.end, *kinds))
         level.clear()
 
     def _end_statement(self) -> None:
@@ -212,5 +225,5 @@ class _Walk:
 def outline(text: str) -> Outline:
     """Return the keys of a text, which need not be TOML."""
     walk = _Walk(text)
-    walk.run()
-    return Outline(text, sorted(walk.entries, key=lambda entry: entry.begin))
+    deep = walk.run()
+    return Outline(text, sorted(walk.entries, key=lambda entry: entry.begin), deep)

@@ -28,6 +28,8 @@ from modelica_like.netlist.further import further, head
 from modelica_like.netlist.registry import find_type
 from modelica_like.trust import trusting
 
+_MAX_ERRORS = 100
+"""Nobody reads more, and each looks for the name that is meant."""
 _MAX_PARTS, _MAX_PARAMETERS, _MAX_DEPTH = 200_000, 10_000, 50
 """Of a netlist with all that it uses; of one file; of netlists in netlists."""
 FMU_PART = "FMU"
@@ -215,6 +217,8 @@ class _Task:
 
     def _each(self, section: str, entries: Mapping[str, Any], action: Callable[[str, Any], None]) -> None:
         for name, entry in entries.items():
+            if len(self.errors) > _MAX_ERRORS:
+                break
             try:
                 action(name, entry)
             except _Reported:
@@ -234,6 +238,8 @@ class _Task:
         if not any(place.file.endswith((".toml", ".mo")) for place in error.where):
             error.where = (source,)
         self.errors.append(error)
+        if len(self.errors) == _MAX_ERRORS:
+            self.errors.append(NetlistError(f"After {_MAX_ERRORS} errors, the netlist is not read on."))
 
     def _add_part(self, name: str, entry: Any) -> None:
         if isinstance(entry, list):

@@ -126,3 +126,11 @@ Give it one: J = …
 b.d (SpringDamper) has no value.
   in bad.toml:4 `b = { is = "SpringDamper", c = 1 }`
 Give it one: d = …""")  # fmt: skip
+
+
+def test_reading_ends_after_a_hundred_errors(bad: Callable[[str], Path]):
+    text = "[parts]\n" + "".join(f'p{k} = {{ is = "Nothing{k}" }}\n' for k in range(150))
+    with pytest.raises(WiringErrors) as caught:
+        load(bad(text))
+    assert len(caught.value.errors) == 101
+    assert str(caught.value.errors[-1]) == "After 100 errors, the netlist is not read on."

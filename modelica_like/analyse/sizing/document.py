@@ -28,7 +28,11 @@ def read_document(path: Path) -> SizingDocument:
     """Read a sizing file and check its form."""
     if not path.exists():
         raise NetlistError(f"The sizing file '{path}' does not exist.")
-    text = read_text(path)
+    return parse_document(read_text(path), path)
+
+
+def parse_document(text: str, path: Path) -> SizingDocument:
+    """Read the text of a sizing file and check its form."""
     lines = locate(text, str(path))
     errors: list[ModelicaLikeError] = []
     sections = read_sections(parse_toml(text, lines), "A sizing file", _READERS, lines, errors)

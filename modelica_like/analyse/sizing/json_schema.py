@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+from functools import lru_cache
 from typing import Any
 
 from modelica_like.analyse.sizing.checks import (
@@ -51,6 +52,12 @@ def schema() -> dict[str, Any]:
         },
         "definitions": {"check": chosen(schemas), **schemas, **quantities.definitions()},
     }  # fmt: skip
+
+
+@lru_cache(maxsize=512)
+def properties_of(check: Check) -> dict[str, Any]:
+    """Return the schemas of what one check can be given, by name."""
+    return _check(check, Quantities(()))["properties"]
 
 
 def _check(check: Check, quantities: Quantities) -> dict[str, Any]:

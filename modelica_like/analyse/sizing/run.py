@@ -14,7 +14,7 @@ import numpy as np
 from modelica_like import upper
 from modelica_like.analyse.sizing.checks import find_check, unit_of_line
 from modelica_like.analyse.sizing.convert import Converter
-from modelica_like.analyse.sizing.document import SizingDocument, placed, read_document
+from modelica_like.analyse.sizing.document import SizingDocument, parse_document, placed, read_document
 from modelica_like.analyse.sizing.formulas import Value, read_value
 from modelica_like.analyse.sizing.simulated import Simulations
 from modelica_like.errors import (
@@ -120,6 +120,35 @@ def size(path: str | Path, runs: Mapping[Path, Solution] | None = None) -> Sizin
     return Sizing(document.name, document.description, checks, document.compare)
 
 
+class _Later(ModelicaLikeError):
+    """Only a run shows it."""
+
+
+class _NoRuns(Simulations):
+    def load(self, table: Mapping[str, Any], where: str) -> Value:
+        raise _Later(where)
+
+
+def survey(path: Path, text: str) -> list[ModelicaLikeError]:
+    """Return the errors of a sizing file that is being written, as far as they are seen without a simulation."""
+    errors: dict[str, ModelicaLikeError] = {}
+    try:
+        document = parse_document(text, path)
+    except ModelicaLikeError as error:
+        return [*error.problems()]
+    for name in document.checks:
+        try:
+            _Run(document, _NoRuns(path.parent)).checked(name)
+        except _Later:
+            continue
+        except ModelicaLikeError as error:
+            errors[str(error)] = error  # a wrong parameter is told once
+            if error.where == (document.lines.source("checks", name),):
+                key = "is" if error.word == document.checks[name]["is"] else error.word
+                error.where = (document.lines.within("checks", name, key),)
+    return [*errors.values()]
+
+
 class _Run:
     """Computes checks and parameters on demand, each once."""
 
@@ -216,7 +245,7 @@ class _Run:
         return values
 
     def _source(self, name: str, key: str) -> Source:
-        return self.document.lines.source("checks", name, key)
+        return self.document.lines.within("checks", name, key)
 
     def _limit(self, result: Any, name: str, value: Any, where: str) -> tuple[Any, Any]:
         if not isinstance(value, dict) or not value or set(value) - {"min", "max"}:
