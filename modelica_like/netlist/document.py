@@ -331,11 +331,7 @@ def options(checks: Mapping[str, Check]) -> Reader:
 
 
 def duration(key: str, value: Any) -> Any:
-    """Return a time as written, after checking it.
-
-    Raises:
-        UnitError, ValueOutOfRange, NetlistError: it is not a time, or not positive.
-    """
+    """Return a time as written; a UnitError, ValueOutOfRange or NetlistError if it is none, or not positive."""
     seconds = to_si(value, parse_unit("s"), key)
     if seconds <= 0:
         raise NetlistError(f"{key} = {value} must be positive.")
