@@ -192,10 +192,13 @@ def optimize(
         from modelica_like.show.report.analysis import optimum_report
 
         bounds = by_name(map(read_bounds, free), "--free") if free else None
-        result = find(
-            assembly, minimize=minimize or (), maximize=maximize or (), free=bounds, subject_to=subject_to or (),
-            until=until, start=start, starts=starts, points=points,
-        )  # fmt: skip
+        from modelica_like.show.report.progress import Bar
+
+        with Bar(title="designs") as bar:
+            result = find(
+                assembly, minimize=minimize or (), maximize=maximize or (), free=bounds, subject_to=subject_to or (),
+                until=until, start=start, starts=starts, points=points, progress=bar,
+            )  # fmt: skip
         page.print(optimum_report(result))
         if plot:
             save_plot(result.plot(), plot)

@@ -239,3 +239,14 @@ def test_a_mode_alone_needs_no_run() -> None:
     best = optimum(loads(TWO_MASSES), maximize="mode(1).frequency", free=free)
     assert best.values == pytest.approx({"shaft.c": 3000.0, "J2.J": 0.1}, rel=1e-9)
     assert best.objectives[0].value == pytest.approx(math.sqrt(3000.0 * (1 / 0.5 + 1 / 0.1)) / (2 * math.pi), rel=1e-9)
+
+
+def test_an_interrupted_search_tells_the_best_design() -> None:
+    def stop(designs: int, most: int) -> None:
+        assert designs <= most
+        if designs == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        optimize(DIRECT, minimize="clutch.lock_time", free=CAPACITY, progress=stop)
+    assert caught.value.__notes__[-1].startswith("The best of 3 designs, within all limits: clutch.capacity = ")

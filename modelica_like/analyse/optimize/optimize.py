@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from modelica_like.analyse.optimize.choices import Choice, combinations
 from modelica_like.analyse.optimize.problem import Question, make_problem
 from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optimum
 from modelica_like.analyse.optimize.runs import Runs
-from modelica_like.analyse.optimize.solve import FEASIBLE, Outcome, Search
+from modelica_like.analyse.optimize.solve import FEASIBLE, MOST_STEPS, Outcome, Search
 from modelica_like.analyse.optimize.terms import Row
 from modelica_like.analyse.written import placed
 from modelica_like.arguments import checked
@@ -27,6 +28,7 @@ from modelica_like.language.inside import inside
 from modelica_like.simulation import Model, loaded
 from modelica_like.solve.initialize import StartKind
 
+Progress = Callable[[int, int], None]
 _POINTS = 20
 _SAME = 1e-5
 """Distance of two designs relative to the bounds: a design is known to about the root of the solver's tolerance."""
@@ -42,6 +44,7 @@ def optimize(
     until: float | str | None = None, parameters: Mapping[str, Any] | None = None, start: StartKind | None = None,
     starts: int | None = None, points: int | None = None, seed: int = 0,
     tolerances: Mapping[str, Any] | None = None, correlated: Sequence[Mapping[str, Any]] | None = None,
+    progress: Progress | None = None,
 ) -> Optimum | Front:  # fmt: skip
     """Find the best design of a drive.
 
@@ -68,11 +71,13 @@ def optimize(
         tolerances: how parameters scatter, as in `tolerance`, for limits that must hold with a probability,
             `P(clutch.lock_time <= 0.4 s) >= 99.9 %`; by default [tolerances] of the netlist.
         correlated: which of them scatter together, as in `tolerance`.
+        progress: called after each design with the number of those tried, and about the most that there can be.
 
     Raises:
         UnknownName, UnitError, ValueOutOfRange: something does not fit the drive; netlists tell file and line.
         NoGradient: the drive as it is has no derivative.
         ModelicaLikeError: the drive cannot be run as it is.
+        KeyboardInterrupt: the search was interrupted; the note has the best design until then.
     """
     drive = loaded(drive)
     written, scatter, folder = {}, dict[str, Any](), ""
@@ -96,7 +101,9 @@ def optimize(
     choices = choose if choose is not None else written.get("choose", {})
     number = starts or written.get("starts", 1)
     if not choices:
-        return _Study(drive, question, seed).best(number, points or written.get("points", _POINTS))
+        return _Study(drive, question, seed, _told(progress, number)).best(
+            number, points or written.get("points", _POINTS)
+        )
     if len(question.minimize) + len(question.maximize) > 1:
         raise ValueOutOfRange("A choice needs one objective.", advice="Limit the other one by subject_to.")
     if not isinstance(drive, Component):
@@ -105,7 +112,15 @@ def optimize(
         )
     with placed(drive, "optimize.choose"):
         options = combinations(drive, choices)
-    return _best_choice(drive, question, options, number, seed)
+    return _best_choice(drive, question, options, number, seed, _told(progress, number * len(options)))
+
+
+def _told(progress: Progress | None, searches: int) -> Callable[[], None]:
+    """Return what counts designs."""
+    designs = itertools.count(1)
+    if progress is None:
+        return lambda: None
+    return lambda: progress(next(designs), MOST_STEPS * searches)
 
 
 def _listed(texts: str | Sequence[str]) -> tuple[str, ...]:
@@ -115,10 +130,12 @@ def _listed(texts: str | Sequence[str]) -> tuple[str, ...]:
 class _Study:
     """One optimisation of one drive."""
 
-    def __init__(self, drive: Component | CompiledDae, question: Question, seed: int) -> None:
+    def __init__(
+        self, drive: Component | CompiledDae, question: Question, seed: int, told: Callable[[], None] = lambda: None
+    ) -> None:
         self.drive, self.seed = drive, seed
         self.problem = make_problem(drive, question, lambda key: placed(drive, f"optimize.{key}"))
-        self.runs = Runs(self.problem)
+        self.runs = Runs(self.problem, told)
 
     def best(self, starts: int, points: int) -> Optimum | Front:
         """Return the optimum, or with two objectives their front."""
@@ -260,7 +277,7 @@ def _different(points: Sequence[Optimum]) -> tuple[Optimum, ...]:
 
 
 def _best_choice(
-    drive: Component, question: Question, options: Sequence[Choice], starts: int, seed: int
+    drive: Component, question: Question, options: Sequence[Choice], starts: int, seed: int, told: Callable[[], None]
 ) -> Optimum:  # fmt: skip
     results: list[tuple[Choice, Optimum]] = []
     failures: list[tuple[Choice, ModelicaLikeError]] = []
@@ -270,7 +287,7 @@ def _best_choice(
             for path, value in choice.values.items():
                 variant.set(path, value)
         try:
-            study = _Study(variant, question, seed)
+            study = _Study(variant, question, seed, told)
             result = study.best(starts, _POINTS)
         except ModelicaLikeError as error:
             failures.append((choice, error))

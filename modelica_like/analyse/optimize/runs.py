@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -36,14 +36,18 @@ class Design:
 class Runs:
     """Runs designs, each once.
 
+    Args:
+        problem: the problem.
+        told: called after each design.
+
     Attributes:
         count: number of runs so far.
         designs: in the order in which they were tried.
         refusals: designs at which a run fails or has no derivative, and the reasons.
     """
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, told: Callable[[], None]) -> None:
+        self.problem, self._told = problem, told
         question, names = problem.question, [parameter.name for parameter in problem.free]
         self.functions: list[SimulationFunction] = []
         self.modal = [name for name in problem.outputs if modal_unit(name) is not None]
@@ -90,6 +94,7 @@ class Runs:
         values, slopes = (np.concatenate(part, axis=1)[:, self._places] for part in zip(*parts, strict=True))
         design = Design(x.copy(), values, slopes)
         self.designs.append(design)
+        self._told()
         return design
 
     def values_at(self, x: Vector) -> Vector | None:

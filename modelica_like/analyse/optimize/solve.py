@@ -24,8 +24,10 @@ from modelica_like.errors import extra_module
 
 FEASIBLE = 1e-6
 """Excess of a limit, relative to the size of its output, that counts as none: ten times the precision of gradients."""
+MOST_STEPS = 80
+"""Of IPOPT: what converges does so within half of them."""
 _OPTIONS = {
-    "print_level": 0, "sb": "yes", "hessian_approximation": "limited-memory", "mu_init": 1e-3, "max_iter": 80,
+    "print_level": 0, "sb": "yes", "hessian_approximation": "limited-memory", "mu_init": 1e-3, "max_iter": MOST_STEPS,
     # Relative to sizes: gradients are known to 1e-7.
     "tol": 1e-7, "acceptable_tol": 1e-6, "acceptable_iter": 4,
     # Bounds are those of parameters, which may not be left.
@@ -99,6 +101,25 @@ class Search:
 
     def from_design(self, x: Vector) -> Outcome:
         """Search from a design."""
+        try:
+            return self._from(x)
+        except KeyboardInterrupt as interrupt:
+            interrupt.add_note(self._best_so_far())
+            raise
+
+    def _best_so_far(self) -> str:
+        """Return a sentence about the best design tried."""
+        measured = [(*self.measures(design.values), design.x) for design in self.runs.designs]
+        if not measured:
+            return "No design was finished."
+        objective, excess, x = min(measured, key=lambda item: (max(item[1], FEASIBLE), item[0]))
+        names = [parameter.name for parameter in self.problem.free]
+        values = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, x, strict=True))
+        within = "within all limits" if excess <= FEASIBLE else "exceeding a limit"
+        reached = objective * self.aim_scale
+        return f"The best of {len(measured)} designs, {within}: {values}; the objective is {reached:.6g}."
+
+    def _from(self, x: Vector) -> Outcome:
         outcome = self._ipopt(x, elastic=False)
         if outcome.optimal and outcome.excess <= FEASIBLE:
             return outcome
@@ -137,6 +158,8 @@ class Search:
             x0=[*begin, *([first] if bounded else [])], lbx=[0.0] * n + free_bound,
             ubx=[1.0] * n + [np.inf] * bounded, lbg=-np.inf, ubg=0.0,
         )  # fmt: skip
+        if callback.interrupt is not None:
+            raise callback.interrupt
         prices = np.array(solved["lam_g"]).ravel()[: excess.numel()]
         status = str(solver.stats()["return_status"])
         end = problem.low + problem.span * np.clip(np.array(solved["x"]).ravel()[:n], 0.0, 1.0)
@@ -209,6 +232,7 @@ class _Values(NamedCallback):
     def __init__(self, search: Search) -> None:
         super().__init__()
         self._search = search
+        self.interrupt: KeyboardInterrupt | None = None
         problem = search.problem
         self._size = len(problem.cases) * len(problem.outputs), len(problem.free)
         self._slopes = _Slopes(self, self._size)
@@ -219,7 +243,11 @@ class _Values(NamedCallback):
         """Return values and slopes, None where a run is refused."""
         search = self._search
         problem = search.problem
-        design = search.runs.at(problem.low + problem.span * np.clip(np.array(q, float).ravel(), 0.0, 1.0))
+        try:
+            design = search.runs.at(problem.low + problem.span * np.clip(np.array(q, float).ravel(), 0.0, 1.0))
+        except KeyboardInterrupt as interrupt:
+            self.interrupt = interrupt  # CasADi ends the search, and tells nobody why
+            raise
         if design is None:
             return None
         values = (design.values / search.sizes).ravel()
