@@ -15,7 +15,7 @@ from modelica_like.analyse.sizing.json_schema import properties_of
 from modelica_like.analyse.sizing.json_schema import schema as sizing_schema
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.language.units import Unit, parse_unit
-from modelica_like.lsp.names import Names, described, owner_of, units_like
+from modelica_like.lsp.names import Names, about_type, described, units_like
 from modelica_like.lsp.text import Spot, Text, word_at
 from modelica_like.netlist.json_schema import sections
 from modelica_like.netlist.outline import Span
@@ -125,7 +125,7 @@ def _values(text: Text, spot: Spot) -> Iterator[Word]:
     (section, *path), names = spot.path, Names(text)
     if path[-1:] == ["is"]:
         written = text.text[slice(*spot.whole)]
-        yield from (Word(name, owner_of(kind).about, "type") for name, kind in library_types().items())
+        yield from (Word(name, about_type(kind), "type") for name, kind in library_types().items())
         files = (file.name for file in text.path.parent.glob("*.toml") if file.name != text.path.name)
         yield from (Word(f"./{name}", "", "type") for name in files)
         if written not in library_types() and (owner := names.type(written)):

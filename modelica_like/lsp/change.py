@@ -9,6 +9,7 @@ from typing import Any
 from modelica_like.errors import DuplicateName, ModelicaLikeError, NetlistError, UnknownName
 from modelica_like.language.formula import CONSTANTS
 from modelica_like.language.units import read_quantity
+from modelica_like.lsp.names import Names
 from modelica_like.lsp.text import Text, word_at
 from modelica_like.netlist.further import head
 from modelica_like.netlist.outline import Entry, Span
@@ -63,15 +64,18 @@ def _in_entry(text: Text, entry: Entry, name: str) -> Iterator[Span]:
         return
     if section in ("series", "connect", "free", "expose") and head(value) == name:
         yield begin, begin + len(name)
-    elif section in (*_DECLARED, "start", "guess") and entry.path[-1] != "is" and _is_formula(text, entry):
+    elif section in (*_DECLARED, "start", "guess") and name in value and _is_formula(text, entry):
         for match in re.finditer(rf"(?<![\w.])(?<!\d ){re.escape(name)}(?!\w)(?!\s*\()", value):
             yield begin + match.start(), begin + match.end()
 
 
 def _is_formula(text: Text, entry: Entry) -> bool:
-    begin, _ = entry.value
+    """Tell whether a value may use names: no number, no cell of a table, no name of a type or a mode, no other text."""
+    (begin, _), schema = entry.value, Names(text).value(".".join(entry.path[1:]))[0]
+    if not entry.names or text.text[begin - 1] not in "\"'" or {"enum", "const", "type"} & schema.keys():
+        return False
     try:
-        return text.text[begin - 1] in "\"'" and read_quantity(text.outline.read(entry.value)) is None
+        return entry.path[-1] != "is" and read_quantity(text.outline.read(entry.value)) is None
     except ModelicaLikeError:
         return True  # a number with something that is no unit
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -21,6 +22,11 @@ from modelica_like.netlist.further import head
 from modelica_like.netlist.json_schema import properties_of
 from modelica_like.netlist.read import is_modelica, load
 from modelica_like.netlist.registry import find_type, library_types
+
+_USUAL = (
+    "kg.cm2", "g.cm2", "mN.m", "N.mm", "N.cm", "kN.m", "mm/s", "m/min", "km/h", "N/mm", "kN/mm", "N/um", "N.m/deg",
+)  # fmt: skip
+"""Units that no type declares, and that are usual in drawings and catalogues."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +67,13 @@ def owner_of(part: type[Component] | Component) -> Owner:
         about = f"{inside(part).name}\n\n{inside(part).description}"
         values = {name: {"description": field.description} for name, field in part.fields.items()}
         return Owner(kind, about.strip(), part.fields, part.connectors, part.parts, values)
-    known, about = declarations(kind), f"{kind.__name__}\n\n{inspect.cleandoc(kind.__doc__ or '')}"
-    return Owner(kind, about.strip(), known.fields, known.connectors, known.parts, properties_of(kind))
+    known = declarations(kind)
+    return Owner(kind, about_type(kind), known.fields, known.connectors, known.parts, properties_of(kind))
+
+
+def about_type(kind: type[Component]) -> str:
+    """Return the name of a type, and its text."""
+    return f"{kind.__name__}\n\n{inspect.cleandoc(kind.__doc__ or '')}".strip()
 
 
 def described(schema: Mapping[str, Any]) -> str:
@@ -79,6 +90,7 @@ class Names:
 
     def __init__(self, text: Text) -> None:
         self.text = text
+        self._types: dict[str, Owner | None] = {}
 
     def parts(self) -> dict[str, str]:
         """Return the types of the parts, as written, by the names of the parts."""
@@ -91,12 +103,14 @@ class Names:
 
     def type(self, name: str) -> Owner | None:
         """Return the type of an `is`; None if there is none, it cannot be read, or is in a folder without trust."""
-        try:
-            if is_modelica(name) or name.endswith(".toml"):
-                return owner_of(load(self.text.path.parent / name))
-            return owner_of(find_type(name, self.text.path.parent)) if name else None
-        except (ModelicaLikeError, OSError):
-            return None  # the diagnostics tell why
+        if name not in self._types:
+            self._types[name] = None  # the diagnostics tell why
+            with suppress(ModelicaLikeError, OSError):
+                is_file, file = is_modelica(name) or name.endswith(".toml"), self.text.path.parent / name
+                self._types[name] = (
+                    owner_of(load(file) if is_file else find_type(name, self.text.path.parent)) if name else None
+                )
+        return self._types[name]
 
     def owner(self, path: str) -> Owner | None:
         """Return what is known of a part, by its path."""
@@ -126,7 +140,7 @@ class Names:
 def units_like(unit: Unit) -> list[str]:
     """Return usual units of a dimension: the unit itself, those of declarations, and those with a name."""
     fields = (field for kind in library_types().values() for field in declarations(kind).fields.values())
-    known: dict[str, Any] = dict.fromkeys([str(unit), *(field.unit_text for field in fields), *ATOMS])
+    known: dict[str, Any] = dict.fromkeys([str(unit), *(field.unit_text for field in fields), *ATOMS, *_USUAL])
     if unit in (ANY, ONE):
         return []
     units = ((text, parse_unit(text)) for text in known if text != "*")

@@ -13,7 +13,6 @@ from modelica_like.errors import (
     WrongConnection,
     raise_together_or_one,
 )
-from modelica_like.flatten.flatten import flatten
 from modelica_like.language import Assembly
 from modelica_like.language.assembly import refused_wiring
 
@@ -46,6 +45,8 @@ def further(drive: Assembly, broken: Collection[str], refused: Collection[str]) 
         broken: names of parts that it should have.
         refused: paths of values that it should have.
     """
+    from modelica_like.flatten.flatten import flatten  # most netlists have no errors
+
     errors, cut = refused_wiring(drive, broken)
     cut = cut or bool(broken)
     try:

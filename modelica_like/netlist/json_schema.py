@@ -14,7 +14,7 @@ from modelica_like.language.places import texts_of_fields
 from modelica_like.language.tables import REQUIRED, Column, Rows
 from modelica_like.language.units import ANY, parse_unit
 from modelica_like.netlist.document import OnChattering, StartKind
-from modelica_like.netlist.json_units import Quantities
+from modelica_like.netlist.json_units import Quantities, unnamed_quantities
 from modelica_like.netlist.read import FMU_PART
 from modelica_like.netlist.registry import library_types
 
@@ -55,7 +55,7 @@ def schema() -> dict[str, Any]:
 @lru_cache(maxsize=512)
 def properties_of(kind: type[Component]) -> dict[str, Any]:
     """Return the schemas of what a part of one type can be given, by name."""
-    return _component(kind, Quantities(()))["properties"]
+    return _component(kind, unnamed_quantities())["properties"]
 
 
 def chosen(types: Iterable[str], others: Iterable[dict[str, Any]] = ()) -> dict[str, Any]:

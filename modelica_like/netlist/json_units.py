@@ -56,6 +56,12 @@ class Quantities:
         )
 
 
+@lru_cache(maxsize=1)
+def unnamed_quantities() -> Quantities:
+    """Return the schemas of quantities for schemas that stand alone, such as those of one type."""
+    return Quantities(())
+
+
 def _whole(patterns: Iterable[str]) -> str:
     return f"{_NUMBER}({'|'.join(dict.fromkeys(patterns)) or '1'})$"
 

@@ -273,6 +273,8 @@ class _Task:
         for key, value in values.items():
             try:
                 self._give(part, key, value, f"{name}.{key}", levels)
+            except CyclicAssembly:
+                raise
             except ModelicaLikeError as error:
                 self.refused |= {f"{name}.{key}", f"{name}.{error.instead}"}
                 self._collect(error, self.document.lines.within("parts", *name.split("."), key))

@@ -80,6 +80,19 @@ m = "motor.flange"
     )
 
 
+def test_words_that_are_no_names_stay():
+    drive = """[parameters]
+stuck = 1
+[parts]
+b = { is = "Brake", capacity = "stuck", mode = "stuck" }
+c = { is = "CombiTable1Ds", table = [["0", "stuck"]] }
+"""
+    edits = renamed(Text(Path("drive.toml"), drive), drive.index("stuck"), "force")
+    assert changed(drive, edits) == drive.replace("stuck =", "force =").replace(
+        'capacity = "stuck"', 'capacity = "force"'
+    )
+
+
 def test_an_array_and_a_parameter_get_names():
     assert with_name("row", "gear", 13).count("gear") == 3
     assert with_name("n", "count", 3) == DRIVE.replace("n = 2", "count = 2").replace('"n * 3', '"count * 3').replace(

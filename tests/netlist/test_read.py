@@ -187,6 +187,14 @@ def test_parts_may_be_called_like_methods(tmp_path: Path) -> None:
     assert run.final["wires.w"] == pytest.approx(0.5, rel=1e-6)
 
 
+def test_a_circle_through_a_part_that_is_replaced(tmp_path: Path) -> None:
+    """It ends the reading at once, though other values are read on after an error."""
+    part = '{ is = "Lepelletier", nothing = 1, brake_c = { is = "./a.toml" } }'
+    (tmp_path / "a.toml").write_text(f"[parts]\nx = {part}\n")
+    with pytest.raises(CyclicAssembly, match=r"a\.toml contains a\.toml"):
+        load(tmp_path / "a.toml")
+
+
 def test_signals_leave_an_assembly(tmp_path: Path) -> None:
     """4 N.m·s·(e + ∫e) on 1 kg m²: e = (10 - 20 t)·exp(-2 t) rad/s."""
     (tmp_path / "control.toml").write_text(

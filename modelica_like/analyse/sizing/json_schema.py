@@ -18,7 +18,7 @@ from modelica_like.analyse.sizing.checks import (
 )
 from modelica_like.language.results import hints
 from modelica_like.netlist.json_schema import DRAFT, chosen
-from modelica_like.netlist.json_units import Quantities
+from modelica_like.netlist.json_units import Quantities, unnamed_quantities
 
 _RUN = {"type": "object", "description": "a number from a run", "required": ["from"], "additionalProperties": True}
 _TEXT = {"type": "string"}
@@ -57,7 +57,7 @@ def schema() -> dict[str, Any]:
 @lru_cache(maxsize=512)
 def properties_of(check: Check) -> dict[str, Any]:
     """Return the schemas of what one check can be given, by name."""
-    return _check(check, Quantities(()))["properties"]
+    return _check(check, unnamed_quantities())["properties"]
 
 
 def _check(check: Check, quantities: Quantities) -> dict[str, Any]:
