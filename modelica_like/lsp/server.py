@@ -14,13 +14,14 @@ from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 
+from modelica_like.analyse.sizing.run import survey
 from modelica_like.errors import DEFECTS, ModelicaLikeError
 from modelica_like.lsp import answers
 from modelica_like.lsp.change import Edit, applied, renamed
 from modelica_like.lsp.text import Text
 from modelica_like.netlist.outline import Span
 from modelica_like.netlist.read import FMU_PART
-from modelica_like.show.report.problems import netlist_problems, sizing_problems
+from modelica_like.show.report.problems import netlist_problems
 
 _PAUSE = 0.3
 """Seconds without a change after which a text is checked: people type faster."""
@@ -95,7 +96,7 @@ class Server(LanguageServer):
 def _problems(text: Text) -> list[dict[str, Any]]:
     try:
         if text.kind == "sizing":
-            return sizing_problems(text.path, text.text)
+            return [error.as_json() for error in survey(text.path, text.text)]
         if text.kind != "netlist" or f'"{FMU_PART}"' in text.text:  # those are checked by `cosim`
             return []
         return netlist_problems(text.path, text.text)

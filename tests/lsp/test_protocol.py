@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlparse
+from urllib.request import url2pathname
 
 import pytest
 from calls import called
@@ -170,7 +172,7 @@ def test_definition_and_symbols(client: Client, tmp_path: Path):
     place = client.at("definition", file, 5, 8)
     assert (place["uri"], marked(text, place["range"])) == (file.as_uri(), "motor")
     place = client.at("definition", file, 2, 18)
-    source = Path(place["uri"].removeprefix("file://")).read_text(encoding="utf-8").split("\n")
+    source = Path(url2pathname(urlparse(place["uri"]).path)).read_text(encoding="utf-8").split("\n")
     assert source[place["range"]["start"]["line"]].startswith("class Torque(")
     symbols = client.ask("textDocument/documentSymbol", {"textDocument": {"uri": file.as_uri()}})
     assert [symbol["name"] for symbol in symbols] == ["parts", "series"]
@@ -274,6 +276,18 @@ def test_garbage_ends_nothing(client: Client, tmp_path: Path):
     client.tell("textDocument/didChange", {"textDocument": 3})
     client.tell("no/method", {})
     assert client.open(tmp_path / "drive.toml", "") == []
+
+
+def test_saved_files_are_checked_again_with_those_that_use_them(client: Client, tmp_path: Path):
+    box, drive = tmp_path / "box.toml", tmp_path / "drive.toml"
+    right = '[parts]\na = { is = "Inertia", J = 1, phi = 0, w = 0 }\n'
+    box.write_text(right.replace("Inertia", "Inertja"), encoding="utf-8")
+    assert len(client.open(drive, '[parts]\nb = { is = "./box.toml" }\n')) == 1
+    box.write_text(right, encoding="utf-8")
+    client.tell("textDocument/didSave", {"textDocument": {"uri": drive.as_uri()}})
+    while (told := client.notified("textDocument/publishDiagnostics"))["uri"] != drive.as_uri():
+        pass
+    assert told["diagnostics"] == []
 
 
 def test_without_the_extra():

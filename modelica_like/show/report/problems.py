@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-from modelica_like.analyse.sizing.run import survey
 from modelica_like.errors import ModelicaLikeError, Source
 from modelica_like.language.component import Component
 from modelica_like.language.inside import inside
@@ -47,8 +46,3 @@ def netlist_problems(path: Path, text: str) -> list[dict[str, Any]]:
     except ModelicaLikeError as error:
         return [problem.as_json() for problem in error.problems()]
     return [note_problem(drive, sentence) for sentence in sentences]
-
-
-def sizing_problems(path: Path, text: str) -> list[dict[str, Any]]:
-    """Return what is wrong with a sizing file that is being written, as far as it is seen without a simulation."""
-    return [error.as_json() for error in survey(path, text)]
