@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from modelica_like.errors import ExportError, MissingExtra, UnknownName, did_you_mean
+from modelica_like.errors import ExportError, MissingExtra, unknown_name
 from modelica_like.writing import replacing
 
 
@@ -103,8 +103,9 @@ def chosen_platforms(platforms: Sequence[str] | str, there: Iterable[str] = PLAT
 
 def _check_known(platform: str, names: Collection[str]) -> None:
     if platform not in names:
-        hint = did_you_mean(platform, names) or "."
-        raise UnknownName(f"There is no platform '{platform}'{hint}", advice=f"There are {', '.join(names)}.")
+        raise unknown_name(
+            f"There is no platform '{platform}'", platform, names, advice=f"There are {', '.join(names)}."
+        )
 
 
 def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifier: str = "model") -> Path:

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import UnknownName, did_you_mean
+from modelica_like.errors import unknown_name
 from modelica_like.flatten.model import FlatParameter, FlatVariable
 from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
@@ -142,8 +142,8 @@ class _Builder:
         for pattern in outputs:
             matches = [path for path in paths if fnmatchcase(path, pattern.replace("[", "[[]"))]
             if not matches:
-                hint = did_you_mean(pattern, paths) or "."
-                raise UnknownName(f"{model.name} has no variable '{pattern}' that could be an output{hint}")
+                what = f"{model.name} has no variable '{pattern}' that could be an output"
+                raise unknown_name(what, pattern, paths)
             chosen.update(matches)
         self.wanted = lambda variable: variable.kind == "output" or variable.path in chosen
         self.starts = _Starts(model)

@@ -53,11 +53,12 @@ class Server(LanguageServer):
             self.last = uri, source, Text(Path(to_fs_path(uri) or uri), source)
         return self.last[2]
 
-    def offset(self, text: Text, position: types.Position) -> int:
-        """Return the offset of a position."""
+    def at(self, params: Any) -> tuple[Text, int]:
+        """Return the text and the offset that a question is about."""
+        text, position = self.text(params.text_document.uri), params.position
         line = text.lines[min(position.line, len(text.lines) - 1)]
         place = self.workspace.position_codec.position_from_client_units([line], types.Position(0, position.character))
-        return text.outline.offset(position.line + 1, place.character + 1)
+        return text, text.outline.offset(position.line + 1, place.character + 1)
 
     def range(self, text: Text, span: Span) -> types.Range:
         """Return the range of a span."""
@@ -111,15 +112,6 @@ def _diagnostic(place: types.Range, problem: dict[str, Any]) -> types.Diagnostic
     return types.Diagnostic(place, message, severity, code=problem["kind"], source="modelica-like")
 
 
-def make_server(version: str) -> Server:
-    """Return a server that answers everything that this module knows."""
-    server = Server(version)
-    _watch(server)
-    _answer(server)
-    _change(server)
-    return server
-
-
 def _watch(server: Server) -> None:
     """Check files when they are opened, changed and saved."""
 
@@ -149,13 +141,9 @@ def _watch(server: Server) -> None:
 def _answer(server: Server) -> None:
     """Answer questions about a place."""
 
-    def at(params: Any) -> tuple[Text, int]:
-        text = server.text(params.text_document.uri)
-        return text, server.offset(text, params.position)
-
     @server.feature(types.TEXT_DOCUMENT_COMPLETION, types.CompletionOptions(trigger_characters=[*'".=[{ ']))
     def complete(params: types.CompletionParams) -> list[types.CompletionItem]:
-        text, offset = at(params)
+        text, offset = server.at(params)
 
         def shown(word: answers.Word, span: Span, written: str) -> types.CompletionItem:
             edit, detail = (
@@ -170,7 +158,7 @@ def _answer(server: Server) -> None:
 
     @server.feature(types.TEXT_DOCUMENT_HOVER)
     def hover(params: types.HoverParams) -> types.Hover | None:
-        text, offset = at(params)
+        text, offset = server.at(params)
         answer = answers.explain(text, offset)
         # As plain text: descriptions may be of others, and are no markup.
         content = types.MarkupContent(types.MarkupKind.PlainText, answer[0]) if answer else None
@@ -178,7 +166,7 @@ def _answer(server: Server) -> None:
 
     @server.feature(types.TEXT_DOCUMENT_DEFINITION)
     def define(params: types.DefinitionParams) -> types.Location | None:
-        text, offset = at(params)
+        text, offset = server.at(params)
         if (found := answers.definition(text, offset)) is None:
             return None
         path, line, column, length = found
@@ -205,12 +193,11 @@ def _change(server: Server) -> None:
 
     @server.feature(types.TEXT_DOCUMENT_RENAME)
     def rename(params: types.RenameParams) -> types.WorkspaceEdit:
-        uri, text = params.text_document.uri, server.text(params.text_document.uri)
+        text, offset = server.at(params)
         try:
-            changes = renamed(text, server.offset(text, params.position), params.new_name)
+            return server.edits(text, params.text_document.uri, renamed(text, offset, params.new_name))
         except ModelicaLikeError as error:
             raise JsonRpcInvalidParams(str(error)) from None
-        return server.edits(text, uri, changes)
 
     @server.feature(types.TEXT_DOCUMENT_CODE_ACTION, types.CodeActionOptions([types.CodeActionKind.QuickFix]))
     def fixes(params: types.CodeActionParams) -> list[types.CodeAction]:
@@ -236,4 +223,7 @@ def serve(version: str) -> None:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     sys.stdout = sys.stderr
-    make_server(version).start_io(sys.stdin.buffer, out)
+    server = Server(version)
+    for register in (_watch, _answer, _change):
+        register(server)
+    server.start_io(sys.stdin.buffer, out)

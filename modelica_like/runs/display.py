@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.errors import UnitError, UnknownName, did_you_mean
+from modelica_like.errors import UnitError, unknown_name
 from modelica_like.language.units import Unit, parse_unit, same_dimension
 
 QUANTITIES = {
@@ -48,8 +48,8 @@ class Display:
             fitting = [path for path in self._own if path == key or fnmatchcase(path, key)]
             if not fitting:
                 quantities = [*self._own, *QUANTITIES.values()]
-                near = did_you_mean(key, quantities) or "."
-                raise UnknownName(f"{model.name} has no variable or quantity '{key}' to show in {text}{near}")
+                what = f"{model.name} has no variable or quantity '{key}' to show in {text}"
+                raise unknown_name(what, key, quantities)
             if key in self._own:
                 _check(key, self._own[key], unit)
             same = {path: text for path in fitting if _fits(self._own[path], unit)}

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from modelica_like.analyse.sizing.formulas import Value
-from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.errors import NetlistError, unknown_name
 from modelica_like.language.units import parse_unit
 from modelica_like.runs.readings import read_output
 
@@ -40,8 +40,9 @@ def load_of(run: Solution, key: Any, what: str = "peak") -> float:
 
 def _name(path: str, what: str) -> str:
     if what not in READERS:
-        raise UnknownName(f"A load cannot be the '{what}' of a trajectory{did_you_mean(what, READERS) or '.'} "
-                          f"It can be {', '.join(READERS)}.")  # fmt: skip
+        raise unknown_name(
+            f"A load cannot be the '{what}' of a trajectory", what, READERS, f" It can be {', '.join(READERS)}."
+        )
     return READERS[what].format(path)
 
 
@@ -57,8 +58,7 @@ class Simulations:
         """Return the load of a table with `from`, a reading (`peak = "clutch.tau"`), `until` and `set`."""
         for key in table:
             if key not in _KEYS:
-                hint = did_you_mean(key, _KEYS) or "."
-                raise UnknownName(f"A load of a simulation has no '{key}'{hint} It has {', '.join(_KEYS)}.")
+                raise unknown_name(f"A load of a simulation has no '{key}'", key, _KEYS, f" It has {', '.join(_KEYS)}.")
         wanted = [key for key in table if key in READERS]
         if len(wanted) != 1 or not isinstance(table.get("from"), str) or not isinstance(table[wanted[0]], str):
             raise NetlistError(

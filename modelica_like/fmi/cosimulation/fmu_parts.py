@@ -7,7 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, did_you_mean, raise_together_or_one
+from modelica_like.errors import (
+    ModelicaLikeError,
+    NetlistError,
+    UnknownName,
+    did_you_mean,
+    raise_together_or_one,
+    unknown_name,
+)
 from modelica_like.fmi.cosimulation.described import DescribedFmu, check_units, described
 from modelica_like.fmi.cosimulation.system import Link, Port, Settings, System, Unit, check_system, find_bonds
 from modelica_like.fmi.export import export_fmu
@@ -137,7 +144,7 @@ class _Joiner:
     def _variable(self, fmu: str, name: str) -> Any:
         variables = self.about[fmu].variables
         if name not in variables:
-            raise UnknownName(f"{fmu} has no variable '{name}'{did_you_mean(name, variables) or '.'}")
+            raise unknown_name(f"{fmu} has no variable '{name}'", name, variables)
         return variables[name]
 
     def _refuse_other_mentions(self) -> None:
@@ -218,7 +225,7 @@ class _Joiner:
                 "other.",
                 advice="Put an adaptor on it, such as TorqueToAngleAdaptor, and connect its signals.",
             )  # fmt: skip
-        raise UnknownName(f"{owner.label} has no signal '{name}'{did_you_mean(name, owner.fields) or '.'}")
+        raise unknown_name(f"{owner.label} has no signal '{name}'", name, owner.fields)
 
 
 def _part(path: str) -> str:

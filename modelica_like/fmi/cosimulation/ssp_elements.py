@@ -11,7 +11,7 @@ from urllib.parse import unquote, urlsplit
 
 import lxml.etree as etree
 
-from modelica_like.errors import DuplicateName, NetlistError, Source, UnknownName, did_you_mean
+from modelica_like.errors import DuplicateName, NetlistError, Source, unknown_name
 from modelica_like.fmi.cosimulation.described import BASE_UNITS, UnitDefinition
 from modelica_like.fmi.cosimulation.ssp_document import FMU_TYPE, NAMES
 from modelica_like.fmi.unpack import refuse_document_type
@@ -65,8 +65,7 @@ class Element:
     def check_connector(self, name: str, place: Source) -> None:
         """Refuse a connector that it does not have."""
         if name not in self.connectors:
-            hint = did_you_mean(name, self.connectors) or "."
-            raise UnknownName(f"{self.label} has no connector '{name}'{hint}", where=place)
+            raise unknown_name(f"{self.label} has no connector '{name}'", name, self.connectors, where=place)
 
 
 class Files:

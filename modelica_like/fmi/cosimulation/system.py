@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, NamedTuple, get_args
 
-from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, did_you_mean, raise_together_or_one
+from modelica_like.errors import ModelicaLikeError, NetlistError, raise_together_or_one, unknown_name
 
 Master = Literal["jacobi", "gauss-seidel"]
 Inputs = Literal["hold", "linear"]
@@ -119,8 +119,7 @@ class Settings:
 
 def _check_word(what: str, name: str, words: Sequence[str]) -> None:
     if name not in words:
-        hint = did_you_mean(name, words) or "."
-        raise UnknownName(f"There is no {what} '{name}'{hint}", advice=f"There are {' and '.join(words)}.")
+        raise unknown_name(f"There is no {what} '{name}'", name, words, advice=f"There are {' and '.join(words)}.")
 
 
 @dataclass(frozen=True)
@@ -152,9 +151,7 @@ def check_system(system: System) -> None:
     unit_names = [unit.name for unit in system.units]
     for port in (port for link in system.links for port in (link.source, *link.targets)):
         if port.unit not in unit_names:
-            errors.append(
-                UnknownName(f"{system.name} has no FMU '{port.unit}'{did_you_mean(port.unit, unit_names) or '.'}")
-            )
+            errors.append(unknown_name(f"{system.name} has no FMU '{port.unit}'", port.unit, unit_names))
     driven: dict[Port, str] = {}
     for name, target in ((link.name, target) for link in system.links for target in link.targets):
         if target in driven:
@@ -163,8 +160,7 @@ def check_system(system: System) -> None:
     names = [link.name for link in system.links]
     for bond in system.bonds:
         for name in {bond.flow, bond.rate} - set(names):
-            hint = did_you_mean(name, names) or "."
-            errors.append(UnknownName(f"{system.name}: bond {bond.name} names no connection '{name}'{hint}"))
+            errors.append(unknown_name(f"{system.name}: bond {bond.name} names no connection '{name}'", name, names))
     if errors:
         raise raise_together_or_one(errors)
 
