@@ -72,7 +72,7 @@ class ModelicaLikeError(Exception):
         place = first.as_json(self.word)
         # Only a file of data can be changed by an operation; a place in Python has no statement.
         suggestion = {**self.operation, "file": first.file} if self.operation and first.statement else None
-        if self.instead and first.has(self.word):
+        if self.instead and first.spot(self.word):
             spot = {key: place[key] for key in ("file", "line", "column", "length")}
             suggestion = {"operation": "replace", **spot, "old": self.word, "new": self.instead}
         texts = {"what": self.what, "why": self.why, "advice": self.advice}

@@ -40,28 +40,19 @@ class Source:
         text = self.text if len(self.text) <= SHOWN else f"{self.text[: SHOWN - 1]}…"
         return f"{place} `{text}`" if text else place
 
-    def spot(self, word: str) -> tuple[int, int, int]:
-        """Return line, column and length of a word in the key and its value, or in the statement, if it is there once.
-
-        Otherwise these are line, column and length of the key and its value.
-        """
+    def spot(self, word: str) -> tuple[int, int, int] | None:
+        """Return line, column and length of a word in key and value, or in the statement, if it is there once."""
         begin = max(self.column - 1, 0)
         for first, last in ((begin, begin + self.length), (0, len(self.statement))) if word else ():
             matches = [*_places(word, self.statement[first:last])]
             if len(matches) == 1:
                 before = self.statement[: first + matches[0]]
                 return self.line + before.count("\n"), len(before) - before.rfind("\n"), len(word)
-        return self.line, self.column, self.length
-
-    def has(self, word: str) -> bool:
-        """Tell whether `spot` is the place of the word."""
-        line, column, length = self.spot(word)
-        begin = self.statement.split("\n")[line - self.line][max(column - 1, 0) :]
-        return bool(column) and length == len(word) and begin.startswith(word)
+        return None
 
     def as_json(self, word: str = "") -> dict[str, Any]:
         """Return the place, or that of a word in it, as data for JSON; what is not known is None."""
-        line, column, length = self.spot(word)
+        line, column, length = self.spot(word) or (self.line, self.column, self.length)
         known = {"line": line, "column": column, "length": length, "path": self.path}
         return {"file": self.file or None, **{key: value or None for key, value in known.items()}}
 

@@ -41,9 +41,14 @@ class Lines:
 
     def within(self, *path: str) -> Source:
         """Return the place of a key that may be in a table in braces; see `source`."""
-        source, entry = self.source(*path), self.outline.entry(path)
-        line, column, length = self.outline.span(entry) if entry else (0, 0, 0)
-        return replace(source, column=column, length=length) if line == source.line else source
+        source, known = self.source(*path), self.outline.by_path
+        entry = known.get(path) or known.get((*path[:-1], *path[-1].split(".")))
+        line, column = self.outline.position(entry.begin) if entry else (0, 0)
+        if entry is None or line != source.line:
+            return source
+        return replace(
+            source, column=column, length=len(self.outline.read((entry.begin, entry.end)).partition("\n")[0])
+        )
 
     def line(self, number: int, path: str = "") -> Source:
         """Return a line as a place, with its text, and the path of a key in it."""

@@ -74,10 +74,6 @@ class Outline:
     def _begins(self) -> list[int]:
         return [0, *(match.end() for match in re.finditer("\n", self.text))]
 
-    def entry(self, path: Path) -> Entry | None:
-        """Return the entry of a path; its last name may have dots."""
-        return self.by_path.get(path) or self.by_path.get((*path[:-1], *path[-1].split(".")) if path else path)
-
     def position(self, offset: int) -> tuple[int, int]:
         """Return line and column, both from one."""
         line = bisect_right(self._begins, offset)
@@ -87,11 +83,6 @@ class Outline:
         """Return the offset of a line and a column, both from one."""
         begin = self._begins[min(line, len(self._begins)) - 1]
         return min(begin + column - 1, len(self.text))
-
-    def span(self, entry: Entry) -> tuple[int, int, int]:
-        """Return line, column and length of an entry, as far as it is on its first line."""
-        line, column = self.position(entry.begin)
-        return line, column, len(self.text[entry.begin : entry.end].partition("\n")[0])
 
     def at(self, offset: int) -> list[Entry]:
         """Return the entries around a place, the innermost first."""
