@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path as File
 from typing import Any
@@ -110,13 +110,22 @@ def side(sheet: Sheet, name: str, outlet: bool) -> Connector:
 
 
 def fit(sheet: Sheet, left: str, right: str) -> bool:
-    """Return whether two parts can follow each other in a series; parts that cannot be made can."""
-    try:
-        return type(side(sheet, left, True)) is type(side(sheet, right, False))
-    except UnknownName:
-        return False
-    except ModelicaLikeError:
-        return True
+    """Return whether two parts can follow each other in a series; parts that cannot be created can."""
+    return _holds((UnknownName, WrongConnection), check_series, sheet, left, right)
+
+
+def joins(sheet: Sheet, ends: Sequence[str]) -> bool:
+    """Return whether ends make a connection; ends of parts that cannot be created do."""
+    return _holds((WrongConnection,), check_connections, sheet, [ends])
+
+
+def _holds(refusals: tuple[type[ModelicaLikeError], ...], check: Callable[..., None], *args: Any) -> bool:
+    with suppress(ModelicaLikeError):
+        try:
+            check(*args)
+        except refusals:
+            return False
+    return True
 
 
 def check_series(sheet: Sheet, left: str, right: str) -> None:
@@ -133,17 +142,6 @@ def check_connections(sheet: Sheet, lines: Sequence[Sequence[str]]) -> None:
     wiring.check_signal_units()
     if wiring.errors:
         raise raise_together_or_one(wiring.errors)
-
-
-def joins(sheet: Sheet, ends: Sequence[str]) -> bool:
-    """Return whether ends still make a connection; ends of parts that cannot be created do."""
-    try:
-        check_connections(sheet, [ends])
-    except WrongConnection:
-        return False
-    except ModelicaLikeError:
-        return True
-    return True
 
 
 def is_output(sheet: Sheet, end: str) -> bool:

@@ -71,7 +71,7 @@ def keys(sheet: Sheet, *sections: str) -> Iterator[Key]:
 
 def is_path(key: Key) -> bool:
     """Return whether a key of [display] is a path, and no quantity."""
-    return "." in key.name or len(key.path) > 2
+    return key.entry is None or "." in key.name or len(key.path) > 2
 
 
 def formulas(sheet: Sheet, name: str = "") -> Iterator[tuple[Entry, str, list[Span]]]:
@@ -149,6 +149,8 @@ def drop_ends(sheet: Sheet, goes: Callable[[str], bool], *sections: str) -> list
             sheet.delete_items(line.array, gone)
         elif gone:
             sheet.delete([line.path])
+            if len(kept) > 1:
+                sheet.notes.append(f"{', '.join(kept)} are not connected any more.")
     return dropped
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, cast
 
 from modelica_like.arguments import checked
@@ -65,13 +66,10 @@ def set(sheet: Sheet, path: str, value: Any, *, section: str | None = None) -> N
         UnknownName: there is no such part, value or section.
         ModelicaLikeError: the value is wrong.
     """
-    data, before = _plain(value), _errors(sheet, path, section)
+    data = _plain(value)
     key = find_key(sheet, path, section) or _new_key(sheet, path, section)
-    sheet.write(key, data)
-    sheet.commit()
-    after = _errors(sheet, path, str(key[0]) if section is not None or key[0] == "parameters" else None, key)
-    if len(after) > len(before):
-        raise after[-1]
+    with _no_new_error(sheet, path, section, key):
+        sheet.write(key, data)
 
 
 @checked
@@ -87,20 +85,16 @@ def unset(sheet: Sheet, path: str, *, section: str | None = None) -> None:
         UnknownName: there is no such value in the netlist.
         NetlistError: a part cannot be without it.
     """
-    before = _errors(sheet, path, section)
     key = find_key(sheet, path, section)
     if key is None:
-        known = sheet.table("parameters") if section is None else sheet.table(section)
+        known = sheet.table(section or "parameters")
         where = f"[{section}]" if section else "The netlist"
         raise UnknownName(f"{where} has no value for '{path}'{did_you_mean(path, known) or '.'}")
     if key[0] == "parameters":
-        users = [".".join(map(str, entry.path[1:])) for entry, _, _ in formulas(sheet, path) if entry.path != key]
+        users = [joined(entry.path[1:]) for entry, _, _ in formulas(sheet, path) if entry.path != key]
         sheet.notes += [f"{', '.join(users)} still use{'s' * (len(users) == 1)} {path}."] if users else []
-    sheet.delete([key])
-    sheet.commit()
-    after = _errors(sheet, path, section)
-    if len(after) > len(before):
-        raise after[-1]
+    with _no_new_error(sheet, path, section):
+        sheet.delete([key])
 
 
 def find_key(sheet: Sheet, path: str, section: str | None) -> Path | None:
@@ -158,28 +152,30 @@ def table_of(sheet: Sheet, name: str) -> Path:
 def _errors(sheet: Sheet, path: str, section: str | None, key: Path = ()) -> list[ModelicaLikeError]:
     """Return what is wrong with a part, or with a section."""
     errors: list[ModelicaLikeError] = []
-    if section is not None or "." not in path:
-        name = path if section == "" else section or "parameters"
-        if name in sheet.data:
-            read_sections({name: sheet.data[name]}, "A netlist", READERS, sheet.lines, errors)
-        if name == "parameters" and not errors and path in sheet.table(name):
-            errors += _wrong_parameter(sheet, path)
-        return errors
+    is_in_part = section is None and "." in path
+    name = path if section == "" else section or "parameters"
+    if name in sheet.data and not is_in_part:
+        read_sections({name: sheet.data[name]}, "A netlist", READERS, sheet.lines, errors)
     try:
-        start = {path: sheet.table("start").get(path)} if key[:1] == ("start",) else {}
-        assembly(sheet, [path], {key: value for key, value in start.items() if value is not None})
+        if is_in_part:
+            start = sheet.table("start") if key[:1] == ("start",) else {}
+            assembly(sheet, [path], {given: value for given, value in start.items() if given == path})
+        elif name == "parameters" and path in sheet.table(name) and not errors:
+            Assembly("netlist").add_parameter(path, sheet.table(name)[path])
     except ModelicaLikeError as error:
+        error.where = error.where if is_in_part else (sheet.source((name, path)),)
         errors += getattr(error, "errors", [error])
     return errors
 
 
-def _wrong_parameter(sheet: Sheet, name: str) -> list[ModelicaLikeError]:
-    try:
-        Assembly("netlist").add_parameter(name, sheet.table("parameters")[name])
-    except ModelicaLikeError as error:
-        error.where = (sheet.source(("parameters", name)),)
-        return [error]
-    return []
+@contextmanager
+def _no_new_error(sheet: Sheet, path: str, section: str | None, key: Path = ()) -> Iterator[None]:
+    """Refuse a change by which something else is wrong than before."""
+    before = len(_errors(sheet, path, section))
+    yield
+    sheet.commit()
+    if len(after := _errors(sheet, path, section, key)) > before:
+        raise after[-1]
 
 
 def part_texts(sheet: Sheet, name: str, new: str) -> tuple[str, str]:

@@ -135,6 +135,21 @@ def test_every_place_follows_a_name() -> None:
     ]  # fmt: skip
 
 
+def test_tables_of_a_part_in_other_sections_follow() -> None:
+    text = 'parts.a.is = "Inertia"\nparts.a.J = 1\n[start.a]\nw = 1\n[display.a]\nw = "rpm"\n'
+    assert edit.rename(text, "a", "b") == text.replace("a.is", "b.is").replace("a.J", "b.J").replace(".a]", ".b]")
+    assert edit.remove(text, "a") == ""
+
+
+def test_signals_without_a_source_go() -> None:
+    text = '[parts]\na = { is = "Sine" }\ng = { is = "Gain" }\nh = { is = "Gain" }\n'
+    text += '[connect]\nx = ["a.y", "g.u", "h.u"]\n'
+    result = apply(text, {"op": "remove", "name": "a"})
+    assert result.text == text.replace('a = { is = "Sine" }\n', "").replace('x = ["a.y", "g.u", "h.u"]\n', "")
+    assert result.notes == ("g.u, h.u are not connected any more.",)
+    assert edit.disconnect(text, "g.u", "a.y") == text.replace('"g.u", ', "")
+
+
 def test_units_texts_and_modes_are_no_names() -> None:
     text = """\
 description = "N of m stuck"

@@ -5,8 +5,10 @@
 
 import os
 import random
+import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from random_edits import Chooser
@@ -18,6 +20,15 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLISTS = sorted(path for path in EXAMPLES.rglob("*.toml") if "sizing" not in path.parts)
 SLOW = int(os.environ.get("RANDOM_EDITS", "1000"))
 STEPS = 30
+
+
+def named(data: dict[str, Any]) -> set[str]:
+    """Return the parts that ends, series and paths of start values name."""
+    lines = [*data.get("series", {}).values(), *data.get("connect", {}).values(), data.get("free", [])]
+    texts = [text for line in lines for text in (line if isinstance(line, list) else [])]
+    texts += data.get("expose", {}).values()
+    texts += [f"{path}." for path, value in data.get("start", {}).items() if "." in path or isinstance(value, dict)]
+    return {re.split(r"[.\[]", text)[0] for text in texts if isinstance(text, str)}
 
 
 def edited(path: Path, seed: int) -> int:
@@ -36,7 +47,9 @@ def edited(path: Path, seed: int) -> int:
         # A refusal for the text that an operation would write is a fault of the operation.
         assert not any(words in refusal for words in ("is not TOML", "declared twice")), request
         assert document.text == texts[-1]
-        tomllib.loads(document.text)
+        data = tomllib.loads(document.text)
+        if not refusal and request["op"] in ("remove", "rename"):
+            assert request.get("name", request.get("old")) not in named(data), request
         assert all(isinstance(problem, ModelicaLikeError) and str(problem) for problem in document.problems())
     for text in reversed(texts[:-1]):
         assert document.undo().text == text
