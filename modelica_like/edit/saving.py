@@ -9,6 +9,7 @@ from typing import Any
 from modelica_like.edit.sheet import Sheet
 from modelica_like.edit.tree import Path, joined
 from modelica_like.errors import ModelicaLikeError
+from modelica_like.garbage import without_garbage_search
 from modelica_like.language import Assembly
 from modelica_like.language.inside import inside
 from modelica_like.netlist.read import loads
@@ -17,6 +18,7 @@ from modelica_like.netlist.write import sections
 _GONE = object()
 
 
+@without_garbage_search()
 def rewritten(drive: Assembly, path: str | File) -> str | None:
     """Return the text from which a drive was read, with what has changed since.
 
@@ -35,7 +37,8 @@ def rewritten(drive: Assembly, path: str | File) -> str | None:
     sheet = Sheet(inside(drive).text, str(origin))
     try:
         _change(sheet, sections(loads(sheet.text, str(origin)), origin.parent), wanted)
-        if sections(loads(sheet.text, str(origin)), origin.parent) != wanted:
+        changed = sheet.text != inside(drive).text
+        if changed and sections(loads(sheet.text, str(origin)), origin.parent) != wanted:
             return None
         wanted[""]["name"] = sheet.data.get("name", File(path).stem)
         _change(sheet, wanted, moved)

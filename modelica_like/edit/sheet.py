@@ -77,6 +77,8 @@ class Sheet:
         """Make all changes."""
         for name, lines in self._sections.items():
             self._add_section(name, lines)
+        if not self._changes:
+            return
         pieces: list[str] = []
         position = 0
         for start, end, text in sorted(self._changes, key=lambda change: change[:1]):

@@ -271,8 +271,8 @@ def test_a_document_is_edited_undone_and_done_again(tmp_path: Path) -> None:
 def test_paths_in_a_sizing_file_are_told(tmp_path: Path) -> None:
     (tmp_path / "checks.toml").write_text('[checks.x]\ntorque = { from = "drive.toml", peak = "shaft.tau" }\n')
     text = 'sizing = "checks.toml"\n' + TEXT
-    told = ("'checks.toml' uses shaft.tau: change that there.",)
+    notes = ("'checks.toml' uses shaft.tau: change that there.",)
     file = tmp_path / "drive.toml"
-    assert apply(text, {"op": "rename", "old": "shaft", "new": "rod"}, file=file).notes == told
-    assert apply(text, {"op": "remove", "name": "shaft"}, file=file).notes == told
+    assert apply(text, {"op": "rename", "old": "shaft", "new": "rod"}, file=file).notes == notes
+    assert apply(text, {"op": "remove", "name": "shaft"}, file=file).notes == notes
     assert apply(text, {"op": "remove", "name": "sine"}, file=file).notes == ()
