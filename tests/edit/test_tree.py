@@ -10,15 +10,15 @@ from modelica_like.edit.sheet import Sheet
 from modelica_like.edit.tree import Tree, decoded
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-HARD = (
-    r'''# a comment with = and [brackets]
+HARD = r'''# a comment with = and [brackets]
 name = "a = [b] # no comment" # one
-"quoted.key" = 'C:\path' ; text = """
+"quoted.key" = 'C:\path'
+text = """
 x = 1 \
    # no comment
-"""" 
-'''.replace(" ; ", "\n").replace('"""" ', '""""')
-    + r"""
+""""
+'''
+HARD += r"""
 plain = '''
 'quoted' ''two'' '''
 escaped = "\"\\\u00e4\t" 	# tab
@@ -46,7 +46,6 @@ m = 3
 [[rows.more]]
 m = 4
 """
-)
 
 
 def at(data: Any, path: tuple[str | int, ...]) -> Any:
