@@ -156,7 +156,8 @@ class Tree:
                 value.items.append(self._value((*path, len(value.items))))
             else:
                 self._entry(path, value)
-            self._at += self.text[self._skip()] == ","
+            after = self._skip()
+            self._at = after + (self.text[after] == ",")
         self._at += 1
         value.end = self._at
         return value

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from random_edits import Chooser
 
-from modelica_like.edit import Document
+from modelica_like.edit import Document, apply
 from modelica_like.errors import ModelicaLikeError
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -66,3 +66,36 @@ def test_random_edits(seeds: range) -> None:
     order = random.Random(1).sample(NETLISTS, len(NETLISTS))
     done = sum(edited(order[seed % len(order)], seed) for seed in seeds)
     assert done > 0.3 * STEPS * len(seeds)
+
+
+def spaced(text: str, chooser: random.Random) -> str:
+    """Return a text with blanks, comments and line breaks where they mean nothing."""
+    data = tomllib.loads(text)
+    for _ in range(8):
+        place = text.find(chooser.choice(",=[]{}.\n "), chooser.randrange(len(text)))
+        added = chooser.choice([" ", "  ", "\t", "\n", " # x\n", ","])
+        other = text[:place] + added + text[place:] if place > 0 else text
+        try:
+            text = other if tomllib.loads(other) == data else text
+        except tomllib.TOMLDecodeError:
+            continue
+    return text
+
+
+def outcome(text: str, request: dict[str, Any], path: Path) -> Any:
+    """Return the content that an operation leaves, or the first line of its refusal."""
+    try:
+        return tomllib.loads(apply(text, request, file=path).text)
+    except ModelicaLikeError as error:
+        return error.what
+
+
+@pytest.mark.parametrize(
+    "seeds", [pytest.param(range(100), id="some"), pytest.param(range(100, 4 * SLOW), id="all", marks=pytest.mark.slow)]
+)
+def test_layout_has_no_meaning(seeds: range) -> None:
+    for seed in seeds:
+        chooser, path = random.Random(seed), NETLISTS[seed % len(NETLISTS)]
+        request = Chooser(Document(path), seed).request()
+        text = path.read_bytes().decode()
+        assert outcome(spaced(text, chooser), request, path) == outcome(text, request, path), (path, request)

@@ -30,7 +30,7 @@ none = {}
 nested = [ [1, 2], # one
   [ 3 , "]" ] , # two
 ]
-a.b."c d".e = { f.g = 1, h = [{ i = "}" }, {}], j = 'x' }
+a.b."c d".e = { f.g = "1" , h = [{ i = "}" }, {}], j = 'x' }
 
   [ parts . "sub table" ] # a header
   x = 1
@@ -79,6 +79,9 @@ def check(text: str) -> None:
         # Line breaks of Windows count as one character to the reader.
         written = text[entry.value.start : entry.value.end].replace("\r\n", "\n")
         assert decoded(written) == at(data, path), path
+        assert [decoded(text[item.start : item.end]) for item in entry.value.items or []] == (
+            at(data, path) if entry.value.items else []
+        )
         assert [*map(decoded_name, entry.names, [text] * len(entry.names))] == [*path[len(path) - len(entry.names) :]]
     missing = {leaf for leaf in leaves(data) if leaf not in tree.entries}
     assert all(any(leaf[:k] in tree.entries for k in range(len(leaf))) for leaf in missing), missing
