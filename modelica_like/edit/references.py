@@ -32,7 +32,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key that is a path, or that is the name of a part."""
+    """A key, or a header (no entry), that names a part: `name` stands at `span`, and may be a path in quotes."""
 
     entry: Entry | None
     path: Path

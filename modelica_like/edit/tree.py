@@ -26,7 +26,7 @@ _GAP = re.compile(r"[ \t]*")
 
 @dataclass(slots=True)
 class Value:
-    """A value as written."""
+    """A value as written, from `start` to `end`; a list has items, an inline table entries."""
 
     start: int
     end: int
@@ -36,7 +36,7 @@ class Value:
 
 @dataclass(slots=True)
 class Entry:
-    """A key with its value."""
+    """A key with its value; `names` tells where the names of the key stand, without those of tables around it."""
 
     path: Path
     names: list[Span]
@@ -51,7 +51,7 @@ class Entry:
 
 @dataclass(slots=True)
 class Section:
-    """A table with a header, or what stands before the first header."""
+    """A table with a header, whose line goes from `start` to `end`, or what stands before the first header."""
 
     path: Path
     names: list[Span]
@@ -62,7 +62,7 @@ class Section:
 
 @dataclass(slots=True)
 class Home:
-    """Where another key of a table is to be written."""
+    """Where another key of a table is to be written: without its first `depth` names, behind the key `after`."""
 
     owner: Section | Value
     depth: int
