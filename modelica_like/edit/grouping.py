@@ -8,6 +8,7 @@ from pathlib import Path as File
 from typing import Any
 
 from modelica_like.arguments import checked
+from modelica_like.edit import asked
 from modelica_like.edit import references as ref
 from modelica_like.edit.parts import assembly, head, is_output, require_new, require_part, side
 from modelica_like.edit.sheet import Sheet
@@ -79,6 +80,7 @@ class _Group:
         for key in ref.keys(outer, *ref.KEYED):
             if self._has(key.name) and ref.is_path(key):
                 outer.rename(key.span, f"{self.name}.{key.name}")
+        asked.rename(outer, lambda path: f"{self.name}.{path}" if self._has(path) else path)
         parts = [(name, *part_texts(outer, name, name)) for name in self.names]
         table = f"{{ {', '.join(f'{key} = {text}' for key, text in self.given.items())} }}"
         if ("parts", self.names[0]) in outer.tree.entries and parts[0][1]:

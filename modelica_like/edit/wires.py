@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from modelica_like.arguments import checked
+from modelica_like.edit import asked
 from modelica_like.edit import references as ref
 from modelica_like.edit.parts import (
     assembly,
@@ -236,7 +237,7 @@ def remove(sheet: Sheet, name: str) -> None:
     for entry, text, _ in ref.formulas(sheet, name):
         if not any(entry.path[: len(path)] == path for path in gone):
             sheet.notes.append(f"{joined(entry.path[1:])} = '{text}' still uses {name}.")
-    sheet.notes += ref.in_other_files(sheet, name)
+    sheet.notes += [*asked.users(sheet, name), *ref.in_other_files(sheet, name)]
     sheet.delete(gone)
     sheet.commit()
 
@@ -269,6 +270,7 @@ def rename(sheet: Sheet, old: str, new: str) -> None:
         sheet.notes += ref.in_other_files(sheet, old)
     for entry, text, places in ref.formulas(sheet, old):
         sheet.rewrite(entry.value, ref.renamed(text, places, lambda path: new + path[len(old) :]))
+    asked.rename(sheet, lambda path: new + path[len(old) :] if head(path) == old else path)
     sheet.commit()
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from modelica_like.errors import DuplicateName, ModelicaLikeError, NetlistError, UnknownName
-from modelica_like.language.formula import CONSTANTS
+from modelica_like.language.formula import CONSTANTS, name_places
 from modelica_like.language.units import read_quantity
 from modelica_like.lsp.names import Names
 from modelica_like.lsp.text import Text, word_at
@@ -17,6 +17,7 @@ from modelica_like.netlist.outline import Entry, Span
 Edit = tuple[Span, str]
 """A place in the text, and what is written there."""
 _DECLARED = ("parts", "parameters")
+_ASKED = ("optimize", "tolerances")
 _NAME = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -54,6 +55,9 @@ def _uses(text: Text, name: str) -> list[Span]:
 
 def _in_entry(text: Text, entry: Entry, name: str) -> Iterator[Span]:
     section, read = entry.path[0], text.outline.read
+    if section in _ASKED:
+        yield from _in_question(text, entry, name)
+        return
     index = 1 - (len(entry.path) - len(entry.names))  # of a part's name among the names of the key
     if section in (*_DECLARED, "start", "guess", "display") and 0 <= index < len(entry.names):
         begin, _ = entry.names[index]
@@ -67,6 +71,19 @@ def _in_entry(text: Text, entry: Entry, name: str) -> Iterator[Span]:
     elif section in (*_DECLARED, "start", "guess") and name in value and _is_formula(text, entry):
         for match in re.finditer(rf"(?<![\w.])(?<!\d ){re.escape(name)}(?!\w)(?!\s*\()", value):
             yield begin + match.start(), begin + match.end()
+
+
+def _in_question(text: Text, entry: Entry, name: str) -> Iterator[Span]:
+    """Yield the places in [optimize] and [tolerances]: keys that are paths, and texts that are outputs."""
+    read = text.outline.read
+    for begin, end in entry.names:
+        if head(read((begin, end))) == name:
+            yield begin, begin + len(name)
+    value, (begin, _) = read(entry.value), entry.value
+    if begin and text.text[begin] not in "[{" and text.text[begin - 1] in "\"'":
+        for start, end in name_places(value):
+            if head(value[start:end]) == name:
+                yield begin + start, begin + start + len(name)
 
 
 def _is_formula(text: Text, entry: Entry) -> bool:

@@ -80,6 +80,20 @@ m = "motor.flange"
     )
 
 
+def test_what_is_asked_of_a_drive_follows():
+    drive = """[parts]
+a = { is = "Inertia", J = 1 }
+[optimize]
+minimize = "max(peak(a.w), a.phi)"
+free = { "a.J" = [1, 2] }
+[tolerances]
+"a.J" = "±5 %"
+correlated = [{ of = ["a.J", "b.J"], rho = 0.5 }]
+"""
+    edits = renamed(Text(Path("drive.toml"), drive), drive.index("a ="), "rotor")
+    assert changed(drive, edits) == drive.replace("a.", "rotor.").replace("a =", "rotor =")
+
+
 def test_words_that_are_no_names_stay():
     drive = """[parameters]
 stuck = 1
