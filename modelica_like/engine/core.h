@@ -123,6 +123,7 @@ Result reach_instant(Instance *c);
 Result leave_instant(Instance *c, int happened);
 /* events.c */
 double just_after(const State *s);
+int at_located_event(const State *s);
 int is_source(const Instance *c, const Transition *one);
 int guard_active(const Instance *c, int guard);
 int has_fixed_moments(const Model *m);

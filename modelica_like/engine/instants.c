@@ -227,10 +227,10 @@ static void stop_back(Instance *c, const Record *at) {
  * 0 if the time is given, and nan if nothing tells how it moves. */
 static double find_cause(Instance *c, double *slope) {
     const Model *m = c->model;
-    const unsigned char *wanting = c->state.event_pending ? c->wanting : nothing_wanting(c);
+    const unsigned char *wanting = at_located_event(&c->state) ? c->wanting : nothing_wanting(c);
     double rate = -1;
     int k = 0;
-    if (!c->state.event_pending) find_wanting(c, c->wishes, 0);
+    if (!at_located_event(&c->state)) find_wanting(c, c->wishes, 0);
     while (k < m->n_transitions && !wanting[k]) k++;
     if (k == m->n_transitions || c->state.n_steps == 0 || !factor_implicit(c)) return 0;
     const Transition *cause = &m->transitions[k];

@@ -271,10 +271,13 @@ static int was_idle(Instance *c, int ticks) {
     return idle;
 }
 
+/* Is this the instant of an event that was located? The present piece may also end at one that is still to come. */
+int at_located_event(const State *s) { return s->event_pending && s->at_event; }
+
 static Result pass_event(Instance *c) {
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
-    int located = s->event_pending, ticks = !located && (c->model->n_moments > 0 || delays_due(c));
+    int located = at_located_event(s), ticks = !located && (c->model->n_moments > 0 || delays_due(c));
     size_t size = (size_t)c->model->n_x * sizeof(double);
     double *rates = c->first_rates, step = s->step, events = s->n_events;
     int panel_valid = s->panel_valid;

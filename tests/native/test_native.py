@@ -31,6 +31,7 @@ from modelica_like.language import (
     Variable,
     der,
     discrete,
+    integer,
     param,
     pre,
     sin,
@@ -263,6 +264,34 @@ def test_steps_and_going_back():
     assert np.array_equal(*ends)
     handle.inputs[0] = 5256.25
     assert not np.array_equal(handle.step(0.6), ends[0])
+
+
+class Stairs(Component):
+    """Counts every 0.3 that x rises, and keeps the time of the last count."""
+
+    rate: Parameter = param("1/s", "rate", default=1.0)
+    x: Variable = var("1", "rises", default=0)
+    n: Discrete = integer("counts")
+    last: Discrete = discrete("s", "time of the last count")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate
+
+    def events(self) -> Events:
+        yield when(self.x > 0.3 * (pre(self.n) + 1), {self.n: pre(self.n) + 1, self.last: self.time})
+
+
+@pytest.mark.parametrize("begin", np.arange(0.05, 1.0, 0.1))
+def test_a_run_from_the_middle_of_a_step_does_not_hurry_its_event(begin):
+    """A step to the next event has been done when the run begins before it."""
+    drive = build(Stairs()).native(outputs=["n", "last"])
+    drive.reset(until=1.0)
+    drive.step(begin)
+    times, values = drive.run(1.0, points=4)
+    counts = np.array([int(t / 0.3 + 1e-9) for t in times])
+    away = np.min(np.abs(times[:, None] - 0.3 * np.arange(1, 4)), axis=1) > 1e-6
+    assert values[away, 0].tolist() == counts[away].tolist()
+    assert values[away, 1] == pytest.approx(0.3 * counts[away], abs=1e-9)
 
 
 def test_tuned_steps_are_those_of_pieces():
