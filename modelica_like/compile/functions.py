@@ -12,6 +12,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTerminal, Vector
 from modelica_like.compile.energy import energy_terms
+from modelica_like.compile.fresh import judged_afresh
 from modelica_like.compile.groups import (
     CompiledTransition,
     Equations,
@@ -168,6 +169,7 @@ class _Builder:
         """Return what may happen at an instant."""
         reduced, flat = self.reduced, self.reduced.flat
         guards, moments, transitions, resets, targets = self.transitions()
+        soon = guards_soon(flat.time, reduced.total_derivative, guards)
         delays, delay_parts = self.delays()
         news, update_rows = updates(
             reduced, partial(self._resets, targets=targets), self._kept, [part[0] for part in delay_parts]
@@ -175,7 +177,7 @@ class _Builder:
         return EventTables(
             guards=self.function("guards", guards),
             guard_rates=self.function("guard_rates", reduced.total_derivative(guards)),
-            guards_soon=self.function("guards_soon", guards_soon(flat.time, reduced.total_derivative, guards)),
+            guards_soon=self.function("guards_soon", judged_afresh(flat, transitions, soon)),
             moments=self.function("moments", moments),
             transitions=transitions,
             resets=self.function("resets", resets),

@@ -273,11 +273,16 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
 }
 
 /* Adds guards that an update has made positive, however soon they will fall again: a rebound may be that short. One
-   that jumps to zero, up to rounding and the location of the event, is judged by where it goes, as others are. */
+   that jumps to zero, up to rounding and the location of the event, is judged by where it goes, as others are; so is
+   one that will not be positive once the relations and whole numbers have followed of which it is made. */
 static void want_jumped(Instance *c, const double *before, unsigned char *wanting) {
-    values_now(c, &c->model->tapes.guards, c->guards_before);
+    double *now = c->guards_before, *rates = now + c->model->n_guards, *soon = c->guards;
+    double step = TIME_RESOLUTION * fmax(1, fabs(c->state.t));
+    values_now(c, &c->model->tapes.guards, now);
+    values_now(c, &c->model->tapes.guards_soon, soon);
     for (int g = 0; g < c->model->n_guards; g++)
-        if (before[g] < 0 && c->guards_before[g] > -JUMPED * before[g] && guard_active(c, g))
+        if (before[g] < 0 && now[g] > -JUMPED * before[g] && guard_active(c, g) &&
+            (number_or_false(soon[g]) > 0 || !(now[g] + step * rates[g] > 0)))
             wanting[c->model->guard_transition[g]] = 1;
 }
 

@@ -386,6 +386,38 @@ def test_rounding_does_not_count_back(solver, rate):
     assert found.final["n"] == round(2 * rate / 0.3)
 
 
+class Wrapped(Component):
+    """A count moves what a remainder, and a choice of sides, are taken of; then both are as large as before."""
+
+    rate: Parameter = param("1/s", "rate", default=1.0)
+    T: Parameter = param("s", "time of the count", default=0.65)
+    x: Variable = var("1", "rises", default=0)
+    rest: Variable = var("1", "what is left of whole turns")
+    far: Variable = var("1", "distance from twice the rest")
+    n: Discrete = integer("counts by the clock")
+    late: Discrete = integer("how often the rest comes above 0.5")
+    away: Discrete = integer("how often the distance comes above 0.5")
+    left: Discrete = integer("how often one of these ceases to be so")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate
+        yield self.rest == mod(self.x - 0.7 * self.n, 1)
+        yield self.far == absolute(self.x - 1.3 * self.n, events=True)
+
+    def events(self) -> Events:
+        yield when(clock(self.T, self.T), {self.n: pre(self.n) + 1})
+        yield when(self.rest > 0.5, {self.late: pre(self.late) + 1})
+        yield when(self.far > 0.5, {self.away: pre(self.away) + 1})
+        yield when((self.rest < 0.5, self.far < 0.5), {self.left: pre(self.left) + 1})
+
+
+def test_what_is_above_before_and_after_a_count_does_not_come_above(solver):
+    """At 0.65 s the rest goes from 0.65 to 0.95 and the distance from 0.65 to 0.65; at 0.7 s the rest is 0 again."""
+    found = run(Wrapped(), 0.69, solver)
+    assert [found.final[name] for name in ("n", "late", "away", "left")] == [1, 1, 1, 0]
+    assert run(Wrapped(), 0.75, solver).final["left"] == 1
+
+
 class Source(Component):
     """A Boolean that a part has."""
 
