@@ -1,5 +1,6 @@
 """Discrete equations against closed forms, by both solvers: when, pre, edge, change, initial, relations with events."""
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -416,6 +417,40 @@ def test_what_is_above_before_and_after_a_count_does_not_come_above(solver):
     found = run(Wrapped(), 0.69, solver)
     assert [found.final[name] for name in ("n", "late", "away", "left")] == [1, 1, 1, 0]
     assert run(Wrapped(), 0.75, solver).final["left"] == 1
+
+
+class Comparator(Component):
+    """Passes on more than one where it gets more than a half."""
+
+    u = signal_in("1", "what it gets")
+    y: Output = signal_out("1", "what it passes on")
+
+    def equations(self) -> Equations:
+        yield self.y == if_(self.u > 0.5, 1 + 0.1 * self.u, 0)
+
+
+class Comparators(Component):
+    """Comparators one behind the other."""
+
+    rate: Parameter = param("1/s", "rate of the first input", default=1.0)
+    u: Output = signal_out("1", "first input")
+    row = [Comparator()] * 30
+
+    def equations(self) -> Equations:
+        yield self.u == self.rate * self.time
+        yield connect(self.u, self.row[0].u)
+        for first, second in itertools.pairwise(self.row):
+            yield connect(first.y, second.u)
+
+
+def test_a_row_of_comparators_switches_at_one_instant(solver):
+    found, y = run(Comparators(), 0.8, solver), 0.8
+    assert {event.time for event in found.events} == {found.events[0].time}
+    assert found.events[0].time == pytest.approx(0.5, abs=CLOSE)
+    assert len(found.events) == 30
+    for k in range(30):
+        y = 1 + 0.1 * y
+        assert found.final[f"row[{k + 1}].y"] == pytest.approx(y, abs=1e-9)
 
 
 class Source(Component):
