@@ -49,7 +49,10 @@ class Buffers:
         self.references = np.array(outputs, np.uint32)
         self.run = Run(steps=_BREATH, n_outputs=len(self.references), references=self.references.ctypes.data)
         self._widths, self._arrays = widths, dict[str, Vector]()
-        for counted, names in _COUNTED.items():
+        # What is not wanted needs no room, and takes none of the time of a short run.
+        written = {counted: [name for name in names if name in widths] for counted, names in _COUNTED.items()}
+        self._written = {counted: names for counted, names in written.items() if names or counted == "points"}
+        for counted, names in self._written.items():
             self._make_room(counted, names, points + 2 * _LEAST if counted == "points" else _LEAST)
 
     def go(self, reached: Callable[[float], bool]) -> int:
@@ -63,12 +66,12 @@ class Buffers:
             code = self.instance.library.run(*arguments)
             if not reached(self.run.last) or code not in (MORE, PAUSED):
                 return code
-            rooms = {counted: getattr(self.run, f"room_{counted}") for counted in _COUNTED}
+            rooms = {counted: getattr(self.run, f"room_{counted}") for counted in self._written}
             full = [counted for counted in rooms if getattr(self.run, f"n_{counted}") + _AT_ONCE > rooms[counted]]
             # An instant may have more events than there is room for, and leaves none of them.
             for counted in (full or rooms) if code == MORE else ():
-                names, room = _COUNTED[counted], 2 * rooms[counted]
-                if names == ("steps_taken",) and room * self._widths.get(names[0], 0) > MOST_KEPT:
+                names, room = self._written[counted], 2 * rooms[counted]
+                if names == ["steps_taken"] and room * self._widths[names[0]] > MOST_KEPT:
                     self.emptied(self["steps_taken"])
                     self.run.n_taken = 0
                 else:
@@ -80,16 +83,15 @@ class Buffers:
         return self._arrays[name][: getattr(self.run, f"n_{counted}")]
 
     def _make_room(self, counted: str, names: Iterable[str], room: int) -> None:
-        wanted = [name for name in names if name in self._widths]
-        needed = 8.0 * room * sum(self._widths[name] for name in wanted)
-        if wanted and needed > (there := memory()):
+        needed = 8.0 * room * sum([self._widths[name] for name in names])
+        if needed > (there := memory()):
             raise ValueOutOfRange(
                 f"By {self.run.last:.6g} s there are {self.run.n_points:,} results, two of them at every event; more "
                 f"of them need room of {needed / 1e9:.3g} GB, and this machine has {there / 1e9:.3g} GB.",
                 advice="Run a shorter time, or a part of the drive.",
             )
         setattr(self.run, f"room_{counted}", room)
-        for name in wanted:
+        for name in names:
             new = np.empty((room, self._widths[name]))
             if name in self._arrays:
                 new[: len(self[name])] = self[name]

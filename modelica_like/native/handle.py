@@ -101,8 +101,8 @@ class Native:
             self._instance.check(self._library.gradient_start(whole, self._by.ctypes.data, self._by.size))
         self._instance.check(self._library.begin(self._address))
         if self.inputs.size:
-            self._read(self._references[0], self.inputs)
-        self._read(self._references[1], self.outputs)
+            self._instance.check(self._library.get(self._address, *self._step[:3]))
+        self._instance.check(self._library.get(self._address, *self._step[3:]))
 
     def set(self, values: Mapping[str, float]) -> None:
         """Set inputs and tunable parameters by path, from now on."""
