@@ -108,11 +108,18 @@ def test_little_room_changes_nothing(monkeypatch):
 
 
 @pytest.mark.slow
-def test_specialised_tapes_change_nothing(monkeypatch, tmp_path):
-    """The same run-time that never specialises gives the same numbers."""
+@pytest.mark.parametrize(
+    ("file", "text", "other"),
+    [
+        ("special.c", "#define WORTH_IT 6 ", "#define WORTH_IT 2000000000 "),
+        ("types.h", "N_SETS = 64, WHOLE_SETS = 3", "N_SETS = 2, WHOLE_SETS = 2"),
+    ],
+)
+def test_specialised_tapes_change_nothing(file, text, other, monkeypatch, tmp_path):
+    """The same run-time that never specialises, or keeps few tapes, gives the same numbers."""
     texts = sources.runtime_sources(("native",))
-    assert "#define WORTH_IT 6 " in texts["special.c"]
-    texts["special.c"] = texts["special.c"].replace("#define WORTH_IT 6 ", "#define WORTH_IT 2000000000 ")
+    assert text in texts[file]
+    texts[file] = texts[file].replace(text, other)
     plain = declared(CDLL(str(compiled(texts, native_platform(), tmp_path))))
     for netlist in (STARTUP, CLUTCHES, EXAMPLES / "lepelletier.toml"):
         special = simulate(netlist, 2.0, solver="native")
