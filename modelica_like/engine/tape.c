@@ -173,7 +173,7 @@ Result solve_implicit(Instance *c, double t, double *point, int quiet) {
     for (int round = 0; round < rounds; round++) {
         evaluate_special(c, &m->tapes.alg, t, point, step);
         if (c->bounded && round > 0 && largest_of(m->n_z, step) <= SOLVED * residual) return RESULT_OK;
-        residual = largest_of(m->n_z, step);
+        if (c->bounded) residual = largest_of(m->n_z, step);
         for (int k = 0; k < m->n_z; k++)
             if (!isfinite(step[k])) return !quiet && fail(c, UNKNOWN_SINGULAR, t, k);
         if (round == 0 || !linear) {
