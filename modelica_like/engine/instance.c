@@ -139,10 +139,10 @@ static uint64_t lay_out(Instance *c, double *memory) {
         left += tape->n_operations; /* among the slots, behind all others */
         room += 4 * (uint64_t)tape->n_operations + 2 * (uint64_t)tape->n_outputs;
     }
-    c->known_for_set = (int)left;
-    c->room_for_set = (size_t)room;
-    left *= WHOLE_SETS;
-    TAKE(c->room, WHOLE_SETS * room);
+    c->most_known = (int)(left * MORE_SETS < MORE_OPERATIONS ? left * MORE_SETS : MORE_OPERATIONS);
+    c->most_room = (size_t)(room * MORE_SETS < 4 * MORE_OPERATIONS ? room * MORE_SETS : 4 * MORE_OPERATIONS);
+    left += (uint64_t)c->most_known;
+    TAKE(c->room, room + c->most_room);
     TAKE(c->special, N_SETS * N_SPECIALS);
     Special *part = &c->part; /* of guards */
     TAKE(part->runs, m->tapes.guards.n_operations);

@@ -22,8 +22,7 @@ static void choose_set(Instance *c) {
     size_t n_d = (size_t)c->model->n_d, size = n_d * sizeof(double);
     double *key = c->set_keys;
     uint64_t set = 0;
-    if (c->room_used > (WHOLE_SETS - 1) * c->room_for_set || c->known_used > (WHOLE_SETS - 1) * c->known_for_set)
-        forget_sets(c);
+    if (c->room_used > c->most_room || c->known_used > c->most_known) forget_sets(c);
     while (
         set < c->n_sets && set < N_SETS && (key[n_d] != c->passing || memcmp(key, c->slots + c->model->slot_d, size)))
         set++, key += n_d + 1;

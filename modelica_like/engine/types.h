@@ -69,8 +69,9 @@ typedef struct { /* a tape for a set of modes, see special.c */
     int uses;
 } Special;
 /* Of the first tapes of a model, from its rates to its edges, for so many sets of modes: runs come back to most
- * of theirs. There is room for whole tapes of so many. */
-enum { N_SPECIALS = 7, N_SETS = 64, WHOLE_SETS = 3 };
+ * of theirs. There is room for whole tapes of one,
+ * and of so many more, up to so many operations of large models. */
+enum { N_SPECIALS = 7, N_SETS = 256, MORE_SETS = 9, MORE_OPERATIONS = 1 << 16 };
 
 /* Arrays with their sizes, for which lay_out has short names. */
 #define FIELD(name, size) *name
@@ -174,11 +175,11 @@ typedef struct Instance {
     int doubts, doubtful; /* about the sign of a guard: of steps since the last event; of the present piece */
     Terms *terms, *strike_terms;
     Strike strike;
-    int stopped;            /* something has been stopped at the present instant */
-    Special *special, part; /* by set and tape; see `make_part` */
-    size_t room_for_set, room_used;
-    int *room, known_for_set, known_used; /* for what these consist of, and what they know */
-    int set;                              /* the present one; how many there have been */
+    int stopped;                       /* something has been stopped at the present instant */
+    Special *special, part;            /* by set and tape; see `make_part` */
+    size_t most_room, room_used;       /* most: to have room for a set behind it */
+    int *room, most_known, known_used; /* for what these consist of, and what they know */
+    int set;                           /* the present one; how many there have been */
     uint64_t n_sets;
     uint64_t chosen_by;         /* behind which count of `decided_by` the set was chosen */
     uint64_t decided_by;        /* counts changes of what decides about tapes: modes and parameters */
