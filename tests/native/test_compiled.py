@@ -168,7 +168,7 @@ def test_what_is_old_or_too_much_goes(cache, monkeypatch):
         return file
 
     old, large, small, other = (
-        stored(*one) for one in (("code-a", 1, 100), ("code-b", 9000, 3), ("code-c", 1, 2), ("runtime-d", 1, 100))
+        stored(*file) for file in (("code-a", 1, 100), ("code-b", 9000, 3), ("code-c", 1, 2), ("runtime-d", 1, 100))
     )
     monkeypatch.setattr(code, "_MOST_BYTES", library.stat().st_size + 5000)
     os.utime(library, (now, now - 50 * day))

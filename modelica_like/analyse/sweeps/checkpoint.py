@@ -36,7 +36,7 @@ class Checkpoint:
     def __init__(self, path: str | Path, job: Job, plan: Plan, size: int) -> None:
         zarr = extra_module("zarr", "analyse")
         self.path = Path(path)
-        settings = sorted(str(one) for one in job.settings.items() if one[0] != "compiled")  # which changes no result
+        settings = sorted(str(item) for item in job.settings.items() if item[0] != "compiled")  # changes no result
         text = json.dumps([job.names, job.outputs, settings, size])
         key = hashlib.sha256(
             job.identity.encode() + text.encode() + np.ascontiguousarray(plan.points).tobytes()
