@@ -170,8 +170,16 @@ def test_a_constant_torque_on_threads_with_inputs_and_limits_of_formulas():
     over = {"push.tau_constant": np.linspace(-1.0, 1.0, 2001)}
     found = sweep(model, over, ["mass.w"], until=2.0, processes=3, chunk=70)
     np.testing.assert_allclose(found["mass.w"], over["push.tau_constant"], atol=1e-12)
-    # One in a hundred of 2001, and the extremes that are not among these.
+    # One in a hundred of 2000, and the extremes: the first run, and the last one.
     assert found.attrs["checked"] == 21
+
+
+def test_many_runs_are_compared_less_often():
+    """20 of the first 2,000, one in a thousand of the 3,000 others, and the last one."""
+    parts = {"push": ConstantTorque(tau_constant=1.0), "mass": Inertia(J=2.0, w=0.0, phi=0.0)}
+    model = build(Assembly("pushed", parts=parts, series={"shaft": [*parts]}))
+    found = sweep(model, {"push.tau_constant": np.linspace(0.0, 1.0, 5000)}, ["mass.w"], until=1.0)
+    assert found.attrs["checked"] == 20 + 3 + 1
 
 
 def test_the_report_tells_what_idas_had_to_do(capsys):

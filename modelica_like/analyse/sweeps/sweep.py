@@ -24,6 +24,7 @@ from modelica_like.analyse.sweeps.workers import (
     in_processes,
     in_this_process,
     in_threads,
+    is_compared,
     on_cluster,
 )
 from modelica_like.arguments import checked
@@ -75,7 +76,8 @@ def sweep(
         progress: called after each chunk of runs.
         chunk: runs that a worker does at a time; by default a 200th of all, from 25 to 1000.
         solver: `native`, the compiled run-time, or `idas`. IDAS does the runs that fail in the run-time. For
-            comparison it repeats the first run, one in a hundred and those with the smallest and largest outputs.
+            comparison it repeats one run in a hundred of the first 2,000, one in a thousand of the others, and those
+            with the smallest and largest outputs.
         settings: further arguments of `simulate`, such as rtol, points or start. Without `compiled`, long sweeps have
             machine code where there is a compiler; results are the same.
 
@@ -159,7 +161,7 @@ def _check_extremes(job: Job, plan: Plan, done: Done) -> None:
         finite = np.flatnonzero(np.isfinite(column))
         if len(finite):
             wanted |= {int(finite[np.argmin(column[finite])]), int(finite[np.argmax(column[finite])])}
-    Reference(job).compare(done, plan.points, sorted(k for k in wanted if k % ONE_IN))
+    Reference(job).compare(done, plan.points, sorted(k for k in wanted if not is_compared(k)))
 
 
 def _workers(job: Job, processes: int | None, scheduler: str | None, runs: int) -> Callable[..., Generator[Done]]:

@@ -32,8 +32,8 @@ _PATIENCE = 10.0
 _PLANNED = ("until", "t0", "rtol", "atol", "points", "options", "on_chattering", "compiled")
 _AGREE = 1e3
 """Difference between solvers that is reported, in tolerances of their steps."""
-ONE_IN = 100
-"""One in so many native runs is compared with IDAS."""
+ONE_IN, _LATER, _MANY = 100, 1000, 2000
+"""One in so many native runs is compared with IDAS, and one in so many of those after the first `_MANY`."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +117,11 @@ def run_chunk(job: Job, first: int, points: Any) -> Done:
     return done
 
 
+def is_compared(number: int) -> bool:
+    """Return whether a native run is one of those that IDAS repeats."""
+    return number % (ONE_IN if number < _MANY else _LATER) == 0
+
+
 class Reference:
     """Runs by IDAS: those of a sweep with this solver, and checks of native runs.
 
@@ -148,11 +153,12 @@ class Reference:
             done.failures[done.first + k] = str(error)
 
     def review(self, points: Any, first: int, values: Any, refused: dict[int, str], failed: list[int]) -> Done:
-        """Repeat failed runs, and compare one in a hundred."""
+        """Repeat failed runs, and compare some of the others."""
         done = Done(first, values, {first + k: text for k, text in refused.items()}, len(failed))
         for k in failed:
             self.run(done, k, points[k])
-        sample = [k for k in range(-first % ONE_IN, len(points), ONE_IN) if k not in refused and k not in failed]
+        left_out = {*refused, *failed}
+        sample = [k for k in range(len(points)) if is_compared(first + k) and k not in left_out]
         self.compare(done, points, sample)
         return done
 
