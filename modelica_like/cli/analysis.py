@@ -7,7 +7,18 @@ from typing import Annotated, Literal
 
 from modelica_like.cli.models import Start
 from modelica_like.cli.reader import Option
-from modelica_like.cli.shared import TABLE, Assignments, Debug, Json, Netlist, Plot, Until, load_netlist, told
+from modelica_like.cli.shared import (
+    SOLVE_FAILED,
+    TABLE,
+    Assignments,
+    Debug,
+    Json,
+    Netlist,
+    Plot,
+    Until,
+    load_netlist,
+    told,
+)
 
 
 def modes(
@@ -208,6 +219,8 @@ def optimize(
             )
         if output and isinstance(result, Optimum):
             result.save(output)
+        if isinstance(result, Optimum) and not result.feasible:
+            raise SystemExit(SOLVE_FAILED)  # as `size` does where a limit is exceeded
 
 
 def tolerance(

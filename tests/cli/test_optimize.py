@@ -47,3 +47,10 @@ def test_a_wrong_bound_is_told() -> None:
     result = called(["optimize", DIRECT, "--minimize", "clutch.tau", "--free", "clutch.capacity=40"])
     assert result.exit_code == 2
     assert result.stderr.startswith("'clutch.capacity=40': '40' is not LOW:HIGH.")
+
+
+def test_limits_that_cannot_be_met_end_with_one() -> None:
+    limits = ["--subject-to", "clutch.lock_time <= 0.05 s", "--subject-to", "clutch.capacity <= 100 N.m"]
+    result = called(["optimize", DIRECT, *ASKED, *limits])
+    assert result.exit_code == 1
+    assert "The limits cannot all be met" in result.stdout

@@ -100,7 +100,7 @@ class Chances:
             )  # fmt: skip
             names = [spread.name for spread in found.outputs]
             nominal = quick_run(model, question.until, start=question.start).read(*names)
-            results += [replace(limit, limit=f"{limit.limit}{case.suffix}") for limit in found.limits]
+            results += [replace(limit, within=case.suffix) for limit in found.limits]
             distances.append(np.array([
                 _distance(limit, found.samples[:, names.index(limit.name)], float(nominal[names.index(limit.name)]))
                 for limit in limits

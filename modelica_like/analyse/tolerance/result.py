@@ -61,16 +61,17 @@ class Spread:
 
 @dataclass(frozen=True)
 class Probability:
-    """The probability that a limit is broken, with its 95 % interval."""
+    """The probability that a limit is broken, with its 95 % interval; `within` names the load case."""
 
     limit: str
     value: float
     low: float
     high: float
+    within: str = ""
 
     def __str__(self) -> str:
         low, high = 100 * self.low, 100 * self.high
-        return f"'{self.limit}' is broken in {100 * self.value:.4g} % of runs ({low:.3g} to {high:.3g} %)."
+        return f"'{self.limit}'{self.within} is broken in {100 * self.value:.4g} % of runs ({low:.3g} to {high:.3g} %)."
 
 
 @dataclass(frozen=True, eq=False)
