@@ -72,7 +72,8 @@ MESSAGES = {
         '[part]\na = { is = "Inertia" }\n',
         "A netlist has no entry 'part'; did you mean 'parts'? "
         "It has name, description, "
-        "parameters, parts, series, connect, start, guess, free, expose, simulate, display, sizing.\n"
+        "parameters, parts, series, connect, start, guess, free, expose, simulate, display, sizing, "
+        "optimize, tolerances.\n"
         "  in bad.toml:1 `[part]`",
     ),
     "no type": (

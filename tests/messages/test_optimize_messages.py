@@ -194,6 +194,12 @@ Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(�
   in netlist.toml:12 `for = { "wheel.J" = 3 }`
 Write [{ name = "cold", "oil.T" = "-20 degC" }].""",
     ),
+    "a choice that is no list": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, choose={"hub.J": 3}, **M),
+        """choose: hub.J needs a list of values or the name of a table, not 3.
+Write {"clutch.plates": [2, 4, 6]}, or {"motor": "motors.csv"}.""",
+    ),
     "choices that are no list": (
         NetlistError,
         lambda: optimize(loads(TEXT + FREE + 'choose = { "wheel.J" = 3 }')),

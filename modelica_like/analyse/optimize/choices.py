@@ -36,8 +36,14 @@ def combinations(drive: Component, choose: Mapping[str, Any]) -> list[Choice]:
 
     Raises:
         NetlistError: a table cannot be read.
-        ValueOutOfRange: there are too many.
+        ValueOutOfRange: there is nothing to choose from, or too much.
     """
+    for path, given in choose.items():
+        if not isinstance(given, str | list | tuple) or not given:
+            raise ValueOutOfRange(
+                f"choose: {path} needs a list of values or the name of a table, not {given!r}.",
+                advice='Write {"clutch.plates": [2, 4, 6]}, or {"motor": "motors.csv"}.',
+            )
     folder = Path(inside(drive).origin).parent if isinstance(drive, Assembly) else Path()
     options = [
         _rows(path, folder / given) if isinstance(given, str) else [Choice({path: v}, {path: v}) for v in given]
