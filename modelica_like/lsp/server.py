@@ -220,10 +220,16 @@ def serve(version: str) -> None:
         version: of this package.
     """
     # What modules and libraries print goes to standard error: it is no part of the protocol.
-    out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    sys.stdout = sys.stderr
-    server = Server(version)
-    for register in (_watch, _answer, _change):
-        register(server)
-    server.start_io(sys.stdin.buffer, out)
+    before, stdout = os.dup(1), sys.stdout
+    try:
+        with os.fdopen(os.dup(1), "wb") as out:
+            os.dup2(2, 1)
+            sys.stdout = sys.stderr
+            server = Server(version)
+            for register in (_watch, _answer, _change):
+                register(server)
+            server.start_io(sys.stdin.buffer, out)
+    finally:
+        sys.stdout = stdout
+        os.dup2(before, 1)
+        os.close(before)
