@@ -191,4 +191,6 @@ def _as_written(value: Any) -> Any:
     """Return the values of [optimize] and [tolerances] as TOML has them."""
     if isinstance(value, dict):
         return {key: _as_written(entry) for key, entry in value.items()}
+    if isinstance(value, tuple) and len(value) == 1 and isinstance(value[0], str):
+        return value[0]  # one text may stand alone
     return [_as_written(entry) for entry in value] if isinstance(value, list | tuple) else value

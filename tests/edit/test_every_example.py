@@ -54,6 +54,9 @@ def build(document: Document, data: dict[str, Any]) -> None:
     for section in ("start", "guess", "display", "simulate", "expose"):
         for path, value in flat(data.get(section, {})).items():
             document.set(path, value, section=section)
+    for section in ("optimize", "tolerances"):
+        for key, value in data.get(section, {}).items():
+            document.set(key, value, section=section)
     if "free" in data:
         document.set("free", data["free"], section="")
 

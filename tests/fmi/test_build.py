@@ -125,7 +125,8 @@ def test_zig_exports_the_fmi_functions_only_and_needs_an_old_glibc(monkeypatch, 
     assert names == declared | OWN
     assert len(declared) == count
     assert newest_glibc(library) <= (2, 17)
-    assert library.stat().st_size < 380_000
+    # Its compiler unrolls the solver of dense systems wherever it is used.
+    assert library.stat().st_size < 420_000
 
 
 @pytest.mark.slow
