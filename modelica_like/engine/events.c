@@ -115,10 +115,11 @@ void drop_balanced(Instance *c, double *soon) {
         if (number_or_false(now[k]) < 0 && soon[k] > 0 && soon[k] <= BALANCED * fabs(now[k])) soon[k] = now[k];
 }
 
-/* At the same edge a mode that was left in this instant is not wanted back where that soon is no longer so, in later
- * rounds either, which updates ask for: what settles within few time resolutions moves so much within one that both
- * modes want the other. Without `modes`, at the begin of an instant and for an importer, all count as left. `soon` as
- * above. */
+/* At the same edge a mode that was left in this round is not wanted back where that soon is no longer so, and a
+ * relation that changed in this instant neither, in later rounds, which updates ask for: what settles within few time
+ * resolutions moves so much within one that both modes want the other. Without `modes`, at the begin of an instant and
+ * for an importer, all relations count as changed. Modes of friction and of ideal elements do not: what drives them is
+ * another. `soon` as above. */
 void drop_returning(Instance *c, const double *modes, double *soon) {
     const Model *m = c->model;
     double *now = c->guards_before;
@@ -128,7 +129,8 @@ void drop_returning(Instance *c, const double *modes, double *soon) {
     values_now(c, &m->tapes.guards, now);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
-        int left = !modes || modes[one->mode] == one->target || c->d_begun[one->mode] == one->target;
+        int relation = m->modes[one->mode].hidden, begun = !modes || c->d_begun[one->mode] == one->target;
+        int left = (modes && modes[one->mode] == one->target) || (relation && begun);
         int returns = guard_active(c, k) && left && now[k] > 0;
         if (returns && soon[k] > 0 && now[k] < LATER * (now[k] - soon[k])) soon[k] = -now[k];
     }
