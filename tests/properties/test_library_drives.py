@@ -67,9 +67,11 @@ def check(seed: int, folder: Path | None = None) -> bool:
     """Check a drive; return whether it runs."""
     values, refused = results(seed, folder)
     assert all(len(text) > 20 for text in refused.values())
-    if (first := apart(values)) > SAME:
-        # Hundreds of impacts add up errors: what converges to the same is the same drive.
-        assert apart(results(seed, folder, RTOL / 100)[0]) < max(CONVERGED, first / 20), f"seed {seed}: {values}"
+    first = apart(values)
+    # Hundreds of impacts add up errors: what converges to the same is the same drive. It converges at this rate, in one
+    # step or, where the first difference is small by chance, in two.
+    if first > SAME and apart(results(seed, folder, RTOL / 100)[0]) >= max(CONVERGED, first / 20):
+        assert apart(results(seed, folder, RTOL / 10_000)[0]) < max(CONVERGED, first / 400), f"seed {seed}: {values}"
     return bool(values)
 
 
