@@ -80,6 +80,14 @@ def test_the_worst_load_case_counts() -> None:
     )
     assert best["clutch.capacity"] == pytest.approx(capacity(0.25, 25.0), rel=1e-6)
     assert [limit.price != 0.0 for limit in best.limits] == [False, True]
+    assert best["clutch.lock_time"] == max(limit.value for limit in best.limits)
+
+
+def test_the_worst_of_an_objective_is_its_value() -> None:
+    """The heavy load locks later, J W / (M - 25)."""
+    cases = [{"name": "heavy", "load_torque": 25.0}, {"name": "light", "load_torque": 5.0}]
+    best = optimum(DIRECT, minimize="clutch.lock_time", free={"clutch.capacity": [60, 200]}, cases=cases)
+    assert best["clutch.lock_time"] == pytest.approx(J * W / (200.0 - 25.0), rel=1e-6)
 
 
 def test_the_largest_load() -> None:
@@ -107,6 +115,16 @@ def test_a_peak_that_jumps_from_one_time_to_another() -> None:
     """The peaks are `share` and 2 (1 - share): their largest is least where both are 2/3."""
     best = optimum(loads(SHARED), minimize="peak(early.y + late.y)", free={"share": [0.05, 0.95]})
     assert best["share"] == pytest.approx(2.0 / 3.0, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_a_limit_has_no_price_where_there_are_no_derivatives() -> None:
+    """The largest share that is allowed, beside the corner of both peaks."""
+    best = optimum(
+        loads(SHARED), minimize="peak(early.y + late.y)", free={"share": [0.05, 0.95]}, subject_to="share <= 0.9"
+    )
+    assert best["share"] == pytest.approx(2.0 / 3.0, abs=1e-5)
+    assert best.limits[0].price == 0.0
 
 
 def test_limits_that_cannot_be_met_are_exceeded_least() -> None:
@@ -202,6 +220,16 @@ def test_a_limit_that_must_hold_with_a_probability() -> None:
     )
     assert best["clutch.capacity"] == pytest.approx(capacity(0.25) / 0.902, rel=1e-3)
     assert "is broken in" in str(best)
+
+
+def test_measured_tolerances_stand_beside_the_netlist(tmp_path: Path) -> None:
+    """The load is anywhere between two values, straight between them: 95 % of all are below 10 + 0.95 * 10."""
+    (tmp_path / "loads.csv").write_text("load,N.m\n10\n20\n")
+    text = DIRECT.read_text().replace('sizing = "sizing/machine_table.toml"\n', "")
+    (tmp_path / "table.toml").write_text(text + '[tolerances]\nload_torque = "loads.csv"\n')
+    limit = "P(clutch.lock_time <= 0.25 s) >= 95 %"
+    best = optimum(tmp_path / "table.toml", minimize="clutch.capacity", free=CAPACITY, subject_to=limit)
+    assert best["clutch.capacity"] == pytest.approx(capacity(0.25, 19.5), rel=2e-3)
 
 
 @pytest.mark.slow

@@ -66,6 +66,14 @@ def test_a_sum_of_two(rho: float) -> None:
     assert result.notes == ()
 
 
+def test_tolerances_that_are_given_do_without_the_correlations_that_are_written() -> None:
+    text = TWO + '[tolerances]\n"first.tau_constant" = "normal(1 N.m)"\n"second.tau_constant" = "normal(20 %)"\n'
+    text += 'correlated = [{ of = ["first.tau_constant", "second.tau_constant"], rho = 0.6 }]\n'
+    written = tolerance(loads(text), "wheel.w")["wheel.w"]
+    given = tolerance(loads(text), "wheel.w", {"first.tau_constant": "normal(1 N.m)"})["wheel.w"]
+    assert (written.linear_sigma, given.linear_sigma) == pytest.approx((math.sqrt(3.2), 1.0), rel=1e-6)
+
+
 def test_shares_of_the_variance_of_a_sum() -> None:
     given = {"first.tau_constant": "normal(2 N.m)", "second.tau_constant": "uniform(3 N.m, 7 N.m)"}
     result = tolerance(loads(TWO), "wheel.w", given, shares=True)

@@ -124,6 +124,12 @@ Use smaller ones.""",
         """Shares of the variance are defined for parameters that are independent.
 Leave out `shares`.""",
     ),
+    "a limit with a probability": (
+        ValueOutOfRange,
+        lambda: tolerance(D, (), {"lead": "±1 %"}, subject_to="P(clutch.lock_time <= 0.4 s) >= 99 %"),
+        """'P(clutch.lock_time <= 0.4 s) >= 99 %' asks for a probability, which is the answer here.
+Write the limit alone.""",
+    ),
     "no text in a netlist": (
         NetlistError,
         lambda: tolerance(loads(ZERO + '[tolerances]\n"wheel.J" = 3\n'), "wheel.w"),

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from modelica_like.analyse.optimize.terms import Limit
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.analyse.tolerance.result import Probability
 from modelica_like.analyse.tolerance.scatter import read_population
-from modelica_like.analyse.tolerance.tolerance import tolerance
+from modelica_like.analyse.tolerance.tolerance import spread
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import extra_module
 from modelica_like.simulation import quick_run
@@ -79,7 +78,7 @@ class Chances:
         for case in problem.cases:
             model = problem.model.with_parameters({**case.values, **self._values(x)})
             # What is free can scatter, too: about the value of the design.
-            population = read_population(model, question.tolerances or {}, question.correlated, Path(question.folder))
+            population = read_population(model, question.tolerances or {}, question.correlated, question.folder)
             to = [scatter.name for scatter in population.scatters]
             slopes = sensitivities(model, names, to, until=question.until, start=question.start).derivatives
             rows.append(np.sqrt(np.einsum("ki,ij,kj->k", slopes, population.covariance, slopes)))
@@ -94,10 +93,10 @@ class Chances:
         results: list[Probability] = []
         for case in problem.cases:
             model = problem.model.with_parameters({**case.values, **self._values(x)})
-            found = tolerance(
-                model, tolerances=question.tolerances, correlated=question.correlated, until=question.until,
-                subject_to=[limit.inner for limit in limits], start=question.start, precision=_PRECISION * least,
-            )  # fmt: skip
+            population = read_population(model, question.tolerances or {}, question.correlated, question.folder)
+            plain = [replace(limit, text=limit.inner, probability=1.0) for limit in limits]
+            run = {"until": question.until, "start": question.start}
+            found = spread(model, population, (), plain, run, _PRECISION * least)
             names = [spread.name for spread in found.outputs]
             nominal = quick_run(model, question.until, start=question.start).read(*names)
             results += [replace(limit, within=case.suffix) for limit in found.limits]

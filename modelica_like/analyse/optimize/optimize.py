@@ -6,7 +6,6 @@ import copy
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optim
 from modelica_like.analyse.optimize.runs import Runs
 from modelica_like.analyse.optimize.solve import FEASIBLE, MOST_STEPS, Outcome, Search
 from modelica_like.analyse.optimize.terms import Row
+from modelica_like.analyse.tolerance.tolerance import scatter_of
 from modelica_like.analyse.written import placed
 from modelica_like.arguments import checked
 from modelica_like.compile.buffers import Vector
@@ -80,30 +80,34 @@ def optimize(
         KeyboardInterrupt: the search was interrupted; the note has the best design until then.
     """
     drive = loaded(drive)
-    written, scatter, folder = {}, dict[str, Any](), ""
-    if isinstance(drive, Assembly):
-        written, scatter = inside(drive).optimize, dict(inside(drive).tolerances)
-        folder = str(Path(inside(drive).origin).parent)
-    pairs = scatter.pop("correlated", ())
+    written = inside(drive).optimize if isinstance(drive, Assembly) else {}
+    scatter, pairs, folder = scatter_of(drive, tolerances, correlated)
     asked = {"minimize": _listed(minimize), "maximize": _listed(maximize)}
     aims = asked if any(asked.values()) else {key: tuple(written.get(key, ())) for key in asked}
     question = Question(
         **aims, free=free if free is not None else written.get("free"),
         subject_to=_listed(subject_to) or tuple(written.get("subject_to", ())),
         cases=tuple(cases) or tuple(written.get("for", ())), parameters=parameters, until=until, start=start,
-        tolerances=tolerances if tolerances is not None else scatter,
-        correlated=tuple(pairs if correlated is None else correlated), folder=folder,
+        tolerances=scatter, correlated=pairs, folder=folder,
     )  # fmt: skip
+    choices = choose if choose is not None else written.get("choose", {})
+    return _answer(
+        drive, question, choices, starts or written.get("starts", 1), points or written.get("points", _POINTS), seed,
+        progress,
+    )  # fmt: skip
+
+
+def _answer(
+    drive: Component | CompiledDae, question: Question, choices: Mapping[str, Any], number: int, points: int, seed: int,
+    progress: Progress | None,
+) -> Optimum | Front:  # fmt: skip
+    """Search for one design, a front, or the best choice."""
     if len(question.minimize) + len(question.maximize) > 2:
         raise ValueOutOfRange(
             "There may be one objective, or two for a front.", advice="Limit the others by subject_to."
         )
-    choices = choose if choose is not None else written.get("choose", {})
-    number = starts or written.get("starts", 1)
     if not choices:
-        return _Study(drive, question, seed, _told(progress, number)).best(
-            number, points or written.get("points", _POINTS)
-        )
+        return _Study(drive, question, seed, _told(progress, number)).best(number, points)
     if len(question.minimize) + len(question.maximize) > 1:
         raise ValueOutOfRange("A choice needs one objective.", advice="Limit the other one by subject_to.")
     if not isinstance(drive, Component):
@@ -240,11 +244,11 @@ class _Study:
                 price = float(outcome.prices[c, row : row + count].sum()) if outcome.optimal else 0.0
                 size = search.sizes[k]
                 weight = abs(price) * size / search.aim_size
-                broken = limit.excess(after[c, k]) > 10 * FEASIBLE * size
+                excess = float(limit.excess(after[c, k]))
                 measured.append(
                     Measured(
                         limit.text, limit.name, limit.unit, case.name, first[c, k], after[c, k], limit.value,
-                        bool(broken), price if weight > 1e-4 else 0.0,
+                        excess, bool(excess > 10 * FEASIBLE * size), price if weight > 1e-4 else 0.0,
                     )
                 )  # fmt: skip
             row += count

@@ -63,7 +63,7 @@ class Question:
     start: Any = None
     tolerances: Mapping[str, Any] | None = None
     correlated: tuple[Mapping[str, Any], ...] = ()
-    folder: str = ""
+    folder: Path = Path()
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,7 @@ def _check_chances(
                 advice='Say how parameters scatter: [tolerances] in the netlist, or tolerances={"clutch.mu": "±10 %"}.',
             )
     if chances:
-        read_population(model, question.tolerances or {}, question.correlated, Path(question.folder))
+        read_population(model, question.tolerances or {}, question.correlated, question.folder)
 
 
 def _with_profiles(

@@ -66,7 +66,8 @@ class Measured(_InUnit):
         before: value of the drive as it was.
         value: of the best design.
         limit: nan of an objective.
-        broken: whether the limit is exceeded.
+        excess: by how much the limit is exceeded; negative below it.
+        broken: whether it is exceeded by more than rounding.
         price: derivative of the objective by the limit; 0 where it does not matter.
     """
 
@@ -77,6 +78,7 @@ class Measured(_InUnit):
     before: float
     value: float
     limit: float = np.nan
+    excess: float = 0.0
     broken: bool = False
     price: float = 0.0
 
@@ -124,7 +126,7 @@ class Optimum(Shown):
             UnknownName: it is none of these.
         """
         values = {parameter.name: parameter.value for parameter in self.parameters}
-        for measured in reversed((*self.objectives, *self.limits)):
+        for measured in (*self.objectives, *sorted(self.limits, key=lambda limit: -limit.excess)):
             values.setdefault(measured.name, measured.value)
         if name not in values:
             raise UnknownName(f"The optimum has no '{name}'{did_you_mean(name, values) or '.'}")

@@ -144,7 +144,7 @@ class Search:
         else:
             objective = bound if bounded else aims
         above = aims - bound if bounded and not elastic else ca.MX(0, 1)
-        apart = [(q[low] * s - q[high] * t + shift) for low, high, s, t, shift in self._order()]
+        apart = [factor * q[low] - q[high] + shift for low, high, factor, shift in self._order()]
         g = ca.vertcat(excess, above, *apart)
         unknowns = ca.vertcat(q, bound) if bounded else q
         begin = (x - problem.low) / problem.span
@@ -165,11 +165,10 @@ class Search:
         end = problem.low + problem.span * np.clip(np.array(solved["x"]).ravel()[:n], 0.0, 1.0)
         return self._outcome(end, prices, status, elastic=elastic)
 
-    def _order(self) -> list[tuple[int, int, float, float, float]]:
+    def _order(self) -> list[tuple[int, int, float, float]]:
+        """Return positions of two scaled values, and factor and shift by which the first is at most the second."""
         low, span = self.problem.low, self.problem.span
-        return [
-            (k, m, span[k] / span[m], 1.0, (low[k] - low[m]) / span[m]) for k, m in self.problem.ordered
-        ]  # fmt: skip
+        return [(k, m, span[k] / span[m], (low[k] - low[m]) / span[m]) for k, m in self.problem.ordered]
 
     def _values(self, x: Vector) -> Vector:
         design = self.runs.at(x)
@@ -209,9 +208,9 @@ class Search:
         limits: list[Any] = []
         if self.rows:
             limits.append(optimize.NonlinearConstraint(lambda q: self._excess(values(q)).ravel(), -np.inf, 0.0))
-        for low, high, s, t, shift in self._order():
+        for low, high, factor, shift in self._order():
             row = np.zeros(len(begin))
-            row[low], row[high] = s, -t
+            row[low], row[high] = factor, -1.0
             limits.append(optimize.LinearConstraint(row, -np.inf, -shift))
         radius = {"initial_tr_radius": _FIRST, "final_tr_radius": _LAST, "maxfev": _TRIALS * (len(begin) + 1)}
         result = optimize.minimize(
@@ -223,7 +222,8 @@ class Search:
         better = objective <= outcome.objective and excess <= max(outcome.excess, FEASIBLE)
         if not better:
             return outcome
-        return Outcome(x, objective, excess, outcome.prices, bool(result.success), "COBYQA")
+        # Without derivatives nothing tells what a limit costs there.
+        return Outcome(x, objective, excess, 0.0 * outcome.prices, bool(result.success), "COBYQA")
 
 
 class _Values(NamedCallback):

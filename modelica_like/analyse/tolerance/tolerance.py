@@ -20,12 +20,13 @@ from modelica_like.arguments import checked
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient, ValueOutOfRange, extra_module
-from modelica_like.language import Assembly
+from modelica_like.language import Assembly, Component
 from modelica_like.language.inside import inside
 from modelica_like.runs.readings import listed, read_number
 from modelica_like.simulation import Model, build, loaded, quick_run
 from modelica_like.solve.initialize import StartKind
 
+_MOST = 100_000
 _BATCH, _BATCHES = 256, 8
 """Points of a scrambled Sobol sequence, and the fewest of these that tell how far their means scatter."""
 _RARE = 20.0
@@ -41,7 +42,7 @@ def tolerance(
     drive: Model, of: str | Sequence[str] = (), tolerances: Mapping[str, Any] | None = None, *,
     subject_to: str | Sequence[str] = (), correlated: Sequence[Mapping[str, Any]] | None = None,
     until: float | str | None = None, parameters: Mapping[str, Any] | None = None, start: StartKind | None = None,
-    precision: float = 0.01, most: int = 100_000, shares: bool = False, seed: int = 0, processes: int | None = None,
+    precision: float = 0.01, most: int = _MOST, shares: bool = False, seed: int = 0, processes: int | None = None,
 ) -> Tolerances:  # fmt: skip
     """Tell what tolerances of parameters do to outputs of a run.
 
@@ -70,16 +71,40 @@ def tolerance(
         ModelicaLikeError: the drive cannot be run as it is.
     """
     drive = loaded(drive)
-    written = dict(inside(drive).tolerances) if isinstance(drive, Assembly) else {}
-    pairs = written.pop("correlated", [])
-    given = tolerances if tolerances is not None else written
+    given, pairs, folder = scatter_of(drive, tolerances, correlated)
     model = build(drive, free=given).with_parameters(dict(parameters or {}))
-    folder = Path(inside(drive).origin).parent if isinstance(drive, Assembly) else Path()
     with placed(drive, "tolerances"):
-        population = read_population(model, given, pairs if correlated is None else correlated, folder)
+        population = read_population(model, given, pairs, folder)
     limits = read_limits(model, [subject_to] if isinstance(subject_to, str) else list(subject_to))
     names = [of] if isinstance(of, str) else list(of)
-    names = list(dict.fromkeys([*names, *(limit.name for limit in limits)]))
+    run = {"until": until, "start": start}
+    return spread(model, population, names, limits, run, precision, most, shares=shares, seed=seed, processes=processes)
+
+
+def scatter_of(
+    drive: Component | CompiledDae, given: Mapping[str, Any] | None, correlated: Sequence[Mapping[str, Any]] | None
+) -> tuple[Mapping[str, Any], tuple[Mapping[str, Any], ...], Path]:
+    """Return how parameters scatter, which together, and the folder of measured values: as given, or as written."""
+    if not isinstance(drive, Assembly):
+        return given or {}, tuple(correlated or ()), Path()
+    written = dict(inside(drive).tolerances)
+    pairs = written.pop("correlated", ())
+    if given is not None:
+        written, pairs = dict(given), ()
+    return written, tuple(pairs if correlated is None else correlated), Path(inside(drive).origin).parent
+
+
+def spread(
+    model: CompiledDae, population: Population, of: Sequence[str], limits: Sequence[Limit], run: Mapping[str, Any],
+    precision: float, most: int = _MOST, *, shares: bool = False, seed: int = 0, processes: int | None = None,
+) -> Tolerances:  # fmt: skip
+    """Return what a population of parameters does; see `tolerance`."""
+    chance = next((limit.text for limit in limits if limit.probability < 1.0), None)
+    if chance is not None:
+        raise ValueOutOfRange(
+            f"'{chance}' asks for a probability, which is the answer here.", advice="Write the limit alone."
+        )
+    names = list(dict.fromkeys([*of, *(limit.name for limit in limits)]))
     for name in listed(names, "output"):
         read_number(model, name)
     if not 0.0 < precision < 1.0 or most < _BATCH * _BATCHES:
@@ -87,8 +112,7 @@ def tolerance(
             f"The precision must be between 0 and 1, and the runs at least {_BATCH * _BATCHES}: they are {precision:g} "
             f"and {most}."
         )
-    study = _Study(model, population, names, limits, {"until": until, "start": start}, seed, processes)
-    return study.result(precision, most, shares)
+    return _Study(model, population, names, limits, run, seed, processes).result(precision, most, shares)
 
 
 class _Study:
