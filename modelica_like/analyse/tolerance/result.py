@@ -118,7 +118,9 @@ class Tolerances(Shown):
                 column = self.samples[:, k]
                 axes.hist(column[np.isfinite(column)], bins=_BINS, color=COLOURS[5])
                 for level in (1, 3):
-                    axes.axvline(spread.quantiles[level], color=COLOURS[1], linewidth=0.8)
+                    share = f"{100 * spread.LEVELS[level]:g} % of runs are below"
+                    axes.axvline(spread.quantiles[level], color=COLOURS[level], linewidth=0.8, label=share)
+                axes.legend(loc="best")
                 axes.set_xlabel(f"{spread.name} in {spread.unit_text}" if spread.unit_text else spread.name)
                 axes.set_ylabel("runs")
         return figure
