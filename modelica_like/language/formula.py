@@ -316,6 +316,8 @@ def _unknown_unit(text: str) -> str:
 def _not_a_formula(text: str, why: str = "", advice: str = "") -> NetlistError:
     shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
     usual = 'A quantity is a number with a unit ("8.5 kg.cm2"), a formula is arithmetic of parameters ("2*J").'
+    if "^" in text:
+        usual = 'A power is written with two asterisks: "w**2".'
     what = f"'{shown}' is neither a quantity nor a formula{'; ' + why if why else ''}."
     return NetlistError(what, advice=advice or usual)
 

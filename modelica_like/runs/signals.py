@@ -129,7 +129,7 @@ def formula_of(word: str) -> Formula | None:
     try:
         formula = parse_formula(word)
     except NetlistError:
-        if set(word) & set("+-/( "):
+        if set(word) & set("+-/(^ "):
             raise
         return None
     return formula if formula.operation != "name" and any(True for _ in formula.names()) else None

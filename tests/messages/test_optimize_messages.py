@@ -286,6 +286,34 @@ Give plain limits.""",
         """Only a drive of a netlist can be saved as one.
 The values are in `values`, the model in `model`.""",
     ),
+    "a gain without frequency": (
+        ValueOutOfRange,
+        lambda: optimize(D, minimize="gain(load_torque, clutch.tau)", free=F),
+        """'gain(load_torque, clutch.tau)' has no frequency.
+Write gain(force, mass.s, 5 Hz).""",
+    ),
+    "a gain at no frequency": (
+        UnitError,
+        lambda: optimize(D, minimize="gain(load_torque, clutch.tau, 5 s)", free=F),
+        """The frequency of 'gain(load_torque, clutch.tau, 5 s)' expects Hz; '5 s' is s.""",
+    ),
+    "a peak without number": (
+        ValueOutOfRange,
+        lambda: optimize(D, minimize="resonance(load_torque, clutch.tau, first)", free=F),
+        """'resonance(load_torque, clutch.tau, first)': peaks are counted from 1, not by 'first'.
+Without a number it is the largest peak.""",
+    ),
+    "an unknown input": (
+        UnknownName,
+        lambda: optimize(D, minimize="resonance(load_torqe, clutch.tau)", free=F),
+        """'resonance(load_torqe, clutch.tau)': machine_table_direct has no 'load_torqe'; did you mean 'load_torque'?""",
+    ),
+    "a power as in Modelica": (
+        NetlistError,
+        lambda: optimize(D, minimize="integral(clutch.tau^2)", free=F),
+        """'clutch.tau^2' is neither a quantity nor a formula.
+A power is written with two asterisks: "w**2".""",
+    ),
     "no pair of numbers": (
         ValueOutOfRange,
         lambda: read_bounds("clutch.capacity=20"),
@@ -317,3 +345,36 @@ def test_tables_of_kinds(tmp_path: Path, name: str) -> None:
         optimize(path)
     assert caught.value.what == message
     assert "hubs.csv" in str(caught.value)
+
+
+CHECKS = {
+    "a run of its own": (
+        'torque = { from = "drive.toml", peak = "brake.tau", until = "1 s" }',
+        "shaft.safety",
+        """A load of 'drive.toml' has a run of its own.
+Of a load of this netlist the run of the optimisation counts, so it has neither `until` nor `set`.""",
+    ),
+    "several values": (
+        'torque = ["1 N.m", "2 N.m"]',
+        "shaft.safety",
+        """'shaft.safety' has 2 values.
+Write one of them: shaft.safety[0].""",
+    ),
+    "no such line": (
+        'torque = { from = "drive.toml", peak = "brake.tau" }',
+        "shaft.safty",
+        """'shaft.safty': the result has no line 'safty'; did you mean 'safety'?""",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_lines_of_design_checks(tmp_path: Path, name: str) -> None:
+    torque, line, message = CHECKS[name]
+    check = f'[checks.shaft]\nis = "shaft_stress"\nbending = "0 N.m"\n{torque}\ndiameter = "10 mm"\n'
+    (tmp_path / "checks.toml").write_text(check + 'yield_strength = "275 N/mm2"\n')
+    (tmp_path / "drive.toml").write_text('sizing = "checks.toml"\n' + TEXT + FREE + f'subject_to = ["{line} >= 2.5"]\n')
+    with pytest.raises(ModelicaLikeError) as caught:
+        optimize(tmp_path / "drive.toml")
+    assert "\n".join(filter(None, [caught.value.what, caught.value.advice])) == message
+    assert "drive.toml" in str(caught.value)

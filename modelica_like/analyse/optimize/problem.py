@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.analyse.optimize.modal import is_modal, modal_unit
+from modelica_like.analyse.optimize.sized import Sized
 from modelica_like.analyse.optimize.terms import (
     Aim,
     Case,
@@ -29,8 +31,9 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language import Component
 from modelica_like.language.inside import declarations
-from modelica_like.language.units import parse_unit, to_si
-from modelica_like.simulation import Model, build, loaded
+from modelica_like.language.units import Unit, parse_unit, to_si
+from modelica_like.runs.readings import read_number
+from modelica_like.simulation import Model, build, loaded, quick_run
 
 _PROFILE = {"points", "rows", "from", "to", "rising", "falling"}
 
@@ -77,7 +80,8 @@ class Problem:
         limits: of outputs.
         cases: load cases; all limits hold in each, and the worst counts.
         ordered: pairs (k, l) of what is free: value k is at most value l.
-        outputs: names of all numbers that are read off a run.
+        outputs: names of all numbers of a design.
+        sized: the design checks of the drive's sizing file.
     """
 
     question: Question
@@ -88,6 +92,7 @@ class Problem:
     cases: tuple[Case, ...]
     ordered: tuple[tuple[int, int], ...]
     outputs: tuple[str, ...]
+    sized: Sized
 
     @property
     def low(self) -> Vector:
@@ -134,9 +139,11 @@ def make_problem(
         model = model.with_parameters(dict(question.parameters or {}))
         free = read_free(model, plain | cells)
     with placed("minimize" if question.minimize else "maximize"):
-        aims = read_aims(model, question.minimize, question.maximize)
+        sized = Sized(drive, model)
+        unit_of = _units(model, sized, question)
+        aims = read_aims(unit_of, question.minimize, question.maximize)
     with placed("subject_to"):
-        limits = read_limits(model, question.subject_to)
+        limits = read_limits(unit_of, question.subject_to)
     with placed("for"):
         cases = read_cases(model, question.cases, free)
     names = [parameter.name for parameter in free]
@@ -144,7 +151,25 @@ def make_problem(
     outputs = tuple(dict.fromkeys([*(row.output for row in rows), *(limit.name for limit in limits)]))
     order = tuple((names.index(low), names.index(high)) for low, high in ordered)
     _check_chances(model, question, limits, placed)
-    return Problem(question, model, free, aims, limits, cases, order, outputs)
+    return Problem(question, model, free, aims, limits, cases, order, outputs, sized)
+
+
+def _units(model: CompiledDae, sized: Sized, question: Question) -> Callable[[str], Unit]:
+    """Return what knows the units of outputs: of the linearized drive, of a design check, of a run."""
+    loads: list[Vector] = []
+
+    def unit_of(name: str) -> Unit:
+        if is_modal(name):
+            return modal_unit(model, name)
+        if not sized.has(name):
+            return read_number(model, name).unit
+        if not loads:
+            names = sized.loads
+            run = quick_run(model, question.until, start=question.start, readings=names) if names else None
+            loads.append(np.array(run.read(*names) if run is not None else (), float).reshape(len(names)))
+        return sized.unit(name, loads[0])
+
+    return unit_of
 
 
 def _check_chances(
@@ -153,6 +178,9 @@ def _check_chances(
 ) -> None:  # fmt: skip
     """Refuse limits with a probability where nothing scatters."""
     chances = [limit for limit in limits if limit.probability < 1.0]
+    for limit in chances:
+        with placed("subject_to"):
+            read_number(model, limit.name)  # no mode and no design check
     if chances and not question.tolerances:
         with placed("subject_to"):
             raise ValueOutOfRange(

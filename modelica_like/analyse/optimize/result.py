@@ -197,9 +197,8 @@ class Optimum(Shown):
         lines = [f"{self.model.name}: {self.runs} runs"]
         lines += [f"  {path:{width}}  {label}" for path, label in self.chosen.items()]
         for parameter in self.parameters:
-            lines.append(
-                f"  {parameter.name:{width}}  {parameter.before:12.6g} → {parameter.value:12.6g} {parameter.unit}"
-            )
+            change = f"{parameter.before:12.6g} → {parameter.value:12.6g}"
+            lines.append(f"  {parameter.name:{width}}  {change} {parameter.unit_text}".rstrip())
         for row in (*self.objectives, *self.limits):
             limit = "" if np.isnan(row.limit) else f"  ({row.text})"
             case = f"  [{row.case}]" if row.case else ""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from modelica_like.analyse.optimize.modal import modal_slopes, modal_unit, modal_values
+from modelica_like.analyse.optimize.modal import is_modal, modal_slopes, modal_values
 from modelica_like.analyse.optimize.problem import Problem
 from modelica_like.analyse.sensitivity.function import SimulationFunction, simulation_function
 from modelica_like.compile.buffers import Vector
@@ -50,9 +50,13 @@ class Runs:
         self.problem, self._told = problem, told
         question, names = problem.question, [parameter.name for parameter in problem.free]
         self.functions: list[SimulationFunction] = []
-        self.modal = [name for name in problem.outputs if modal_unit(name) is not None]
-        self.read = [name for name in problem.outputs if name not in self.modal]
-        order = [*self.read, *self.modal]
+        self.modal = [name for name in problem.outputs if is_modal(name)]
+        self.sized = [name for name in problem.outputs if problem.sized.has(name)]
+        loads = problem.sized.loads if self.sized else ()
+        runs = [name for name in problem.outputs if name not in self.modal and name not in self.sized]
+        self.read = list(dict.fromkeys([*runs, *loads]))
+        self._loads = [self.read.index(name) for name in loads]
+        order = [*self.read, *self.modal, *self.sized]
         self._places = [order.index(name) for name in problem.outputs]
         for case in problem.cases if self.read else ():
             run = {"until": question.until, "start": question.start, "parameters": dict(case.values)}
@@ -87,7 +91,8 @@ class Runs:
             if self.read:
                 results = [function.at(x) for function in self.functions]
                 values = np.array([[output.value for output in result.outputs] for result in results])
-                parts.insert(0, (values, np.array([result.derivatives for result in results])))
+                slopes = np.array([result.derivatives for result in results])
+                parts = [(values, slopes), *parts, (self._lines(values), self._slopes_of_lines(values, slopes))]
         except ModelicaLikeError as error:
             self.refusals.append((x.copy(), error))
             return error
@@ -103,11 +108,27 @@ class Runs:
         if isinstance(known, Design):
             return known.values
         try:
-            parts = [np.array([function.values_at(x) for function in self.functions])] if self.read else []
-            return np.concatenate([*parts, self._modes(x, slopes=False)[0]], axis=1)[:, self._places]
+            parts = [self._modes(x, slopes=False)[0]]
+            if self.read:
+                values = np.array([function.values_at(x) for function in self.functions])
+                parts = [values, *parts, self._lines(values)]
+            return np.concatenate(parts, axis=1)[:, self._places]
         except ModelicaLikeError as error:
             self.refusals.append((x.copy(), error))
             return None
+
+    def _lines(self, values: Vector) -> Vector:
+        """Return lines of design checks, shape (cases, lines), from what was read off the runs."""
+        sized, names = self.problem.sized, self.sized
+        lines = [sized.values(names, row[self._loads]) for row in values] if names else []
+        return np.array(lines).reshape(len(values), len(names))
+
+    def _slopes_of_lines(self, values: Vector, slopes: Vector) -> Vector:
+        """Return their derivatives by x, shape (cases, lines, free), through the loads."""
+        sized = self.problem.sized
+        by_loads = [sized.slopes(self.sized, row[self._loads]) for row in values if self.sized]
+        rows = [lines @ inner[self._loads] for lines, inner in zip(by_loads, slopes, strict=False)]
+        return np.array(rows).reshape(len(values), len(self.sized), slopes.shape[2])
 
     def _modes(self, x: Vector, *, slopes: bool) -> tuple[Vector, Vector]:
         """Return outputs of modes, shape (cases, outputs), and their derivatives by x."""
@@ -131,7 +152,10 @@ class Runs:
             run = simulate(
                 self.problem.model, question.until, parameters=dict(parameters), start=question.start, solver="idas"
             )
-            values |= dict(zip(self.read, map(float, run.read(*self.read)), strict=True))
+            numbers = np.array(run.read(*self.read), float).reshape(1, -1)
+            values |= dict(
+                zip([*self.read, *self.sized], map(float, [*numbers[0], *self._lines(numbers)[0]]), strict=True)
+            )
         if self.modal:
             model = self.problem.model.with_parameters(dict(parameters))
             values |= dict(zip(self.modal, map(float, modal_values(model, self.modal, question.start)), strict=True))

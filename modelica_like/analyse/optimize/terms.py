@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
 
 import numpy as np
 
-from modelica_like.analyse.optimize.modal import modal_unit
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnitError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import ONE, Unit, read_quantity, same_dimension, to_si
 from modelica_like.runs.calls import call_of
-from modelica_like.runs.readings import read_number
 
 Sense = Literal["<=", ">=", "=="]
 _CHANCE = re.compile(r"P\s*\((?P<inside>.+)\)\s*>=\s*(?P<share>[^<>=()]+)", re.DOTALL)
 _LEAST_CHANCE = 0.5
 """At one half, and below, a limit need not keep a distance."""
+UnitOf = Callable[[str], Unit]
 _LIMIT = re.compile(r"(?P<left>.+?)(?P<sense><=|>=|==|<|>|=)(?P<right>.+)", re.DOTALL)
 
 
@@ -162,8 +161,8 @@ def model_value(model: CompiledDae, name: str) -> float:
     return float(np.concatenate([model.p, model.u])[model.fixed_position[name]])
 
 
-def read_aims(model: CompiledDae, minimize: Sequence[str], maximize: Sequence[str]) -> tuple[Aim, ...]:
-    """Return the objectives.
+def read_aims(unit_of: UnitOf, minimize: Sequence[str], maximize: Sequence[str]) -> tuple[Aim, ...]:
+    """Return the objectives; `unit_of` knows the outputs.
 
     Raises:
         UnknownName: the model has no such output.
@@ -174,26 +173,20 @@ def read_aims(model: CompiledDae, minimize: Sequence[str], maximize: Sequence[st
         raise ValueOutOfRange(
             "An optimisation needs an objective.", advice='Say what is to be small: minimize = "peak(shaft.tau)".'
         )
-    return (*(_aim(model, text, 1.0) for text in minimize), *(_aim(model, text, -1.0) for text in maximize))
+    return (*(_aim(unit_of, text, 1.0) for text in minimize), *(_aim(unit_of, text, -1.0) for text in maximize))
 
 
-def _aim(model: CompiledDae, text: str, sign: float) -> Aim:
+def _aim(unit_of: UnitOf, text: str, sign: float) -> Aim:
     """Read an output, or the largest (to maximise, the least) of several, `max(peak(a.tau), peak(b.tau))`."""
     called = call_of(text)
     names = _split(called[1]) if called is not None and called[0] == ("max" if sign > 0 else "min") else [text]
     if len(names) == 1:
         names = [text.strip()]
-    units = [_unit(model, name) for name in names]
+    units = [unit_of(name) for name in names]
     for unit in units[1:]:
         if not same_dimension(unit, units[0]):
             raise UnitError(f"'{text}' compares {units[0]} with {unit}.")
     return Aim(text.strip(), units[0], sign, tuple(row for name in names for row in _rows(name, sign)))
-
-
-def _unit(model: CompiledDae, name: str) -> Unit:
-    """Return the unit of an output of a run or of a mode."""
-    unit = modal_unit(name)
-    return read_number(model, name).unit if unit is None else unit
 
 
 def _split(text: str) -> list[str]:
@@ -213,22 +206,22 @@ def _rows(name: str, sign: float) -> tuple[Row, ...]:
     return (Row(name, sign),)
 
 
-def read_limits(model: CompiledDae, texts: Sequence[str]) -> tuple[Limit, ...]:
-    """Return the limits.
+def read_limits(unit_of: UnitOf, texts: Sequence[str]) -> tuple[Limit, ...]:
+    """Return the limits; `unit_of` knows the outputs.
 
     Raises:
         ValueOutOfRange: a text is no relation.
         UnknownName: the model has no such output.
         UnitError: the sides have different units.
     """
-    return tuple(_with_probability(model, text) for text in texts)
+    return tuple(_with_probability(unit_of, text) for text in texts)
 
 
-def _with_probability(model: CompiledDae, text: str) -> Limit:
+def _with_probability(unit_of: UnitOf, text: str) -> Limit:
     called = _CHANCE.fullmatch(text.strip())
     if called is None:
-        return _limit(model, text)
-    number, limit = read_quantity(called["share"]), _limit(model, called["inside"].strip())
+        return _limit(unit_of, text)
+    number, limit = read_quantity(called["share"]), _limit(unit_of, called["inside"].strip())
     share = number[0] * number[1].factor if number is not None and same_dimension(number[1], ONE) else 0.0
     if not _LEAST_CHANCE < share < 1.0 or limit.sense == "==":
         raise ValueOutOfRange(
@@ -238,7 +231,7 @@ def _with_probability(model: CompiledDae, text: str) -> Limit:
     return replace(limit, text=text, probability=share, inner=called["inside"].strip())
 
 
-def _limit(model: CompiledDae, text: str) -> Limit:
+def _limit(unit_of: UnitOf, text: str) -> Limit:
     sides = _LIMIT.fullmatch(text.strip())
     if sides is None or sides["sense"] == "=":
         raise ValueOutOfRange(
@@ -247,11 +240,11 @@ def _limit(model: CompiledDae, text: str) -> Limit:
         )
     left, right = sides["left"].strip(), sides["right"].strip()
     sense = cast("Sense", {"<": "<=", ">": ">="}.get(sides["sense"], sides["sense"]))
-    unit = _unit(model, left)
+    unit = unit_of(left)
     number = read_quantity(right)
     if number is None:
         name = f"{left} - ({right})"
-        return Limit(text, name, read_number(model, name).unit, sense, 0.0)
+        return Limit(text, name, unit_of(name), sense, 0.0)
     if number[1] == ONE and str(unit) not in ("1", "*"):
         raise UnitError(
             f"'{text}' compares a value in {unit} with a number without a unit.",

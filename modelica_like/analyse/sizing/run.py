@@ -108,7 +108,7 @@ def size(path: str | Path, runs: Mapping[Path, Solution] | None = None) -> Sizin
         ModelicaLikeError: the file has an error; the message says what, where and what to do.
     """
     document = read_document(Path(path))
-    run = _Run(document, Simulations(Path(path).parent, runs))
+    run = Checks(document, Simulations(Path(path).parent, runs))
     checks = tuple(run.checked(name) for name in document.checks)
     for heading, names in document.compare.items():
         place = document.lines.source("compare", heading)
@@ -138,7 +138,7 @@ def survey(path: Path, text: str) -> list[ModelicaLikeError]:
         return [*error.problems()]
     for name in document.checks:
         try:
-            _Run(document, _NoRuns(path.parent)).checked(name)
+            Checks(document, _NoRuns(path.parent)).checked(name)
         except _Later:
             continue
         except ModelicaLikeError as error:
@@ -149,7 +149,7 @@ def survey(path: Path, text: str) -> list[ModelicaLikeError]:
     return [*errors.values()]
 
 
-class _Run:
+class Checks:
     """Computes checks and parameters on demand, each once."""
 
     def __init__(self, document: SizingDocument, simulations: Simulations) -> None:

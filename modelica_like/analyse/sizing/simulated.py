@@ -38,6 +38,12 @@ def load_of(run: Solution, key: Any, what: str = "peak") -> float:
     return float(run.read(_name(key if isinstance(key, str) else run.path(key), what))[0])
 
 
+def name_of_load(table: Mapping[str, Any]) -> str:
+    """Return the reading that a table with one of `READERS` takes."""
+    what = next(key for key in table if key in READERS)
+    return _name(table[what], what)
+
+
 def _name(path: str, what: str) -> str:
     if what not in READERS:
         raise unknown_name(
@@ -65,7 +71,7 @@ class Simulations:
                 f"{where} must be a value, or name a netlist and one variable of it.",
                 advice='Write { from = "drive.toml", peak = "clutch.tau" }.',
             )
-        name = _name(table[wanted[0]], wanted[0])
+        name = name_of_load(table)
         run = self._run(table, name)
         unit = parse_unit(str(read_output(run.model, name).unit))
         return Value(float(run.read(name)[0]), unit)

@@ -75,7 +75,8 @@ def tolerance(
     model = build(drive, free=given).with_parameters(dict(parameters or {}))
     with placed(drive, "tolerances"):
         population = read_population(model, given, pairs, folder)
-    limits = read_limits(model, [subject_to] if isinstance(subject_to, str) else list(subject_to))
+    texts = [subject_to] if isinstance(subject_to, str) else list(subject_to)
+    limits = read_limits(lambda name: read_number(model, name).unit, texts)
     names = [of] if isinstance(of, str) else list(of)
     run = {"until": until, "start": start}
     return spread(model, population, names, limits, run, precision, most, shares=shares, seed=seed, processes=processes)
