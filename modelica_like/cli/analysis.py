@@ -190,10 +190,11 @@ def optimize(
         Path | None, Option("--output", "-o", metavar="FILE", help="Write the netlist with the best values.")
     ] = None,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the front, or the way to the optimum.")] = None,
+    report: Annotated[Path | None, Option(metavar="FILE", help="Write a page about the best design.")] = None,
     json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Find the best design: what [optimize] of the netlist asks for, or these options."""
-    with told(debug, json=json, pictures=[plot], files=[output]) as page:
+    with told(debug, json=json, pictures=[plot], files=[output, report]) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.optimize.optimize import optimize as find
         from modelica_like.analyse.optimize.result import Optimum
@@ -213,13 +214,19 @@ def optimize(
         page.print(optimum_report(result))
         if plot:
             save_plot(result.plot(), plot)
-        if output and not isinstance(result, Optimum):
-            raise ValueOutOfRange(
-                "A front is no single design to write.", advice="Limit one of the objectives by --subject-to."
-            )
-        if output and isinstance(result, Optimum):
+        if not isinstance(result, Optimum):
+            if output or report:
+                raise ValueOutOfRange(
+                    "A front is no single design to write.", advice="Limit one of the objectives by --subject-to."
+                )
+            return
+        if output:
             result.save(output)
-        if isinstance(result, Optimum) and not result.feasible:
+        if report:
+            from modelica_like.show.report.page import save_report
+
+            save_report(result.best_drive(), result.simulate(), report, optimum=result)
+        if not result.feasible:
             raise SystemExit(SOLVE_FAILED)  # as `size` does where a limit is exceeded
 
 

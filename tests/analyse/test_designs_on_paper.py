@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like import linearize, load, optimize
+from modelica_like import linearize, load, optimize, save_report
 from modelica_like.analyse.optimize.result import Optimum
 from modelica_like.netlist import loads
 
@@ -163,3 +163,24 @@ def test_a_design_check_limits_a_design(tmp_path: Path) -> None:
     least = optimum(load(tmp_path / "brake.toml"), maximize="shaft.safety", subject_to="brake.lock_time <= 10 s")
     assert least["brake.capacity"] == pytest.approx(10.0, rel=1e-6)
     assert least["shaft.safety"] == pytest.approx(2.5 * most / 10.0, rel=1e-6)
+
+
+def test_a_page_about_the_best_design(tmp_path: Path) -> None:
+    """It has the values, the limits, the sentences and the runs before and after."""
+    (tmp_path / "checks.toml").write_text(CHECKS)
+    (tmp_path / "brake.toml").write_text(BRAKE + 'subject_to = ["shaft.safety >= 2.5", "max(brake.tau) <= 90 N.m"]\n')
+    best = optimum(load(tmp_path / "brake.toml"))
+    assert best.simulate(before=True)["brake.capacity"][-1] == pytest.approx(20.0)
+    save_report(best.best_drive(), best.simulate(), tmp_path / "best.html", optimum=best)
+    page = (tmp_path / "best.html").read_text(encoding="utf-8")
+    section = page.split("<h2>Best design</h2>")[1].split("</section>")[0]
+    for text in (
+        "brake.capacity",
+        "12.4699",
+        "shaft.safety &gt;= 2.5",
+        "is active",
+        "Before and after",
+        f"{best.runs} runs",
+    ):
+        assert text in section, text
+    assert section.count("data:image/svg+xml;base64,") == 2

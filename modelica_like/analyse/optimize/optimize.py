@@ -197,16 +197,20 @@ class _Study:
         before = self.runs.at(problem.begin)
         after, notes = self._checked(values, self.runs.at(x))
         first = before.values if before is not None else np.full(after.shape, np.nan)
+        objectives, question = self._objectives(first, after), problem.question
+        worst = next(case for case in problem.cases if case.name == objectives[0].case)
+        run = {"until": question.until, "start": question.start, "parameters": dict(worst.values)}
         return Optimum(
             problem.model.with_parameters(dict(values)),
             tuple(
                 Chosen(p.name, p.unit, p.low, p.high, p.value, value)
                 for p, value in zip(problem.free, values.values(), strict=True)
             ),
-            {}, self._objectives(first, after), self._limits(search, outcome, first, after),
+            {}, objectives, self._limits(search, outcome, first, after),
             outcome.excess <= FEASIBLE, outcome.optimal, self.runs.count,
             np.array([search.measures(design.values) for design in self.runs.designs]) * [search.aim_scale, 1.0],
             notes=(*notes, *self._remarks(outcome)), drive=self.drive if isinstance(self.drive, Component) else None,
+            run=run,
         )  # fmt: skip
 
     def _checked(self, values: Mapping[str, float], design: Any) -> tuple[Vector, list[str]]:

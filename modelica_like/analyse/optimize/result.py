@@ -21,6 +21,8 @@ from modelica_like.upper import Shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from modelica_like.runs.solution import Solution
+
 _WITHIN = 1e-6
 """Excess of a limit over its size that counts as none."""
 _AT_BOUND = 1e-6
@@ -104,6 +106,8 @@ class Optimum(Shown):
         history: objective and largest relative excess of a limit of all designs tried, shape (designs, 2).
         combinations: objective of each combination of choices; nan where limits cannot be met.
         notes: sentences about the search.
+        drive: the drive as it was, with what was chosen.
+        run: arguments of its runs, in the load case that is worst.
     """
 
     model: CompiledDae
@@ -118,6 +122,7 @@ class Optimum(Shown):
     combinations: tuple[tuple[Mapping[str, Any], float], ...] = field(default=(), repr=False)
     notes: tuple[str, ...] = ()
     drive: Component | None = field(default=None, repr=False)
+    run: Mapping[str, Any] = field(default_factory=dict[str, Any], repr=False)
 
     def __getitem__(self, name: str) -> float:
         """Return a value of the best design: a free parameter, or the worst of an objective or limited output.
@@ -137,6 +142,17 @@ class Optimum(Shown):
         """Best values in SI units by path, as `parameters` of a run."""
         return {parameter.name: parameter.value for parameter in self.parameters}
 
+    def simulate(self, *, before: bool = False) -> Solution:
+        """Run the best design, or the drive as it was, in the load case that is worst.
+
+        Raises:
+            ModelicaLikeError: a run fails.
+        """
+        from modelica_like.simulation import simulate
+
+        given = {parameter.name: parameter.before for parameter in self.parameters} if before else self.values
+        return simulate(self.model, **{**self.run, "parameters": {**self.run.get("parameters", {}), **given}})
+
     def save(self, path: str | Path) -> None:
         """Write the drive with the best values as a netlist.
 
@@ -145,6 +161,14 @@ class Optimum(Shown):
         """
         from modelica_like.netlist import save
 
+        save(self.best_drive(), path)
+
+    def best_drive(self) -> Assembly:
+        """Return the drive with the best values.
+
+        Raises:
+            LanguageError: the drive is no netlist.
+        """
         if not isinstance(self.drive, Assembly):
             raise LanguageError(
                 "Only a drive of a netlist can be saved as one.",
@@ -162,7 +186,7 @@ class Optimum(Shown):
                 drive.set(parameter.name, parameter.value)
         for table, rows in tables.items():
             drive.set(table, rows)
-        save(drive, path)
+        return drive
 
     def sentences(self) -> list[str]:
         """Return what holds the design back, what that costs, and notes."""

@@ -179,7 +179,7 @@ def read_aims(unit_of: UnitOf, minimize: Sequence[str], maximize: Sequence[str])
 def _aim(unit_of: UnitOf, text: str, sign: float) -> Aim:
     """Read an output, or the largest (to maximise, the least) of several, `max(peak(a.tau), peak(b.tau))`."""
     called = call_of(text)
-    names = _split(called[1]) if called is not None and called[0] == ("max" if sign > 0 else "min") else [text]
+    names = split(called[1]) if called is not None and called[0] == ("max" if sign > 0 else "min") else [text]
     if len(names) == 1:
         names = [text.strip()]
     units = [unit_of(name) for name in names]
@@ -189,7 +189,7 @@ def _aim(unit_of: UnitOf, text: str, sign: float) -> Aim:
     return Aim(text.strip(), units[0], sign, tuple(row for name in names for row in _rows(name, sign)))
 
 
-def _split(text: str) -> list[str]:
+def split(text: str) -> list[str]:
     """Split at the commas that are in no brackets."""
     parts, depth = [""], 0
     for char in text:

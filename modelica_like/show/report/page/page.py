@@ -13,6 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.optimize.result import Optimum
 from modelica_like.arguments import checked
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.fmi.export import tool
@@ -27,6 +28,7 @@ from modelica_like.show.draw import schematic
 from modelica_like.show.plot import for_page, quantity_of
 from modelica_like.show.report.changes import Change, changes
 from modelica_like.show.report.page.assessed import design_checks, ranking, small_motions
+from modelica_like.show.report.page.best import best_design
 from modelica_like.show.report.page.tables import details, table
 from modelica_like.show.report.plausible import notes as plausible
 from modelica_like.show.report.run import notices, statistics_line
@@ -44,7 +46,10 @@ _SMALL = 5e-4
 
 
 @checked
-def save_report(drive: Component | None, run: Trajectories, path: str | Path, *, show: Sequence[str] = ()) -> None:
+def save_report(
+    drive: Component | None, run: Trajectories, path: str | Path, *, show: Sequence[str] = (),
+    optimum: Optimum | None = None,
+) -> None:  # fmt: skip
     """Write the report of a run as a page.
 
     Args:
@@ -53,21 +58,25 @@ def save_report(drive: Component | None, run: Trajectories, path: str | Path, *,
         path: the file.
         show: names, patterns or formulas of the curves; by default speeds, torques and forces of the parts, or what a
             circuit has.
+        optimum: the search that this drive is the result of, told in a section of its own.
 
     Raises:
         UnknownName: nothing matches a pattern.
         OSError: the file cannot be written.
     """
-    write_text(path, report(drive, run, show=show))
+    write_text(path, report(drive, run, show=show, optimum=optimum))
 
 
-def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = ()) -> str:
+def report(
+    drive: Component | None, run: Trajectories, *, show: Sequence[str] = (), optimum: Optimum | None = None
+) -> str:
     """Return the report of a run as HTML: one file that loads nothing else.
 
     Args:
         drive: the drive; None if only results are known, those of an FMU or a table.
         run: its run.
         show: as of `save_report`.
+        optimum: as of `save_report`.
 
     Raises:
         UnknownName: nothing matches a pattern.
@@ -79,6 +88,7 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
     left = escape(drawn.pop("left")).replace("--show", "<code>--show</code>")
     hint = f"{_READ} {left}" if drawn["panels"] else _NO_CURVES
     sections = [
+        ("Best design", best_design(optimum) if optimum is not None else ""),
         ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>' if drive else ""),
         ("What happens", _happens(drive, run)),
         ("Curves", f'<div id="curves"></div><p class="hint">{hint}</p>'),
