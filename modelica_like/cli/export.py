@@ -42,6 +42,9 @@ def export(
     embed: Annotated[
         bool, Option("--embed", help="Compile the model into the binary, for importers that do not locate resources.")
     ] = False,
+    compiled: Annotated[
+        bool, Option("--compiled", help="Compile the equations into the binary, too: the same results, faster.")
+    ] = False,
     modes: Annotated[Modes, Option(help="Modes as outputs, local variables, or integer outputs.")] = "output",
     fixed_step: FixedStep = None,
     tables: Annotated[
@@ -68,7 +71,7 @@ def export(
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, ("me", "cs") if kind == "both" else (kind,),
                 () if platforms == ["none"] else platforms or ("native",),
-                outputs=outputs or (), ends=ends or (), takes=takes, embed=embed, modes=modes,
+                outputs=outputs or (), ends=ends or (), takes=takes, embed=embed, compiled=compiled, modes=modes,
                 fixed_step=fixed_step, tables=tables or (), check=check, strict=strict, report=status.update,
             )  # fmt: skip
         say(str(done))

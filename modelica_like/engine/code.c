@@ -1,6 +1,12 @@
 /* Tapes and the LU of the step matrix as compiled code, where the model has some (straight.py); what they need. */
 #include "core.h"
 
+void use_codes(Model *m, const Codes *codes) {
+    m->codes = codes;
+    m->n_known = 0;
+    for (int k = 0; k < N_CODES; k++) m->n_known += codes->tapes[k].n_known;
+}
+
 /* Lists and marks the guards of the modes at the point that was loaded last. */
 const unsigned char *active_guards(Instance *c) {
     if (c->active_by == c->decided_by + 1) return c->active;

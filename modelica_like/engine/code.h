@@ -9,7 +9,7 @@
 
 /* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
    Versions can only be told to a linker that is given libm. */
-#if defined(OLD_GLIBC) && !defined(CODE_ONLY) && defined(__GLIBC__) && (defined(__x86_64__) || defined(__aarch64__))
+#if defined(OLD_GLIBC) && !defined(NEW_GLIBC) && defined(__GLIBC__) && (defined(__x86_64__) || defined(__aarch64__))
 #ifdef __x86_64__
 #define OLD(f) ".symver " #f "," #f "@GLIBC_2.2.5\n"
 #else
@@ -93,7 +93,9 @@ static inline void lu_solve(int n, const double *m, const int *order, double *x)
 /* One pattern fits all texts. */
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #pragma GCC diagnostic ignored "-Wunused-variable"
+#ifndef CODES
 #define CODES __attribute__((visibility("default"))) const Codes codes =
+#endif
 #define OPERATION(name, value, by_a, by_b)                                                              \
     static inline double value_##name(double a, double b) { return (void)b, value; }                    \
     static inline double slope_##name(double a, double b, double f, double dot_of_a, double dot_of_b) { \

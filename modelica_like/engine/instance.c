@@ -212,6 +212,7 @@ Instance *instance_open(Instance bare, const char *token, const char *location) 
                                      : model_open(location, bare.allocate, bare.release, message);
     if (own == NULL && bare.name == NULL) bare.name = "?";
     if (own == NULL) return refuse(&bare, "%s", message), NULL;
+    if (model_data_size > 0 && model_codes != NULL) use_codes(own, model_codes);
     bare.model = own;
     Instance *c = instance_new(bare, token);
     if (c == NULL) model_free(own);

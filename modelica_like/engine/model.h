@@ -171,6 +171,7 @@ static inline const Tape *tapes_of(const Model *m) { return (const Tape *)(const
 #define REFUSE(...) (snprintf(message, MESSAGE_LENGTH, __VA_ARGS__), (void *)0)
 typedef void *(*Allocate)(size_t count, size_t size);
 typedef void (*Release)(void *memory);
+void use_codes(Model *m, const Codes *codes);
 Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message);
 void model_free(Model *m);
 uint32_t crc32_of(const unsigned char *bytes, size_t size);
@@ -180,5 +181,6 @@ Model *model_open(const char *location, Allocate allocate, Release release, char
 /* model_data.c: the bytes of the file where they are compiled in, of size 0 where they are read */
 extern const uint64_t model_data[];
 extern const size_t model_data_size;
+extern const Codes *const model_codes; /* of the same model, or NULL */
 
 #endif

@@ -3,3 +3,4 @@
 
 const uint64_t model_data[] = {0};
 const size_t model_data_size = 0;
+const Codes *const model_codes = NULL;

@@ -56,11 +56,7 @@ EXPORTED Model *native_open(const unsigned char *bytes, size_t size, char *messa
 EXPORTED void native_close(Model *m) { model_free(m); }
 
 /* Compiled code, which must outlive it, for handles that are made from now on. */
-EXPORTED void native_compiled(Model *m, const Codes *codes) {
-    m->codes = codes;
-    m->n_known = 0;
-    for (int k = 0; k < N_CODES; k++) m->n_known += codes->tapes[k].n_known;
-}
+EXPORTED void native_compiled(Model *m, const Codes *codes) { use_codes(m, codes); }
 
 /* An instance for a program that has loaded this library. */
 Instance *instance_for(const Model *m, void *environment) {

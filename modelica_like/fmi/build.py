@@ -144,10 +144,10 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
 
 
 def _wholes(names: Iterable[str]) -> dict[str, str]:
-    """Join C files, so that common headers are read once; those of FMI 2 and 3 stay separate."""
+    """Join C files, so that common headers are read once; FMI 2, FMI 3 and compiled equations stay separate."""
     wholes: dict[str, str] = {}
     for name in names:
-        group = name[:4] if name.startswith(("fmi2", "fmi3")) else ""
+        group = name[:4] if name.startswith(("fmi2", "fmi3", "code_")) else ""
         wholes[f"whole{group}.c"] = wholes.get(f"whole{group}.c", "") + f'#include "{name}"\n'
     return wholes
 

@@ -27,6 +27,7 @@ from modelica_like.fmi.model_file import MODEL, as_c, model_file, with_token
 from modelica_like.fmi.package import known_version, target_file, write_archive
 from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources, source_files
+from modelica_like.fmi.straight import straight
 from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, icon_name, terminals_and_icons, with_open_ends
 from modelica_like.garbage import without_garbage_search
@@ -42,6 +43,8 @@ _PICTURES = Path(__file__).parent / "pictures"
 _LEGIBLE = 100
 """Largest number of parts of a drive that is drawn as an icon."""
 _TOKEN = "{00000000-0000-0000-0000-000000000000}"
+_CODE, _CODE_HEAD = "code_model.c", "#define CODE_ONLY\n#define CODES const Codes codes =\n"
+"""Compiled equations: a source of their own, for the run-time alone."""
 
 Report = Callable[[str], None]
 
@@ -81,7 +84,7 @@ class Export:
 def export_fmu(
     drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] | str = ("me", "cs"),
     platforms: Sequence[str] | str = "native", *, outputs: Sequence[str] = (), ends: Sequence[str] = (),
-    takes: Takes = "flow", embed: bool = False, modes: ModesAs | str = "output",
+    takes: Takes = "flow", embed: bool = False, compiled: bool = False, modes: ModesAs | str = "output",
     fixed_step: float | str | None = None, tables: Sequence[str] = (), check: bool = True, strict: bool = False,
     report: Report | None = None,
 ) -> Export:  # fmt: skip
@@ -100,6 +103,7 @@ def export_fmu(
         ends: free connectors of parts to open, such as `load.flange_b`.
         takes: what open ends take from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
         embed: compile the model into the binaries, for importers that do not pass the location of resources.
+        compiled: compile the equations, too: the same results, faster. The model is then in the binaries.
         modes: `output` (enumerations), `local` (enumerations without output), or `integer` (outputs).
         fixed_step: step size of Co-Simulation in s, or such as "1 ms", for hardware in the loop: the work of a step is
             bounded, and a communication step is a whole number of them. By default accuracy chooses the steps.
@@ -122,8 +126,9 @@ def export_fmu(
     _check_letters(model)
     variables = interface(model, outputs, as_what)
     tell("writing the model")
-    about = _about(model, chosen, kinds, description, fixed)
-    files = _contents(model, variables, about, equations, embed, _pictures(drive))
+    embed = embed or compiled
+    about = _about(model, chosen, kinds, description, fixed, compiled=compiled)
+    files = _contents(model, variables, about, equations, embed, _pictures(drive), compiled=compiled)
     files |= _binaries(files, identifier(model.name), chosen, names, embed, tell)
     tell("checking")
     checked = _written(files, target, model, about, check and native_platform() in names, strict)
@@ -206,7 +211,10 @@ def _pictures(drive: CompiledDae | Component) -> tuple[bytes, bytes]:
     return svg.encode(), png or general[1]
 
 
-def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], description: str, fixed_step: float) -> About:
+def _about(
+    model: CompiledDae, version: Version, kinds: tuple[Kind, ...], description: str, fixed_step: float, *,
+    compiled: bool,
+) -> About:  # fmt: skip
     settings = model.settings
     end = seconds(settings["until"]) if "until" in settings else None
     points = int(settings.get("points", Options.points))
@@ -214,7 +222,7 @@ def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], descri
     return About(
         version=version, kinds=frozenset(kinds), token=_TOKEN, description=description, stop_time=end,
         tolerance=float(settings.get("rtol", Options.rtol)), step_size=step,
-        sources=source_files(version), log_categories=LOG_CATEGORIES, tool=tool(),
+        sources=(*source_files(version), *([_CODE] if compiled else [])), log_categories=LOG_CATEGORIES, tool=tool(),
         fixed_step=fixed_step,
     )  # fmt: skip
 
@@ -231,8 +239,9 @@ def tool() -> str:
 
 
 def _contents(
-    model: CompiledDae, variables: Interface, about: About, equations: Listing, embed: bool, icon: tuple[bytes, bytes]
-) -> dict[str, bytes]:
+    model: CompiledDae, variables: Interface, about: About, equations: Listing, embed: bool,
+    icon: tuple[bytes, bytes], *, compiled: bool,
+) -> dict[str, bytes]:  # fmt: skip
     """Return all files except the binaries, with a token from their content."""
     texts = {"modelDescription.xml": model_description(model, variables, about)}
     texts |= {f"sources/{name}": text for name, text in runtime_sources((about.version,)).items()}
@@ -249,7 +258,10 @@ def _contents(
             f"terminalsAndIcons/icon.{ending}": drawn for ending, drawn in zip(("svg", "png"), icon, strict=True)
         }
     seen = variables.variables + (variables.arrays if about.version == "3.0" else ())
-    data = model_file(make_tables(model, variables.start), seen, _TOKEN, about.tolerance, about.fixed_step)
+    numbers = make_tables(model, variables.start)
+    data = model_file(numbers, seen, _TOKEN, about.tolerance, about.fixed_step)
+    if compiled:
+        texts[f"sources/{_CODE}"] = _CODE_HEAD + straight(numbers)
     # A GUID that is a hash of the content.
     total = hashlib.sha256(data)
     for key in sorted(texts):
@@ -258,7 +270,7 @@ def _contents(
     token = f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
     data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}
-    texts["sources/model_data.c"] = as_c(data)
+    texts["sources/model_data.c"] = as_c(data, compiled=compiled)
     files: dict[str, bytes] = {name: text.encode() for name, text in texts.items()}
     files |= pictures
     return files if embed else files | {MODEL: data}

@@ -144,8 +144,9 @@ def with_token(data: bytes, old: str, new: str) -> bytes:
     return _headed(data[_HEADER.size :].replace(old.encode() + b"\0", new.encode() + b"\0"))
 
 
-def as_c(data: bytes) -> str:
-    """Write the file of a model as C text, in words of 8 bytes so that it is aligned."""
+def as_c(data: bytes, *, compiled: bool = False) -> str:
+    """Write the file of a model as C text, in aligned words of 8 bytes; `compiled`: its equations are code, too."""
+    codes = "extern const Codes codes;\nconst Codes *const model_codes = &codes;\n"
     words = np.frombuffer(data, "<u8")
     lines = (", ".join(f"{word:#x}u" for word in words[k : k + 6].tolist()) for k in range(0, len(words), 6))
     return (
@@ -153,6 +154,7 @@ def as_c(data: bytes) -> str:
         '#include "model.h"\n\nconst uint64_t model_data[] = {\n    '
         + ",\n    ".join(lines)
         + "};\nconst size_t model_data_size = sizeof model_data;\n"
+        + (codes if compiled else "const Codes *const model_codes = NULL;\n")
     )
 
 

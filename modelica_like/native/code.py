@@ -17,8 +17,8 @@ from modelica_like.errors import ExportError
 from modelica_like.fmi.build import RUNTIMES, build, compiler_command, flags, native_platform
 from modelica_like.fmi.runtime import cache_folder
 from modelica_like.fmi.sources import own_sources
+from modelica_like.fmi.straight import straight
 from modelica_like.fmi.tables import Tables
-from modelica_like.native.straight import straight
 from modelica_like.writing import write_bytes
 
 _HEADERS = ("code.h", "operations.h", "rodas.h")
@@ -48,7 +48,8 @@ def _library(text: str) -> Path:
     name = f"code-{hashlib.sha256(repr(parts).encode()).hexdigest()[:32]}"
     library = cache_folder() / platform / f"{name}{RUNTIMES[platform].suffix}"
     if not library.is_file():
-        files = {f"{name}.c": "#define CODE_ONLY\n" + text} | {header: sources[header] for header in _HEADERS}
+        whole = f"#define CODE_ONLY\n#define NEW_GLIBC\n{text}"
+        files = {f"{name}.c": whole} | {header: sources[header] for header in _HEADERS}
         with TemporaryDirectory(prefix="modelica_like_") as place:
             write_bytes(library, build(files, platform, Path(place), name).read_bytes())
         _tidy(library)

@@ -45,6 +45,36 @@ def test_both_ways_of_export_give_the_same_bits(drive, version, tmp_path):
         assert runs[0].tobytes() == runs[1].tobytes()
 
 
+@pytest.mark.parametrize(
+    ("drive", "version"),
+    [
+        ("elements/switching", "2.0"),
+        ("machine_tool_startup", "3.0"),
+        pytest.param("winch", "2.0", marks=pytest.mark.slow),
+    ],
+)
+def test_compiled_equations_give_the_same_bits(drive: str, version: str, tmp_path: Path) -> None:
+    """Also in Model Exchange, and where the sources are compiled one by one, as an importer does."""
+    paths = [tmp_path / "tapes.fmu", tmp_path / "compiled.fmu"]
+    for path, compiled in zip(paths, (False, True), strict=True):
+        export_fmu(EXAMPLES / f"{drive}.toml", path, version, compiled=compiled, check=False)
+    with zipfile.ZipFile(paths[1]) as archive:
+        assert "resources/model.bin" not in archive.namelist()
+        assert b"run_0" in archive.read("sources/code_model.c")
+        archive.extractall(tmp_path / "unpacked")
+    described = fmpy.read_model_description(str(paths[1]))
+    sources = tmp_path / "unpacked" / "sources"
+    list_of_sources = sources.parent / "modelDescription.xml" if version == "2.0" else sources / "buildDescription.xml"
+    assert '"code_model.c"' in list_of_sources.read_text()
+    command = ["cc", "-std=c99", "-shared", "-fPIC", "-o", str(tmp_path / "own.so")]
+    subprocess.run([*command, *map(str, sorted(sources.glob("*.c"))), "-lm"], check=True)
+    names = [v.name for v in described.modelVariables if v.type in ("Real", "Float64") and v.causality != "independent"]
+    for kind in ("ModelExchange", "CoSimulation"):
+        runs = [fmpy.simulate_fmu(str(path), fmi_type=kind, output=names) for path in paths]
+        assert len(runs[0]) > 100
+        assert runs[0].tobytes() == runs[1].tobytes()
+
+
 # -- where the model is ------------------------------------------------------------------------------------------------
 
 PLACES = [

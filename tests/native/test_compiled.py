@@ -17,10 +17,10 @@ from modelica_like.fmi import build as compiler
 from modelica_like.fmi import sources
 from modelica_like.fmi.interface import interface
 from modelica_like.fmi.model_file import generate
+from modelica_like.fmi.straight import straight
 from modelica_like.fmi.tables import make_tables
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, param, var
 from modelica_like.native import code, model
-from modelica_like.native.straight import straight
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STARTUP = EXAMPLES / "machine_tool_startup.toml"
@@ -73,7 +73,7 @@ def test_examples_are_equal_to_the_bit(name):
 
 def test_long_tapes_are_cut(monkeypatch, cache):
     """Values pass from one function to the next by the slots, those of conditional blocks, too."""
-    monkeypatch.setattr("modelica_like.native.straight._LONGEST", 7)
+    monkeypatch.setattr("modelica_like.fmi.straight._LONGEST", 7)
     drive = build(STARTUP)
     same(*(simulate(drive, 1.0, solver="native", compiled=compiled) for compiled in (False, True)))
 
@@ -82,10 +82,10 @@ def test_without_exchanges_only_where_that_is_precise(monkeypatch, cache):
     """Without the compiled LU, or with one that always refuses, linear.c does the same."""
     drive = build(STARTUP)
     expected = simulate(drive, 0.2, solver="native")
-    monkeypatch.setattr("modelica_like.native.straight_lu._MOST", 0)
+    monkeypatch.setattr("modelica_like.fmi.straight_lu._MOST", 0)
     same(expected, simulate(build(STARTUP), 0.2, solver="native", compiled=True))
-    monkeypatch.setattr("modelica_like.native.straight_lu._MOST", 600)
-    monkeypatch.setattr("modelica_like.native.straight_lu._Lu.factor", lambda _: iter(["return 0;"]))
+    monkeypatch.setattr("modelica_like.fmi.straight_lu._MOST", 600)
+    monkeypatch.setattr("modelica_like.fmi.straight_lu._Lu.factor", lambda _: iter(["return 0;"]))
     same(expected, simulate(build(STARTUP), 0.2, solver="native", compiled=True))
 
 

@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterable, Sequence
 from heapq import heappop, heappush
 from itertools import accumulate
 
+from modelica_like.fmi.straight_lu import straight_lu
+from modelica_like.fmi.straight_step import straight_step
 from modelica_like.fmi.tables import Tables
 from modelica_like.fmi.tape import ARGUMENTS, Tape
-from modelica_like.native.straight_lu import straight_lu
-from modelica_like.native.straight_step import straight_step
 
 TAPES = {"rates": 0, "jacobian": 1, "alg": 2, "alg_jacobian": 3, "guards": 5, "edges": 6, "guards_soon": 7}
 """Tapes that are compiled, with their numbers in model.h."""
