@@ -19,7 +19,7 @@ TASKS = {
     },
     "Analyse and size it": {
         "modes": "analysis", "steady": "analysis", "sweep": "analysis", "sensitivity": "analysis",
-        "optimize": "analysis", "tolerance": "analysis", "size": "validation",
+        "optimize": "analysis", "calibrate": "analysis", "tolerance": "analysis", "size": "validation",
     },
     "Give it to other tools": {
         "export": "export", "runtimes": "export", "validate": "validation", "split": "cosimulation",

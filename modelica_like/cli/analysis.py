@@ -1,4 +1,4 @@
-"""Commands that analyse drives: small motions, operating points, sweeps, derivatives, best designs, tolerances."""
+"""Commands that analyse drives: small motions, operating points, sweeps, gradients, designs, calibrations, scatter."""
 
 from __future__ import annotations
 
@@ -228,6 +228,43 @@ def optimize(
             save_report(result.best_drive(), result.simulate(), report, optimum=result)
         if not result.feasible:
             raise SystemExit(SOLVE_FAILED)  # as `size` does where a limit is exceeded
+
+
+def calibrate(
+    netlist: Netlist, assignments: Assignments = None, *,
+    data: Annotated[
+        list[Path] | None, Option(metavar="FILE.csv", help="Measured curves: `time` and columns such as 'J.w [rpm]'.")
+    ] = None,
+    free: Annotated[
+        list[str] | None, Option(metavar="NAME=LOW:HIGH", help="What is to be found, e.g. 'clutch.mu=0.1:0.5'.")
+    ] = None,
+    uncertainty: Annotated[
+        list[str] | None, Option(metavar="NAME=VALUE", help="Of a column; default: a hundredth of its largest value.")
+    ] = None,
+    starts: Annotated[int, Option(metavar="N", help="Starts of the search.")] = 1,
+    output: Annotated[
+        Path | None, Option("--output", "-o", metavar="FILE", help="Write the netlist with the values found.")
+    ] = None,
+    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw confidence ellipses.")] = None,
+    json: Json = False, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Find parameters that fit measured curves best, with intervals and what the data do not determine."""
+    with told(debug, json=json, pictures=[plot], files=[output]) as page:
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.analyse.calibration.calibrate import calibrate as find
+        from modelica_like.analyse.calibration.measurements import Trajectories
+        from modelica_like.analyse.sweeps.ranges import by_name, read_assignment, read_bounds
+        from modelica_like.show.plot import save_plot
+        from modelica_like.show.report.analysis import calibration_report
+
+        known = by_name(map(read_assignment, uncertainty or ()), "--uncertainty")
+        bounds = {name: (low, high) for name, (low, high) in by_name(map(read_bounds, free or ()), "--free").items()}
+        result = find(assembly, [Trajectories(file, known) for file in data or ()], bounds, starts=starts)
+        page.print(calibration_report(result))
+        if plot:
+            save_plot(result.plot(), plot)
+        if output:
+            result.save(output)
 
 
 def tolerance(

@@ -28,7 +28,7 @@ TABLES = {
     "compare": ([DRIVE, DRIVE, "--until", "0.1s"], {"deviations", "events"}),
     "size": ([str(EXAMPLES / "sizing" / "clutch_heat.toml")], set()),
 }
-SLOW = {"validate", "cosim", "demo"}
+SLOW = {"validate", "cosim", "demo", "calibrate"}
 """Commands tested elsewhere, or the same in `Page.print`."""
 
 

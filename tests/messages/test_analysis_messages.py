@@ -153,7 +153,8 @@ There is no method 'fast'. There are sobol and morris."""),
 SALib is not installed.
 Install it with: pip install "modelica-like[analyse]\""""),
     "no data": (ValueOutOfRange, lambda: fitted([]), """\
-A calibration needs data, at least one parameter, and at least one start."""),
+A calibration needs data, at least one parameter, and at least one start.
+Write calibrate(drive, [Trajectories("meas.csv")], {"clutch.mu": (0.1, 0.5)}), or on the command line --data meas.csv --free clutch.mu=0.1:0.5."""),
     "bounds the wrong way round": (ValueOutOfRange, lambda: fitted(Numbers({"mass.w": 1.0}, until=1.0), {"mass.J": (2.0, 1.0)}), """\
 mass.J: the lower bound 2 is not below the upper bound 1."""),
     "no uncertainty": (ValueOutOfRange, lambda: fitted(Numbers({"mass.w": 0.0}, until=1.0)), """\

@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from modelica_like.analyse.calibration.measurements import Measurement, Numbers, OperatingPoints, Trajectories
+from modelica_like.analyse.calibration.pictures import ellipses
+from modelica_like.analyse.written import with_values
 from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import (
     CalibrationFailed,
     InitializationError,
+    LanguageError,
     SolveError,
     UnknownName,
     ValueOutOfRange,
     extra_module,
 )
+from modelica_like.language import Assembly, Component
 from modelica_like.language.units import to_si
-from modelica_like.simulation import Model, build
+from modelica_like.simulation import Model, build, loaded
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Calibration", "Numbers", "OperatingPoints", "Trajectories", "calibrate"]
 
@@ -52,6 +59,7 @@ class Calibration:
             zero, of changes relative to 1e-4 of the distance of the bounds).
         at_bounds: parameters that stopped at a bound.
         starts: sum of squares reached from each start.
+        drive: the drive as it was.
     """
 
     model: CompiledDae = field(repr=False)
@@ -65,6 +73,7 @@ class Calibration:
     undetermined: tuple[dict[str, float], ...]
     at_bounds: tuple[str, ...]
     starts: tuple[float, ...] = field(repr=False)
+    drive: Component | None = field(default=None, repr=False)
 
     def __getitem__(self, name: str) -> float:
         if name not in self.names:
@@ -97,6 +106,31 @@ class Calibration:
         """Correlations of the values, shape (parameters, parameters)."""
         size = np.sqrt(np.diag(self.covariance))
         return self.covariance / np.outer(size, size)
+
+    def save(self, path: str | Path) -> None:
+        """Write the drive with the values found as a netlist.
+
+        Raises:
+            LanguageError: the drive is no netlist.
+        """
+        from modelica_like.netlist import save
+
+        if not isinstance(self.drive, Assembly):
+            raise LanguageError(
+                "Only a drive of a netlist can be saved as one.", advice="The values are in `values`, by `names`."
+            )
+        save(with_values(self.drive, dict(zip(self.names, map(float, self.values), strict=True))), path)
+
+    def plot(self) -> Figure:
+        """Draw the 95 % ellipse of every pair of parameters that the data determine, and their intervals.
+
+        Within an ellipse both values lie together with that probability, to first order; the intervals are those of
+        single values.
+
+        Raises:
+            ValueOutOfRange: the data determine less than two parameters.
+        """
+        return ellipses(self)
 
     def __str__(self) -> str:
         width = max(map(len, self.names))
@@ -136,10 +170,15 @@ def calibrate(
         CalibrationFailed: the model could not be solved from any start.
         MissingExtra: scipy is not installed.
     """
+    drive = loaded(drive)
     model = build(drive, free=parameters)
     measured = [data] if isinstance(data, Measurement | str | Path) else list(data)
     if not measured or not parameters or starts < 1:
-        raise ValueOutOfRange("A calibration needs data, at least one parameter, and at least one start.")
+        raise ValueOutOfRange(
+            "A calibration needs data, at least one parameter, and at least one start.",
+            advice='Write calibrate(drive, [Trajectories("meas.csv")], {"clutch.mu": (0.1, 0.5)}), or on the command '
+            "line --data meas.csv --free clutch.mu=0.1:0.5.",
+        )
     for item in measured:
         if not isinstance(item, Measurement):
             raise ValueOutOfRange(
@@ -163,7 +202,8 @@ def calibrate(
             advice="Give a guess for which the model can be solved, or narrower bounds.",
         )  # fmt: skip
     best = min(results, key=lambda r: r.cost)
-    return problem.result(best, tuple(2 * result.cost for result in results))
+    result = problem.result(best, tuple(2 * result.cost for result in results))
+    return replace(result, drive=drive if isinstance(drive, Component) else None)
 
 
 class _Problem:

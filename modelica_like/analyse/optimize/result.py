@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from modelica_like.analyse.written import with_values
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, did_you_mean
@@ -174,19 +174,7 @@ class Optimum(Shown):
                 "Only a drive of a netlist can be saved as one.",
                 advice="The values are in `values`, the model in `model`.",
             )
-        drive = copy.deepcopy(self.drive)
-        tables: dict[str, Any] = {}
-        for parameter in self.parameters:
-            table, bracket, place = parameter.name.rpartition("[")
-            if bracket and "," in place:
-                rows = tables.setdefault(table, [list(row) for row in _table(drive, table)])
-                row, column = map(int, place.rstrip("]").split(","))
-                rows[row - 1][column - 1] = parameter.value
-            else:
-                drive.set(parameter.name, parameter.value)
-        for table, rows in tables.items():
-            drive.set(table, rows)
-        return drive
+        return with_values(self.drive, self.values)
 
     def sentences(self) -> list[str]:
         """Return what holds the design back, what that costs, and notes."""
@@ -272,9 +260,3 @@ class Front(Shown):
             for values, point in zip(self.values, self.points, strict=True)
         ]
         return "\n".join([f"Front of {len(rows)} designs, {self.runs} runs", head, *rows, *self.notes])
-
-
-def _table(drive: Component, path: str) -> Any:
-    owner, _, name = path.rpartition(".")
-    parts = {part.path: part for part in drive.walk()}
-    return getattr(parts[owner], name)

@@ -1,4 +1,4 @@
-"""Results of analyses as tables: operating points, modes, sensitivities, sweeps, best designs, tolerances."""
+"""Results of analyses as tables: operating points, modes, sensitivities, sweeps, designs, calibrations, tolerances."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from modelica_like.show.report.tables import Listed, Shown, table
 if TYPE_CHECKING:
     import xarray
 
+    from modelica_like.analyse.calibration.calibrate import Calibration
     from modelica_like.analyse.linear.model import Mode, Modes
     from modelica_like.analyse.operating.curves import Curves
     from modelica_like.analyse.operating.steady import OperatingPoint
@@ -185,6 +186,25 @@ def _front(front: Front) -> RenderableType:
     ]
     head = f"[bold]{escape(first.model.name)}[/]  front of {len(rows)} designs, {front.runs} runs"
     return Group(head, "", table("front", *titles, rows=rows), *map(escape, front.notes))
+
+
+def calibration_report(result: Calibration) -> RenderableType:
+    """Return the values found with their intervals, what the data do not determine, and the largest deviations."""
+    rows = [
+        (name, value, half if np.isfinite(half) else Shown("not determined", None), unit,
+         "at its bound" if name in result.at_bounds else "")
+        for name, value, half, unit in zip(result.names, result.values, result.confidence, result.units, strict=True)
+    ]  # fmt: skip
+    head = f"[bold]{escape(result.model.name)}[/]  {len(result.residuals)} numbers, {len(result.names)} parameters"
+    parts: list[RenderableType] = [head, ""]
+    parts += [table("calibrated", "name", "value>.6g", "± 95 %>.2g", "unit", "", rows=rows), ""]
+    for combination in result.undetermined:
+        weights = ", ".join(f"{name} {100 * weight:+.0f} %" for name, weight in combination.items())
+        parts.append(f"The data do not determine this combination: {escape(weights)}.")
+    worst = np.argsort(-np.abs(result.residuals))[:_FAILURES_TOLD]
+    deviations = [(result.labels[k], float(result.residuals[k])) for k in worst]
+    parts.append(table("largest deviations", "measurement", "in uncertainties>+.3g", rows=deviations))
+    return Group(*parts)
 
 
 def tolerance_report(result: Tolerances) -> RenderableType:
