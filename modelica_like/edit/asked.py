@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from modelica_like.edit.parts import head
 from modelica_like.edit.sheet import Sheet
-from modelica_like.edit.tree import Span, Value, joined
+from modelica_like.edit.tree import joined
 from modelica_like.language.formula import name_places
+from modelica_like.netlist.further import head
+from modelica_like.netlist.outline import Span, Value
 
 _SECTIONS = ("optimize", "tolerances")
 _TEXTS = {"minimize", "maximize", "subject_to"}

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, Self
 
 from modelica_like.arguments import checked
-from modelica_like.edit import grouping, values, wires
+from modelica_like.edit import grouping, suggested, values, wires
 from modelica_like.edit.sheet import Sheet
 from modelica_like.errors import DuplicateName, ModelicaLikeError, NetlistError, UnknownName, did_you_mean
 from modelica_like.flatten import flatten
@@ -26,6 +26,11 @@ OPERATIONS: Mapping[str, Callable[..., None]] = {
     "remove": wires.remove, "rename": wires.rename, "replace": values.replace, "set": values.set,
     "unset": values.unset, "duplicate": values.duplicate, "group": grouping.group,
 }  # fmt: skip
+_SUGGESTED: Mapping[str, Callable[..., None]] = {
+    "replace": suggested.respell, "set": suggested.give, "free": suggested.free, "connect": wires.connect,
+    "insert": wires.insert,
+}  # fmt: skip
+"""By the `operation` of a suggestion."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,8 @@ def apply(
 
     Args:
         text: TOML.
-        request: name of the operation as `op`, and its arguments: `{"op": "connect", "first": "a.y", "second": "b.u"}`.
+        request: name of the operation as `op`, and its arguments: `{"op": "connect", "first": "a.y", "second": "b.u"}`;
+            or the suggestion of a problem, to whose `set` a `value` is added.
         file: path of the netlist; netlists and modules used as parts are searched in its folder.
         files: texts of netlists that are not written yet, by absolute path.
 
@@ -61,11 +67,14 @@ def apply(
         ModelicaLikeError: the operation is refused.
     """
     arguments = dict(request)
-    name = arguments.pop("op", None)
-    operation = OPERATIONS.get(name) if isinstance(name, str) else None
+    is_suggested = "op" not in arguments and "operation" in arguments
+    if is_suggested:
+        arguments.pop("file", None)
+    name, known = arguments.pop("operation" if is_suggested else "op", None), _SUGGESTED if is_suggested else OPERATIONS
+    operation = known.get(name) if isinstance(name, str) else None
     if operation is None:
-        names = ", ".join(OPERATIONS)
-        raise UnknownName(f"There is no operation '{name}'{did_you_mean(name, OPERATIONS) or '.'} There are {names}.")
+        names = ", ".join(known)
+        raise UnknownName(f"There is no operation '{name}'{did_you_mean(name, known) or '.'} There are {names}.")
     known = inspect.signature(operation).parameters
     takes = [key for key in known if key not in ("sheet", "more")]
     listed = f"It takes {', '.join(takes)}."

@@ -10,14 +10,15 @@ from typing import Any
 from modelica_like.arguments import checked
 from modelica_like.edit import asked
 from modelica_like.edit import references as ref
-from modelica_like.edit.parts import assembly, head, is_output, require_new, require_part, side
+from modelica_like.edit.parts import assembly, is_output, require_new, require_part, side
 from modelica_like.edit.sheet import Sheet
-from modelica_like.edit.tree import Entry, Path, Span
 from modelica_like.edit.values import part_texts
 from modelica_like.errors import DuplicateName, NetlistError
 from modelica_like.language import Connector
 from modelica_like.language.assembly import end_at
 from modelica_like.netlist import spell
+from modelica_like.netlist.further import head
+from modelica_like.netlist.outline import Entry, Path, Span
 
 
 @checked

@@ -8,7 +8,7 @@ from pathlib import Path as File
 from typing import Any
 
 from modelica_like.edit.sheet import Sheet
-from modelica_like.edit.tree import Path, joined
+from modelica_like.edit.tree import joined
 from modelica_like.errors import (
     DuplicateName,
     ModelicaLikeError,
@@ -22,13 +22,11 @@ from modelica_like.flatten.wiring import Wiring
 from modelica_like.language import Assembly, Component, Connector, Output, connect
 from modelica_like.language.assembly import end_at
 from modelica_like.language.fields import require_identifier
+from modelica_like.language.formula import CONSTANTS
 from modelica_like.netlist.document import Document, check_part
+from modelica_like.netlist.further import head
+from modelica_like.netlist.outline import Path
 from modelica_like.netlist.read import assemble
-
-
-def head(path: str) -> str:
-    """Return the name with which a path begins, without the place in an array."""
-    return path.partition(".")[0].partition("[")[0]
 
 
 def assembly(
@@ -79,6 +77,8 @@ def require_new(sheet: Sheet, name: str, what: str = "part") -> None:
         if name in sheet.table(section):
             kind = {"parts": "a part", "parameters": "a parameter", "expose": "an outer connector"}[section]
             raise DuplicateName(f"The netlist has {kind} '{name}' already.", where=sheet.source((section, name)))
+    if name in CONSTANTS:
+        raise DuplicateName(f"'{name}' is no name for a {what}: it is a constant of formulas.")
     if hasattr(Component, name):
         raise DuplicateName(f"'{name}' is no name for a {what}: every component has something of this name.")
 

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path as File
 
-from modelica_like.edit.parts import fit, head, joins, owner_of
+from modelica_like.edit.parts import fit, joins, owner_of
 from modelica_like.edit.sheet import Sheet
-from modelica_like.edit.tree import Entry, Path, Span, Value
 from modelica_like.errors import ModelicaLikeError, UnitError
 from modelica_like.language.formula import name_places, parse_formula
 from modelica_like.language.units import read_quantity
 from modelica_like.netlist.document import read_text
+from modelica_like.netlist.further import head
+from modelica_like.netlist.outline import Entry, Path, Span, Value
 
 KEYED = ("start", "guess", "display")
 """Sections whose keys are paths."""

@@ -7,11 +7,12 @@ from pathlib import Path as File
 from typing import Any
 
 from modelica_like.edit.sheet import Sheet
-from modelica_like.edit.tree import Path, joined
+from modelica_like.edit.tree import joined
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.garbage import without_garbage_search
 from modelica_like.language import Assembly
 from modelica_like.language.inside import inside
+from modelica_like.netlist.outline import Path
 from modelica_like.netlist.read import loads
 from modelica_like.netlist.write import sections
 

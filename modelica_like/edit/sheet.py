@@ -8,11 +8,12 @@ from itertools import groupby
 from pathlib import Path as File
 from typing import Any
 
-from modelica_like.edit.tree import Entry, Path, Section, Tree, Value, joined
+from modelica_like.edit.tree import Tree, joined
 from modelica_like.errors import Source
 from modelica_like.netlist import spell
 from modelica_like.netlist.document import parse_toml, plain
 from modelica_like.netlist.locate import Lines, locate
+from modelica_like.netlist.outline import Entry, Outline, Path, Section, Value
 
 _ORDER = ("parameters", "parts", "series", "connect", "expose", "start", "guess", "simulate", "display")
 """Sections, as they follow each other in a new netlist."""
@@ -48,7 +49,8 @@ class Sheet:
     @cached_property
     def tree(self) -> Tree:
         """Positions in the text."""
-        return Tree(self.text)
+        outline = self.lines.outline  # of the text as it is read
+        return Tree(outline if outline.text == self.text else Outline(self.text))
 
     @cached_property
     def given(self) -> dict[tuple[str, str], Path]:

@@ -7,15 +7,17 @@ from contextlib import contextmanager
 from typing import Any, cast
 
 from modelica_like.arguments import checked
-from modelica_like.edit.parts import assembly, check_connections, head, require_new, require_part
+from modelica_like.edit.parts import assembly, check_connections, require_new, require_part
 from modelica_like.edit.references import KEYED, cut_misfits, drop_ends, exposed, formulas, is_path, keys, lines
 from modelica_like.edit.sheet import Sheet
-from modelica_like.edit.tree import Path, Section, decoded, joined
+from modelica_like.edit.tree import joined
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, did_you_mean
 from modelica_like.language import Assembly, Discrete, Variable
 from modelica_like.language.assembly import end_at
 from modelica_like.netlist import spell
 from modelica_like.netlist.document import READERS, read_sections
+from modelica_like.netlist.further import head
+from modelica_like.netlist.outline import Path, Section, decoded
 from modelica_like.netlist.write import plain
 
 

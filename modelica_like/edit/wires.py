@@ -13,7 +13,6 @@ from modelica_like.edit.parts import (
     assembly,
     check_connections,
     check_series,
-    head,
     is_output,
     require_new,
     require_part,
@@ -25,6 +24,7 @@ from modelica_like.edit.values import add
 from modelica_like.errors import DuplicateName, NetlistError, WrongConnection
 from modelica_like.language import Connector, Input, Output
 from modelica_like.language.assembly import end_at
+from modelica_like.netlist.further import head
 
 
 @checked

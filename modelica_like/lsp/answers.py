@@ -175,7 +175,7 @@ def definition(text: Text, offset: int) -> Place | None:
     paths = [("checks", word), ("parts", re.split(r"[^\w]", first)[-1]), ("parameters", word)]
     for path in paths if text.kind == "sizing" else paths[1:]:
         if (entry := text.outline.by_path.get(path)) and entry.names:
-            place, stop = entry.names[-1]
+            place, stop = text.outline.inside(entry.names[-1])
             return (text.path, *text.outline.position(place), stop - place)
     return None
 
@@ -204,13 +204,16 @@ class Symbol:
 def symbols(text: Text) -> list[Symbol]:
     """Return the sections of a file with their entries, in their order; of very many the first."""
     tops: dict[str, Symbol] = {}
-    known: set[tuple[str, ...]] = set()
+    known: set[tuple[str, str]] = set()
     for entry in text.outline.entries[:_MOST_SYMBOLS] if text.kind != "other" else ():
-        name, whole = entry.path[0], (entry.begin, entry.end)
-        top = tops.setdefault(name, Symbol(name, "", whole, entry.names[0] if entry.names else whole, []))
+        name, whole = str(entry.path[0]), (entry.start, entry.end)
+        first = text.outline.inside(entry.names[0]) if entry.names else whole
+        top = tops.setdefault(name, Symbol(name, "", whole, first, []))
         top.whole = top.whole[0], max(top.whole[1], entry.end)
-        if len(entry.path) == 2 and entry.names and entry.path not in known:
-            known.add(entry.path)
-            value = text.outline.by_path.get((*entry.path, "is"), entry).value
-            top.inner.append(Symbol(entry.path[1], text.outline.read(value)[:80], whole, entry.names[-1], []))
+        inner = ".".join(map(str, entry.path[1:]))
+        if len(entry.path) == 2 and entry.names and (name, inner) not in known:
+            known.add((name, inner))
+            value = text.outline.by_path.get((name, inner, "is"), entry).value
+            place = text.outline.inside(entry.names[-1])
+            top.inner.append(Symbol(inner, text.outline.read(value)[:80], whole, place, []))
     return [*tops.values()]

@@ -82,9 +82,9 @@ class Server(LanguageServer):
         """Return the place of a problem; one in a netlist inside is shown where that is used."""
         file, line = problem["file"], problem["line"]
         if file and (other := Path(file).resolve()) != text.path.resolve():
-            uses = [entry.value for entry in text.outline.entries if entry.path[-1] == "is" and entry.value[0]]
+            uses = [entry.value for entry in text.outline.entries if entry.path[-1] == "is"]
             used = (use for use in uses if (text.path.parent / text.outline.read(use)).resolve() == other)
-            return self.range(text, next(used, (0, 0)))
+            return self.range(text, text.outline.inside(next(used, (0, 0))))
         begin = text.outline.offset(line or 1, problem["column"] or 1)
         length = problem["length"] or len(text.lines[(line or 1) - 1])
         return self.range(text, (begin, begin + length))
@@ -197,7 +197,7 @@ def _change(server: Server) -> None:
         try:
             return server.edits(text, params.text_document.uri, renamed(text, offset, params.new_name))
         except ModelicaLikeError as error:
-            raise JsonRpcInvalidParams(str(error)) from None
+            raise JsonRpcInvalidParams("\n".join(filter(None, (error.what, error.advice)))) from None
 
     @server.feature(types.TEXT_DOCUMENT_CODE_ACTION, types.CodeActionOptions([types.CodeActionKind.QuickFix]))
     def fixes(params: types.CodeActionParams) -> list[types.CodeAction]:

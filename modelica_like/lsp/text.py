@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path as File
 from typing import Literal
 
 from modelica_like.netlist.json_schema import sections
-from modelica_like.netlist.outline import Entry, Outline, Span, outline
+from modelica_like.netlist.outline import Entry, Outline, Path, Span
 
 _SIZING = ("name", "description", "parameters", "checks", "compare")
 _IN_PATH = re.compile(r"[\w.*-]")
@@ -42,14 +42,14 @@ class Text:
         text: all of it.
     """
 
-    def __init__(self, path: Path, text: str) -> None:
+    def __init__(self, path: File, text: str) -> None:
         self.path = path
         self.text = text.removeprefix("\ufeff").replace("\r\n", "\n")
 
     @cached_property
     def outline(self) -> Outline:
         """Its keys."""
-        return outline(self.text)
+        return Outline(self.text)
 
     @cached_property
     def lines(self) -> list[str]:
@@ -59,7 +59,7 @@ class Text:
     @cached_property
     def kind(self) -> Literal["netlist", "sizing", "new", "other"]:
         """Whether it is a netlist, a sizing file, the begin of one, or none of these."""
-        names = {entry.path[0] for entry in self.outline.entries}
+        names = {str(entry.path[0]) for entry in self.outline.entries}
         if "parts" in names or "checks" in names:
             return "netlist" if "parts" in names else "sizing"
         # The last one may not be complete.
@@ -71,7 +71,7 @@ class Text:
         before = len(self.text[:offset].rstrip(" \t"))
         for entry in self.outline.entries if self.text[before - 1 : before] == "=" else ():
             if entry.end == before:
-                return Spot("value", entry.path, "", (offset, offset), offset)
+                return Spot("value", _words(entry.path), "", (offset, offset), offset)
         for entry in self.outline.at(offset):
             if spot := self._within(entry, offset):
                 return spot
@@ -80,27 +80,32 @@ class Text:
             begin -= 1
         if self.text[:begin].endswith("["):
             return Spot("header", (), self.text[begin:offset], (begin, offset), begin)
-        return Spot("key", self.outline.table(offset), self.text[begin:offset], (begin, offset), begin)
+        return Spot("key", _words(self.outline.table(offset)), self.text[begin:offset], (begin, offset), begin)
 
     def _within(self, entry: Entry, offset: int) -> Spot | None:
         """Return what stands at a place in an entry; None if that is behind a comma, or between names."""
-        for k, (begin, end) in enumerate(entry.names):
+        path = _words(entry.path)
+        for k, (begin, end) in enumerate(map(self.outline.inside, entry.names)):
             if begin <= offset <= end:
-                is_header = entry.is_header
-                table = entry.path[: len(entry.path) - len(entry.names) + k]
-                return Spot("header" if is_header else "key", table, self.text[begin:offset], (begin, end), begin)
-        begin, end = entry.value
+                table = path[: len(path) - len(entry.names) + k]
+                role = "header" if entry.is_header else "key"
+                return Spot(role, table, self.text[begin:offset], (begin, end), begin)
+        value = entry.value
+        begin, end = self.outline.inside(value)
         if not begin or not begin <= offset <= end:
             return None
-        opened = self.text[begin] if begin < len(self.text) and self.text[begin - 1] not in "\"'" else ""
-        if opened not in ("[", "{"):
-            return Spot("value", entry.path, self.text[begin:offset], (begin, end), begin)
+        if value.items is None and value.entries is None:
+            return Spot("value", path, self.text[begin:offset], (begin, end), begin)
         closed = end > begin + 1 and self.text[end - 1] in "]}"
         if not begin < offset < end + (not closed):
             return None
-        if opened == "{":
-            return Spot("key", entry.path, "", (offset, offset), offset)
-        return Spot("value", (*entry.path, "+"), "", (offset, offset), offset)
+        if value.items is None:
+            return Spot("key", path, "", (offset, offset), offset)
+        return Spot("value", (*path, "+"), "", (offset, offset), offset)
+
+
+def _words(path: Path) -> tuple[str, ...]:
+    return tuple(map(str, path))
 
 
 def word_at(text: Text, offset: int) -> Span:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from modelica_like.errors import NetlistError, Source
-from modelica_like.netlist.outline import Outline, Path, outline
+from modelica_like.netlist.outline import Outline
 
 _MAX_TEXT = 120
+Path = tuple[str, ...]
+"""Of a key; elements of arrays have none of their own."""
 
 
 @dataclass
@@ -28,7 +30,7 @@ class Lines:
     numbers: dict[Path, int] = field(default_factory=dict)
     repeated: list[tuple[Path, int, int]] = field(default_factory=list)
     ends: dict[int, int] = field(default_factory=dict)
-    outline: Outline = field(default_factory=lambda: outline(""))
+    outline: Outline = field(default_factory=lambda: Outline(""))
 
     def source(self, *path: str) -> Source:
         """Return the place of a key (a last one with dots may also be several), or of the nearest table around it."""
@@ -43,12 +45,10 @@ class Lines:
         """Return the place of a key that may be in a table in braces; see `source`."""
         source, known = self.source(*path), self.outline.by_path
         entry = known.get(path) or known.get((*path[:-1], *path[-1].split(".")))
-        line, column = self.outline.position(entry.begin) if entry else (0, 0)
+        line, column = self.outline.position(entry.start) if entry else (0, 0)
         if entry is None or line != source.line:
             return source
-        return replace(
-            source, column=column, length=len(self.outline.read((entry.begin, entry.end)).partition("\n")[0])
-        )
+        return replace(source, column=column, length=len(self.outline.text[entry.start : entry.end].partition("\n")[0]))
 
     def line(self, number: int, path: str = "") -> Source:
         """Return a line as a place, with its text, and the path of a key in it."""
@@ -87,23 +87,20 @@ def locate(text: str, file: str) -> Lines:
     Raises:
         NetlistError: brackets or keys are nested too deeply.
     """
-    keys = outline(text)
+    keys = Outline(text)
     lines = Lines(file, text.split("\n"), outline=keys)
     if keys.deep:
         place = Source(file, keys.position(keys.deep)[0])
         raise NetlistError("Brackets or keys are nested too deeply for a netlist.", where=place)
-    table: Path = ()
     closed: set[Path] = set()  # tables that cannot be opened again: headers, and keys with a value
     for entry in keys.entries:
-        names = tuple(keys.read(name) for name in entry.names)
-        number = keys.position(entry.begin)[0]
+        path, number = tuple(name for name in entry.path if isinstance(name, str)), keys.position(entry.start)[0]
         if entry.is_header:
-            table = names
-            is_element = text.startswith("[[", entry.begin)
-            lines.add(table, number, table=is_element or table not in closed)
-            closed.add(table)
+            is_element = text.startswith("[[", entry.start)
+            lines.add(path, number, table=is_element or path not in closed)
+            closed.add(path)
         elif entry.is_statement:
             lines.ends[number] = keys.position(entry.end)[0]
-            lines.add((*table, *names), number)
-            closed.add((*table, *names))
+            lines.add(path, number)
+            closed.add(path)
     return lines

@@ -3,72 +3,120 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any
 
 _MAX_DEPTH = 20
 """Of brackets, and number of names in a key."""
-Path = tuple[str, ...]
+Path = tuple[str | int, ...]
+"""Names of tables and keys from the top; the place in an array as a number, from zero."""
 Span = tuple[int, int]
 """Begin and end in the text."""
 
 # No possessive quantifier (`*+`) of a group: it is broken in Python before 3.11.5.
-STRING = r"""(?P<string>\"{3}(?:[^"\\]++|\\.|"(?!""))*(?:\"{3,5}|\Z) | '{3}(?:[^']++|'(?!''))*(?:'{3,5}|\Z)
+_STRING = r"""(?P<string>\"{3}(?:[^"\\]++|\\.|"(?!""))*(?:\"{3,5}|\Z) | '{3}(?:[^']++|'(?!''))*(?:'{3,5}|\Z)
         |"(?:[^"\\\n]++|\\.)*"? | '[^'\n]*+'?)"""
 """A text in quotes, also one that does not end."""
 _TOKEN = re.compile(
-    rf"""[ \t\r.]*+(?:(?P<comment>\#[^\n]*+) | {STRING} | (?P<open>[\[{{]) | (?P<close>[\]}}]) | (?P<newline>\n)
+    rf"""[ \t\r.\ufeff]*+(?:(?P<comment>\#[^\n]*+) | {_STRING} | (?P<open>[\[{{]) | (?P<close>[\]}}]) | (?P<newline>\n)
         | (?P<equals>=) | (?P<comma>,) | (?P<word>[^"'\#\[\]{{}}\n=.,\s]++) | (?P<other>.))""",
     re.VERBOSE | re.DOTALL,
 )
 _NEXT = re.compile(
-    r"[ \t]*+(?:[\w.\"-]++[ \t]*+=|\[{1,2}(?!true\b|false\b|inf\b|nan\b)[A-Za-z_][\w.-]*+\]{1,2}[ \t]*+$)", re.M
+    r"""[ \t]*+(?:(?:[\w.-]|"[^"\n]*+"|'[^'\n]*+')+[ \t]*+=
+        |\[{1,2}(?!true\b|false\b|inf\b|nan\b)[A-Za-z_][\w.-]*+\]{1,2}[ \t]*+$)""",
+    re.M | re.VERBOSE,
 )
 """A line that begins a statement, though a bracket before it is still open."""
+_NOT_PLAIN = re.compile(r"[\"'\\]")
 
 
-class Entry(NamedTuple):
-    """A header, a key with its value, or an element of an array.
+@dataclass(slots=True, eq=False)
+class Value:
+    """A value as written, from `start` to `end`; a list has items, a table in braces entries."""
+
+    start: int
+    end: int
+    items: list[Value] | None = None
+    entries: list[Entry] | None = None
+
+
+@dataclass(slots=True, eq=False)
+class Entry:
+    """A key with its value, an element of an array, or a header.
 
     Attributes:
-        path: names, with elements of arrays by their number from zero.
-        names: places of the names in the key, without quotes.
-        begin: of the key, or of the element.
-        value: of the value, without quotes; empty for a header, and where there is none yet.
+        path: all names.
+        names: places of the names in the key, with their quotes.
+        start: of the key, or of the element.
         end: of all.
-        is_header: whether it is one.
-        is_statement: whether it is a key with `=`, not within braces or brackets.
+        value: empty where there is none yet.
+        owner: where the key stands.
     """
 
     path: Path
-    names: tuple[Span, ...]
-    begin: int
-    value: Span
+    names: list[Span]
+    start: int
     end: int
-    is_header: bool = False
-    is_statement: bool = False
+    value: Value
+    owner: Section | Value
+
+    @property
+    def is_header(self) -> bool:
+        """Whether it is one; its path has no number at the end."""
+        return isinstance(self.owner, Section) and self.names is self.owner.names
+
+    @property
+    def is_statement(self) -> bool:
+        """Whether it is a key with `=`, not within braces or brackets."""
+        return isinstance(self.owner, Section) and bool(self.names) and self.value.start > self.names[-1][1]
 
 
-@dataclass
-class Outline:
-    """Keys of a text in their order.
+@dataclass(slots=True, eq=False)
+class Section:
+    """A table with a header, or what stands before the first header.
 
     Attributes:
+        path: its names.
+        names: their places.
+        start: of the line of the header.
+        end: of this line, with its break.
+        entries: keys of the table.
+    """
+
+    path: Path = ()
+    names: list[Span] = field(default_factory=list[Span])
+    start: int = 0
+    end: int = 0
+    entries: list[Entry] = field(default_factory=list[Entry])
+
+
+class Outline:
+    """The keys of a text, which need not be TOML, in their order.
+
+    Args:
         text: all of it.
+
+    Attributes:
         entries: of the text, up to the place where it is nested too deeply.
+        sections: of the text; the first has no header.
         deep: this place, or zero.
     """
 
-    text: str
-    entries: list[Entry]
-    deep: int = 0
+    def __init__(self, text: str) -> None:
+        self.text = text
+        walk = _Walk(text)
+        self.deep = walk.run()
+        self.entries = sorted(walk.entries, key=lambda entry: entry.start)
+        self.sections = walk.sections
 
     @cached_property
-    def by_path(self) -> dict[Path, Entry]:
-        """The first entry of each path."""
-        return {entry.path: entry for entry in reversed(self.entries)}
+    def by_path(self) -> dict[tuple[str, ...], Entry]:
+        """The first entry of each path, with numbers as texts."""
+        return {tuple(map(str, entry.path)): entry for entry in reversed(self.entries)}
 
     @cached_property
     def _begins(self) -> list[int]:
@@ -86,24 +134,35 @@ class Outline:
 
     def at(self, offset: int) -> list[Entry]:
         """Return the entries around a place, the innermost first."""
-        return [entry for entry in reversed(self.entries) if entry.begin <= offset <= entry.end]
+        return [entry for entry in reversed(self.entries) if entry.start <= offset <= entry.end]
 
     def table(self, offset: int) -> Path:
         """Return the path of the last header before a place."""
-        headers = (entry for entry in reversed(self.entries) if entry.is_header and entry.end <= offset)
-        return next((entry.path for entry in headers), ())
+        headers = (entry.owner for entry in reversed(self.entries) if entry.is_header and entry.end <= offset)
+        return next((section.path for section in headers if isinstance(section, Section)), ())
 
-    def read(self, span: Span) -> str:
-        """Return the text at a place."""
-        return self.text[slice(*span)]
+    def inside(self, place: Span | Value) -> Span:
+        """Return the place of a name or a value without its quotes, of which the last may be missing."""
+        begin, end = (place.start, place.end) if isinstance(place, Value) else place
+        quote = self.text[begin:end][:1]
+        if quote not in ('"', "'"):
+            return begin, end
+        width = 3 if self.text.startswith(3 * quote, begin, end) else 1
+        is_closed = end - begin >= 2 * width and self.text.endswith(width * quote, begin, end)
+        return begin + width, max(end - width * is_closed, begin + width)
+
+    def read(self, place: Span | Value) -> str:
+        """Return the text at a place, without quotes."""
+        return self.text[slice(*self.inside(place))]
 
 
 class _Level:
     """A statement, a table in braces, or an array, and the entry that is being read there."""
 
-    def __init__(self, kind: str, base: Path) -> None:
+    def __init__(self, kind: str, base: Path, owner: Section | Value) -> None:
         self.kind = kind
         self.base = base
+        self.owner = owner
         self.count = 0
         self.clear()
 
@@ -113,7 +172,7 @@ class _Level:
         self.begin = -1
         self.end = 0
         self.valued = self.kind == "["
-        self.value: list[Span] = []
+        self.value: Value | None = None
 
 
 class _Walk:
@@ -122,9 +181,9 @@ class _Walk:
     def __init__(self, text: str) -> None:
         self.text = text
         self.entries: list[Entry] = []
-        self.table: Path = ()
+        self.sections = [Section()]
         self.elements: dict[Path, int] = {}
-        self.levels = [_Level("", ())]
+        self.levels = [_Level("", (), self.sections[0])]
         self.header = 0
         """Brackets of a header that is being read."""
 
@@ -146,18 +205,15 @@ class _Walk:
         return 0
 
     def _word(self, span: Span, level: _Level) -> None:
-        (level.value if level.valued else level.names).append(span)
         level.end = span[1]
+        if not level.valued:
+            level.names.append(span)
+        elif level.value is None:
+            level.value = Value(*span)
+        else:
+            level.value.end = span[1]
 
-    _other = _word
-
-    def _string(self, span: Span, level: _Level) -> None:
-        text = self.text[slice(*span)]
-        quotes = 3 if text[:3] in ('"""', "'''") else 1
-        closed = len(text) >= 2 * quotes and text.endswith(text[:quotes])
-        inner = span[0] + quotes, max(span[1] - quotes * closed, span[0] + quotes)
-        (level.value if level.valued else level.names).append(inner)
-        level.end = span[1]
+    _other = _string = _word
 
     def _equals(self, span: Span, level: _Level) -> None:
         level.valued, level.end = True, span[1]
@@ -171,28 +227,41 @@ class _Walk:
         if not level.valued:
             self.header += 1
             return
-        level.value.append(span)
-        self.levels.append(_Level(self.text[span[0]], self._path(level)))
+        self._word(span, level)
+        kind, value = self.text[span[0]], level.value or Value(*span)
+        value.items, value.entries = ([], None) if kind == "[" else (None, [])
+        self.levels.append(_Level(kind, self._path(level), value))
 
     def _close(self, span: Span, level: _Level) -> None:
         if level.kind:
             self._finish(level)
             self.levels.pop()
-            level = self.levels[-1]
-            level.value.append(span)
+            self._word(span, self.levels[-1])
         level.end = span[1]
 
     def _path(self, level: _Level) -> Path:
-        names = (str(level.count),) if level.kind == "[" else tuple(self.text[slice(*name)] for name in level.names)
+        names = (level.count,) if level.kind == "[" else map(self._name, level.names)
         return (*level.base, *names)
+
+    def _name(self, span: Span) -> str:
+        written = self.text[slice(*span)]
+        if written[0] not in "\"'":
+            return written
+        try:
+            return decoded(written)
+        except tomllib.TOMLDecodeError:
+            return written.strip(written[0])
 
     def _finish(self, level: _Level) -> None:
         """Store the entry of a level."""
         if level.names or level.value:
-            value = (level.value[0][0], level.value[-1][1]) if level.value else (level.end, level.end)
-            kinds = self.header > 0, level.valued and not level.kind
-            path, names = self._path(level), tuple(level.names)
-            self.entries.append(Entry(path, names, level.begin, (0, 0) if self.header else value, level.end, *kinds))
+            value = level.value or Value(level.end, level.end)
+            entry = Entry(self._path(level), level.names, level.begin, level.end, value, level.owner)
+            self.entries.append(entry)
+            if level.kind != "[" and level.owner.entries is not None:
+                level.owner.entries.append(entry)
+            elif isinstance(level.owner, Value) and level.owner.items is not None:
+                level.owner.items.append(value)
         level.clear()
 
     def _end_statement(self) -> None:
@@ -201,20 +270,31 @@ class _Walk:
             self.levels[-1].end = max(level.end, self.levels[-1].end)
             self._finish(level)
         (level,) = self.levels
-        if self.header:
-            level.base = ()
-            table = self._path(level)
-            if self.header > 1:
-                self.elements[table] = self.elements.get(table, -1) + 1
-                table = (*table, str(self.elements[table]))
+        if self.header and level.names:
+            self._end_header(level)
+        else:
             self._finish(level)
-            level.base = table
-        self._finish(level)
         self.header = 0
 
+    def _end_header(self, level: _Level) -> None:
+        named: Path = ()
+        path = named
+        for k, name in enumerate(map(self._name, level.names), 1):
+            named = path = (*path, name)
+            if self.header > 1 and k == len(level.names):
+                self.elements[path] = self.elements.get(path, -1) + 1
+            if path in self.elements:
+                path = (*path, self.elements[path])
+        end = self.text.find("\n", level.end) + 1 or len(self.text)
+        section = Section(path, level.names, self.text.rfind("\n", 0, level.begin) + 1, end)
+        self.sections.append(section)
+        self.entries.append(Entry(named, level.names, level.begin, level.end, Value(0, 0), section))
+        level.clear()
+        level.base, level.owner = path, section
 
-def outline(text: str) -> Outline:
-    """Return the keys of a text, which need not be TOML."""
-    walk = _Walk(text)
-    deep = walk.run()
-    return Outline(text, sorted(walk.entries, key=lambda entry: entry.begin), deep)
+
+def decoded(written: str) -> Any:
+    """Return the value that TOML text is."""
+    if written[0] in "\"'" and not _NOT_PLAIN.search(written, 1, len(written) - 1):
+        return written[1:-1]  # the reader would take most of the time
+    return tomllib.loads(f"x = {written}")["x"]

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from modelica_like.edit.sheet import Sheet
-from modelica_like.edit.tree import Tree, decoded
+from modelica_like.edit.tree import Tree
+from modelica_like.netlist.outline import Outline, decoded
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 HARD = r'''# a comment with = and [brackets]
@@ -29,6 +30,9 @@ empty = []
 none = {}
 nested = [ [1, 2], # one
   [ 3 , "]" ] , # two
+  [
+  "a = b",
+  'c = [' ],
 ]
 a.b."c d".e = { f.g = "1" , h = [{ i = "}" }, {}], j = 'x' }
 
@@ -74,7 +78,7 @@ def test_examples() -> None:
 
 
 def check(text: str) -> None:
-    tree, data = Tree(text), tomllib.loads(text)
+    tree, data = Tree(Outline(text)), tomllib.loads(text)
     for path, entry in tree.entries.items():
         # Line breaks of Windows count as one character to the reader.
         written = text[entry.value.start : entry.value.end].replace("\r\n", "\n")
@@ -94,11 +98,11 @@ def decoded_name(span: tuple[int, int], text: str) -> str:
 
 def test_every_key_of_a_hard_text_is_removed_and_written() -> None:
     data = tomllib.loads(HARD)
-    for path in Tree(HARD).entries:
+    for path in Tree(Outline(HARD)).entries:
         sheet = Sheet(HARD, "hard.toml")
         sheet.delete([path])
         sheet.commit()
-        assert path not in Tree(sheet.text).entries
+        assert path not in Tree(Outline(sheet.text)).entries
         assert len(leaves(data)) - len(leaves(sheet.data)) >= 0
         sheet = Sheet(HARD, "hard.toml")
         sheet.write(path, "new # text")

@@ -189,7 +189,7 @@ def test_rename(client: Client, tmp_path: Path):
     assert [*changes] == [file.as_uri()]
     assert applied(text, changes[file.as_uri()]) == text.replace("J1", "rotor")
     place = {"textDocument": {"uri": file.as_uri()}, "position": {"line": 5, "character": 16}, "newName": "motor"}
-    assert client.answer("textDocument/rename", place)["error"]["message"] == "'motor' is already in use."
+    assert client.answer("textDocument/rename", place)["error"]["message"] == "The netlist has a part 'motor' already."
 
 
 def fix(client: Client, file: Path, text: str) -> str:
@@ -207,7 +207,7 @@ def test_quick_fixes(client: Client, tmp_path: Path):
     assert text == DRIVE.replace("Inertja", "Inertia")
     gear = '[parts]\nm = { is = "Torque", tau = 1 }\ng = { is = "IdealGear", ratio = 2 }\n[series]\nx = ["m", "g"]\n'
     text = fix(client, file, gear)
-    assert text == 'free = ["g.flange_b"]\n' + gear
+    assert text == 'free = ["g.flange_b"]\n\n' + gear
     text = fix(client, file, '[parts]\na = { is = "Inertia" }\n')
     assert text == '[parts]\na = { is = "Inertia", J = "… kg.m2" }\n'
     (one, *_) = client.open(file, text)

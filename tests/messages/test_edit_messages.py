@@ -54,6 +54,19 @@ CASES: dict[str, tuple[type[ModelicaLikeError], dict[str, Any], str]] = {
         "The netlist has no part 'motr'; did you mean 'motor'? It has motor, rotor, sine, brake, row, three, ramp.\n"
         "  in drive.toml:3 `[parts]`",
     ),
+    "a constant": (
+        DuplicateName, {"op": "rename", "old": "rotor", "new": "pi"},
+        "'pi' is no name for a part: it is a constant of formulas.",
+    ),
+    "a suggestion that is none": (
+        UnknownName, {"operation": "repl"},
+        "There is no operation 'repl'; did you mean 'replace'? There are replace, set, free, connect, insert.",
+    ),
+    "a word that has changed since": (
+        NetlistError,
+        {"operation": "replace", "line": 4, "column": 18, "length": 7, "old": "Inertja", "new": "Inertia", "file": ""},
+        "There is no 'Inertja' at line 4, column 18.\nCheck the netlist again.",
+    ),
     "no name": (
         NetlistError, {"op": "add", "name": "a b", "kind": "Inertia"},
         "'a b' is no name for a part.\nA name is a letter, then letters, digits and _.",
