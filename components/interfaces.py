@@ -14,7 +14,13 @@ from modelica_like.language import Component, Connector, Domain, Equations, Expr
 class Flange(Connector):
     """End of a shaft: angle, and the torque in a cut through it."""
 
-    domain = Domain("torque", "motion", "a spring or clutch", converters={"LinearFlange": "A spindle or rack"})
+    domain = Domain(
+        "torque",
+        "motion",
+        "a spring or clutch",
+        converters={"LinearFlange": "A spindle or rack"},
+        spring="SpringDamper",
+    )
     stroke = icons.SHAFT
     phi: Variable = var("rad", "angle")
     tau: Variable = flow("N.m", "cut torque, positive into the component")
@@ -26,7 +32,10 @@ class Flange(Connector):
 class LinearFlange(Connector):
     """End of a rod or slide: position, and the force in a cut through it."""
 
-    domain = Domain("force", "motion", "a spring or brake", converters={"Flange": "A spindle or rack"})
+    domain = Domain(
+        "force", "motion", "a spring or brake", converters={"Flange": "A spindle or rack"},
+        spring="TranslationalSpringDamper",
+    )  # fmt: skip
     stroke = icons.SLIDE
     s: Variable = var("m", "position")
     f: Variable = flow("N", "cut force, positive into the component")

@@ -66,7 +66,9 @@ class ModelicaLikeError(Exception):
             `kind`, the name of its class; `file`, `line`, `column`, `length` and `path` (of the key) of its first
             place; `what`, `why` and `advice`; `places`, the others with the same keys; `suggestion`, a change of the
             file that does exactly what the advice says: its `operation` is `replace` (the text `old` at a place by
-            `new`), `set` (give the parameter `path` a value in `unit`) or `free` (add `end` to the list `free`).
+            `new`), `set` (give the parameter or input `path` a value in `unit`), `free` (add `end` to the list `free`),
+            `connect` (the ends `first` and `second`) or `insert` (a part `name` of type `kind` between the two ends
+            `between`); `modelica_like.edit.apply` takes it.
         """
         first, *others = self.where or (Source(""),)
         place = first.as_json(self.word)
@@ -125,7 +127,11 @@ class DuplicateName(ModelicaLikeError):
 
 
 class MissingValue(ModelicaLikeError):
-    """A parameter without default, or an input, has no value."""
+    """A parameter without default has no value."""
+
+
+class MissingInput(MissingValue):
+    """An input has neither a value nor a connection."""
 
 
 class NetlistError(ModelicaLikeError):
@@ -356,5 +362,5 @@ def nearest(name: object, candidates: Iterable[str]) -> str:
     name, names = str(name), list(candidates)
     within = sorted((other for other in names if len(name) > _SHORT and name.lower() in other.lower()), key=len)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.58 if not within else 0.8)
-    near = near or within or [other for other in names if other in name.split("_")]
+    near = near or within or [other for other in names if other in name.split("_") or other.lower() == name.lower()]
     return near[0] if near else ""

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.errors import (
+    MissingInput,
     MissingValue,
     ModelicaLikeError,
     Source,
@@ -29,7 +30,7 @@ from modelica_like.flatten.model import (
     Origin,
     StartValue,
 )  # fmt: skip
-from modelica_like.flatten.parameters import Parameters
+from modelica_like.flatten.parameters import Parameters, give_operation
 from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
 from modelica_like.language.component import Component
@@ -315,7 +316,8 @@ class _Flattener:
                 self.linear.append(LinearEquation(((node, 1.0),), -value, Origin(path, "value", _WIRE)))
             else:
                 what, advice = f"{path} is an input without a value.", "Connect it or give it a value."
-                self.errors.append(MissingValue(what, where=component.place_of(), advice=advice))
+                give = give_operation(component, name)
+                self.errors.append(MissingInput(what, where=component.place_of(), advice=advice, operation=give))
 
     def _relate_inputs(self, component: Component) -> None:
         """Declare which open inputs of an adaptor are derivatives of each other."""

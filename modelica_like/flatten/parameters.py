@@ -157,11 +157,9 @@ class Parameters:
         position = self.declare(component, name, label)
         if position is None:
             kind = type(component).__name__
-            part, unit = inside(component), component.fields[name].unit_text
-            operation = {"operation": "set", "path": f"{part.name}.{name}", "unit": unit}
             raise MissingValue(
                 f"{label} ({kind}) has no value.", where=component.place_of(), advice=f"Give it one: {name} = …",
-                operation=operation if isinstance(part.owner, Assembly) else None,
+                operation=give_operation(component, name),
             )  # fmt: skip
         return position
 
@@ -195,6 +193,14 @@ class Parameters:
     def expressions(self) -> Any:
         """Return the vector q."""
         return column(self._q)
+
+
+def give_operation(component: Component, name: str) -> dict[str, str] | None:
+    """Return the change of a netlist that gives a part a value, None if the part is in no netlist."""
+    part, unit = inside(component), component.fields[name].unit_text
+    return (
+        {"operation": "set", "path": f"{part.name}.{name}", "unit": unit} if isinstance(part.owner, Assembly) else None
+    )
 
 
 def _number(text: str) -> Any:

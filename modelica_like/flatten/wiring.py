@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WrongConnection
 from modelica_like.flatten.checks import unit_of_field
@@ -19,6 +20,8 @@ from modelica_like.language.units import ONE, Unit, same_dimension
 End = tuple[int, bool]
 """A connector (its id) seen from inside or from outside (True) its component."""
 _SHAFTS_OF_TWO_SETS = 4
+_PARTNERS_OF = 20
+"""Errors up to which the other end of a free one is looked for among all parts."""
 
 
 @dataclass
@@ -138,21 +141,72 @@ class Wiring:
         for name, connector in component.connectors.items():
             if connector.may_be_free or self.is_connected(connector) or id(connector) in self.freed:
                 continue
+            owner = inside(component).owner
             label, end, flow = component.label, f"{inside(component).name}.{name}", connector.domain.flow
             alike = [end for end in component.connectors.values() if type(end) is type(connector) and not end.optional]
             # Of three shafts of a planetary set none carries torque if one does not; with four, two others do.
             idle = f"{label} ({type(component).__name__})" if len(alike) < _SHAFTS_OF_TWO_SETS else "it"
-            listed = isinstance(inside(component).owner, Assembly)
+            listed = isinstance(owner, Assembly)
             say = f'list it: free = ["{end}"]' if listed else f"yield free(self.{end})"
             operation = {"operation": "free", "end": end} if listed else None
+            partner = self._partner(component, connector) if listed else ""
+            if partner:
+                operation = {"operation": "connect", "first": end, "second": partner}
             self.errors.append(
                 FreeFlange(
                     f"{label}.{name} is free, so {idle} carries no {flow}.",
                     where=component.place_of(),
-                    advice=f"Connect it, or {say}." if inside(component).owner else "Connect it in a drive.",
+                    advice=f"Connect it{partner and ' to '}{partner}, or {say}." if owner else "Connect it in a drive.",
                     operation=operation,
                 )
             )
+
+    def _partner(self, component: Component, connector: Connector) -> str:
+        """Return the only end of other parts to which a free one can be meant to be connected, or an empty text.
+
+        It is on the other side of its part, has no connection, and no path of connected parts leads there already. An
+        end that may be free is not meant, unless nothing of its part is connected.
+        """
+        owner, network, side = inside(component).owner, self._networks.get(id(component)), _side(connector)
+        # A connection that was refused may be the one that is missing.
+        is_known = len(self.errors) < _PARTNERS_OF and all(isinstance(error, FreeFlange) for error in self.errors)
+        if not isinstance(owner, Component) or not side or not is_known:
+            return ""
+        ends = [
+            f"{inside(part).name}.{name}"
+            for part in owner.walk()
+            if part is not component and inside(part).owner is owner
+            and (network is None or self._networks.get(id(part)) != network)
+            for name, end in part.connectors.items()
+            if type(end) is type(connector) and _side(end) == -side
+            and not (end.optional or self.is_connected(end) or id(end) in self.freed)
+            and not (end.may_be_free and id(part) in self._networks)
+        ]  # fmt: skip
+        return ends[0] if len(ends) == 1 else ""
+
+    @cached_property
+    def _networks(self) -> dict[int, int]:
+        """The identity of one part of its network, by that of each connected part."""
+        above: dict[int, int] = {}
+
+        def top(part: int) -> int:
+            while above.setdefault(part, part) != part:
+                above[part] = part = above[above[part]]
+            return part
+
+        for ends in self.sets():
+            first, *others = (id(inside(self.connectors[end]).owner) for end in ends)
+            for other in others:
+                above[top(other)] = top(first)
+        return {part: top(part) for part in above}
+
+
+def _side(connector: Connector) -> int:
+    """Return 1 for the outlet of its part, -1 for the inlet, 0 for what is both or none."""
+    kind, name = type(inside(connector).owner), inside(connector).name
+    if not issubclass(kind, Component):
+        return 0
+    return (name in kind.outlet.split()) - (name in kind.inlet.split())
 
 
 def _is_within(end: Connector | Symbol, scope: Component) -> bool:

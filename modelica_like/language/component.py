@@ -150,11 +150,10 @@ class Component(Declared):
                 advice=f"Annotate the part in {type(self).__name__} to make it replaceable, or set its values by path.",
             )  # fmt: skip
         else:
-            refuse_collection(f"{type(self).__name__}.{name}", value, caller)
+            refuse_collection(f"{(kind := type(self).__name__)}.{name}", value, caller)
             names = [*self.fields, *self._declared.modes, *self._declared.structural, *self._declared.replaceable]
-            error = unknown("parameter or variable", type(self).__name__, name, names, self.renamed)
-            error.where = (caller(),)
-            raise error
+            given = (field for field in self.fields.values() if isinstance(field, Parameter | Input))
+            raise unknown("parameter or variable", kind, name, names, self.renamed, given, caller())
 
     def set_value(self, field: Field, value: Any) -> None:
         """Store the value of a declared field; called by the fields themselves."""
@@ -316,9 +315,8 @@ class Component(Declared):
         names = getattr(type(self), which).split()
         connector = next((self._inside.connectors[name] for name in names if name in self._inside.connectors), None)
         if connector is None:
-            error = unknown(
-                which, f"{self.label} ({type(self).__name__})", " or ".join(names), list(self._inside.connectors)
-            )
+            label = f"{self.label} ({type(self).__name__})"
+            error = unknown(which, label, " or ".join(names), list(self._inside.connectors))
             ends = [*self._inside.connectors, *self.terminal_members()]
             example = f': joint = ["{self.label}.{min(ends)}", …]' if ends else "."
             error.advice = f"Join it in [connect], not in a series{example}"

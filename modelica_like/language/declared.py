@@ -7,7 +7,7 @@ from copy import copy
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, Self, cast
 
-from modelica_like.errors import LanguageError, Source, UnknownName, unknown_name
+from modelica_like.errors import LanguageError, Source, UnknownName, nearest, question
 from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Field, Variable
 from modelica_like.language.icon import Stroke
@@ -130,6 +130,7 @@ class Domain:
         separator: part to put between two parts that fix the same potential.
         reference: component type that every network of such connectors needs, such as `Ground`.
         converters: part that connects to another connector type, by the name of that type.
+        spring: component type that lets two parts differ that fix the same potential.
     """
 
     flow: str = "flow"
@@ -137,6 +138,7 @@ class Domain:
     separator: str = "a compliant part"
     reference: str = ""
     converters: Mapping[str, str] = field(default_factory=dict[str, str])
+    spring: str = ""
 
 
 class Connector(Declared):
@@ -181,8 +183,9 @@ class Connector(Declared):
 
 
 def unknown(
-    kind: str, label: str, name: str, existing: Iterable[str], renamed: Mapping[str, str] | None = None
-) -> UnknownName:
+    kind: str, label: str, name: str, existing: Iterable[str], renamed: Mapping[str, str] | None = None,
+    described: Iterable[Field] = (), where: Source | tuple[()] = (),
+) -> UnknownName:  # fmt: skip
     """Return the error about a name that does not exist.
 
     Args:
@@ -191,14 +194,18 @@ def unknown(
         name: the name.
         existing: the names that exist.
         renamed: what to write instead of names of earlier versions.
+        described: fields that are meant by a word that is in the description of one of them only.
+        where: place of the wrong name.
     """
     if renamed and renamed.get(name):
         now = renamed[name] if renamed[name].isidentifier() else ""  # others are formulas and sentences
         what = f"{label} has no {kind} '{name}' any more."
-        return UnknownName(what, advice=f"Write {renamed[name]}.", word=name, instead=now)
+        return UnknownName(what, where=where, advice=f"Write {renamed[name]}.", word=name, instead=now)
     names = list(existing)
     listing = f" It has {', '.join(names)}." if names else " It has none."
-    return unknown_name(f"{label} has no {kind} '{name}'", name, names, listing)
+    meant = [field.name for field in described if name.lower() in field.description.lower().split()]
+    what, near = f"{label} has no {kind} '{name}'", nearest(name, names) or (meant[0] if len(meant) == 1 else "")
+    return UnknownName(f"{what}{question(near) or '.'}{listing}", where=where, word=name, instead=near)
 
 
 def refuse_collection(label: str, value: object, where: Callable[[], Source] | None = None) -> None:

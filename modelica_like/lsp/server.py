@@ -33,7 +33,10 @@ _KINDS = {
     "end": types.CompletionItemKind.Interface, "unit": types.CompletionItemKind.Unit,
     "word": types.CompletionItemKind.Value,
 }  # fmt: skip
-_FIXES = {"replace": "Write '{new}'", "set": "Give {path} a value", "free": "Leave {end} free"}
+_FIXES = {
+    "replace": "Write '{new}'", "set": "Give {path} a value", "free": "Leave {end} free",
+    "connect": "Connect {first} to {second}", "insert": "Put a {kind} between {between[0]} and {between[1]}",
+}  # fmt: skip
 
 
 class Server(LanguageServer):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Generator
+from collections.abc import Collection, Generator, Set
 from contextlib import contextmanager
 
 from modelica_like.errors import (
     FreeFlange,
+    MissingInput,
     MissingValue,
     ModelicaLikeError,
     UnknownName,
@@ -31,19 +32,19 @@ def thoroughly(drive: Assembly) -> Generator[None]:
         yield
     except ModelicaLikeError as error:
         told = {str(problem) for problem in error.problems()}
-        others = [other for other in further(drive, (), ()) if str(other) not in told]
+        others = [other for other in further(drive, (), frozenset()) if str(other) not in told]
         if not others:
             raise
         raise raise_together_or_one([*error.problems(), *others]) from None
 
 
-def further(drive: Assembly, broken: Collection[str], refused: Collection[str]) -> list[ModelicaLikeError]:
+def further(drive: Assembly, broken: Collection[str], refused: Set[str]) -> list[ModelicaLikeError]:
     """Return the errors of connections, and of values that are missing.
 
     Args:
         drive: loses the connections that have errors or name broken parts.
         broken: names of parts that it should have.
-        refused: paths of values that it should have.
+        refused: paths of values that it should have; `part.*` if it is not clear which.
     """
     from modelica_like.flatten.flatten import flatten  # most netlists have no errors
 
@@ -61,10 +62,11 @@ def head(path: str) -> str:
     return path.partition(".")[0].partition("[")[0]
 
 
-def _is_independent(error: ModelicaLikeError, refused: Collection[str], *, cut: bool) -> bool:
+def _is_independent(error: ModelicaLikeError, refused: Set[str], *, cut: bool) -> bool:
     """Tell whether an error cannot be the consequence of a connection or a value that is left out."""
-    if isinstance(error, MissingValue) and error.operation:
-        return error.operation["path"] not in refused
+    if isinstance(error, MissingValue) and not isinstance(error, MissingInput) and error.operation:
+        path = error.operation["path"]
+        return refused.isdisjoint({path, f"{path.rpartition('.')[0]}.*"})
     if isinstance(error, UnknownName):
         return head(error.word) not in refused
     if isinstance(error, FreeFlange | MissingValue):

@@ -276,7 +276,8 @@ class _Task:
             except CyclicAssembly:
                 raise
             except ModelicaLikeError as error:
-                self.refused |= {f"{name}.{key}", f"{name}.{error.instead}"}
+                meant = error.instead or ("*" if isinstance(error, UnknownName) and error.word == key else "")
+                self.refused |= {f"{name}.{key}", f"{name}.{meant}"}
                 self._collect(error, self.document.lines.within("parts", *name.split("."), key))
         return part
 

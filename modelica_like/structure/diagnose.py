@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import casadi as ca
 
@@ -112,12 +113,33 @@ def doubly_fixed(model: FlatModel, origins: Sequence[Origin], what: str, why: st
     words = {"potential": domain.potential, "flow": domain.flow}
     where = _places(origins)
     advice = f"Remove one, or put {domain.separator} between."
+    if between := _separation(model, domain, _parts(origins)):
+        where = [*(model.components[path].place_of() for path in _parts(origins)), *where]
     if _has_no_reference(model, domain, network):
         where = [model.components[path].place_of() for path in network][:_SHOWN]
         what = f"The network of {_list(network)} has no {domain.reference}."
         why = f"Every {domain.potential} in it is relative to another one; none is zero."
         advice = f'Connect a part that is = "{domain.reference}" to it.'
-    return Overdetermined(what.format(**words), where=where, why=why.format(**words), advice=advice)
+        between = None
+    return Overdetermined(what.format(**words), where=where, why=why.format(**words), advice=advice, operation=between)
+
+
+def _separation(model: FlatModel, domain: Domain, parts: Sequence[str]) -> dict[str, Any] | None:
+    """Return the operation that puts a spring between two parts, None if its place is not clear.
+
+    It is clear for two parts of a netlist, of which the first has one connection, to one other end.
+    """
+    components = [model.components[part] for part in parts if "." not in part and part in model.components]
+    if not domain.spring or len(parts) != 2 or [bool(c.place_of().statement) for c in components] != [True, True]:
+        return None
+    connections = (equation.origin for equation in model.linear if equation.origin.kind == "connection")
+    joined = {tuple(origin.path.split(" – ")) for origin in connections}
+    ends = [ends for ends in joined if any(end.rpartition(".")[0] == parts[0] for end in ends)]
+    if len(ends) != 1 or len(ends[0]) != 2:
+        return None
+    names = (f"spring_{k}" if k > 1 else "spring" for k in range(1, len(model.components) + 2))
+    name = next(name for name in names if name not in model.components)
+    return {"operation": "insert", "name": name, "kind": domain.spring, "between": [*ends[0]]}
 
 
 def _parts(origins: Sequence[Origin]) -> list[str]:

@@ -12,6 +12,7 @@ from calls import called
 from payloads import texts
 
 from modelica_like import errors
+from modelica_like.edit import apply
 from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WiringErrors
 from modelica_like.netlist import loads
 
@@ -116,6 +117,74 @@ def test_a_free_flange_and_a_missing_value(tmp_path: Path):
         {"operation": "set", "path": "a.J", "unit": "kg.m2", "file": str(file)},
         {"operation": "free", "end": "b.flange_b", "file": str(file)},
     ]
+
+
+MOTOR = '[parts]\nm = { is = "Torque", tau = 1 }\ng = { is = "IdealGear", ratio = 2 }\n'
+FIXABLE = {
+    "a free end, and one part without connections": (
+        MOTOR + 'load = { is = "Inertia", J = 1 }\n[series]\nx = ["m", "g"]\n',
+        {"operation": "connect", "first": "g.flange_b", "second": "load.flange_a"},
+        "",
+    ),
+    "a free end, and two parts without connections": (
+        MOTOR + 'r = { is = "Inertia", J = 1 }\n'
+        'load = { is = "Inertia", J = 1 }\nother = { is = "Inertia", J = 1 }\n[series]\nx = ["m", "r", "g"]\n',
+        {"operation": "free", "end": "g.flange_b"},
+        "",
+    ),
+    "a free end, and another that would close a loop": (
+        MOTOR + 'r = { is = "Inertia", J = 1 }\n[connect]\nx = ["r.flange_b", "g.flange_a", "m.flange"]\n',
+        {"operation": "free", "end": "g.flange_b"},
+        "",
+    ),
+    "an input": (
+        '[parts]\nm = { is = "Torque" }\nr = { is = "Inertia", J = 1 }\n[series]\nx = ["m", "r"]\n',
+        {"operation": "set", "path": "m.tau", "unit": "N.m", "value": "3 N.m"},
+        "",
+    ),
+    "two speeds on one shaft": (
+        '[parts]\na = { is = "ConstantSpeed", w_fixed = 3 }\nr = { is = "Inertia", J = 1 }\n'
+        'b = { is = "ConstantSpeed", w_fixed = 4 }\n[series]\nx = ["a", "r", "b"]\n',
+        {"operation": "insert", "name": "spring", "kind": "SpringDamper", "between": ["r.flange_b", "b.flange"]},
+        "spring.c (SpringDamper) has no value.",
+    ),
+    "two fixed slides": (
+        '[parts]\na = { is = "TranslationalFixed" }\nb = { is = "TranslationalFixed" }\n[series]\nx = ["a", "b"]\n',
+        {"operation": "insert", "name": "spring", "kind": "TranslationalSpringDamper",
+         "between": ["a.flange", "b.flange"]},
+        "spring.c (TranslationalSpringDamper) has no value.",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", FIXABLE)
+def test_a_suggestion_is_an_operation(case: str, tmp_path: Path):
+    file = tmp_path / "drive.toml"
+    text, expected, left = FIXABLE[case]
+    file.write_text(text, encoding="utf-8")
+    (problem,) = problems(file)
+    suggestion = problem["suggestion"]
+    assert {**suggestion, "file": ""} == {**{key: expected[key] for key in expected if key != "value"}, "file": ""}
+    file.write_text(apply(text, {**suggestion, **expected}, file=file).text, encoding="utf-8")
+    errors = [problem["what"] for problem in problems(file) if problem["kind"] != "note"]
+    assert errors[:1] == ([left] if left else [])
+
+
+MISSPELLED = {
+    'a = { is = "Inertia", j = 1 }': ("a.j", "J"),
+    'a = { is = "Inertia", inertia = 1 }': ("a.inertia", "J"),
+    'a = { is = "Inertia", Jx = 1 }': ("a.Jx", "J"),
+    'a = { is = "Inertia", colour = 1 }': ("a.colour", None),
+}
+
+
+@pytest.mark.parametrize("line", MISSPELLED)
+def test_a_misspelled_name_is_told_once(line: str, tmp_path: Path):
+    file = tmp_path / "drive.toml"
+    file.write_text(f"[parts]\n{line}\n", encoding="utf-8")
+    (problem,) = problems(file)
+    path, meant = MISSPELLED[line]
+    assert (problem["path"], (problem["suggestion"] or {}).get("new")) == (f"parts.{path}", meant)
 
 
 def test_an_end_of_another_kind_is_replaced(tmp_path: Path):

@@ -208,6 +208,12 @@ def test_quick_fixes(client: Client, tmp_path: Path):
     gear = '[parts]\nm = { is = "Torque", tau = 1 }\ng = { is = "IdealGear", ratio = 2 }\n[series]\nx = ["m", "g"]\n'
     text = fix(client, file, gear)
     assert text == 'free = ["g.flange_b"]\n\n' + gear
+    text = fix(client, file, gear.replace("[series]", 'r = { is = "Inertia", J = 1 }\n[series]'))
+    assert text.endswith('x = ["m", "g"]\n\n[connect]\ng_r = ["g.flange_b", "r.flange_a"]\n')
+    text = fix(
+        client, file, '[parts]\nm = { is = "Torque" }\nr = { is = "Inertia", J = 1 }\n[series]\nx = ["m", "r"]\n'
+    )
+    assert 'm = { is = "Torque", tau = "… N.m" }' in text
     text = fix(client, file, '[parts]\na = { is = "Inertia" }\n')
     assert text == '[parts]\na = { is = "Inertia", J = "… kg.m2" }\n'
     (one, *_) = client.open(file, text)

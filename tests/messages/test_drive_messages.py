@@ -242,7 +242,7 @@ case(
     "an unknown parameter",
     lambda: Inertia(j=1.0),  # unknown parameter
     """\
-Inertia has no parameter or variable 'j'. It has J, phi, w.
+Inertia has no parameter or variable 'j'; did you mean 'J'? It has J, phi, w.
   in test_drive_messages.py:{unknown parameter} `Inertia(j=1.0)`""",
 )
 case(
@@ -263,7 +263,7 @@ rotor.J (Inertia) has no value.
 Give it one: J = …""",
 )
 case(
-    errors.MissingValue,
+    errors.MissingInput,
     "an input without a value",
     lambda: flatten(Assembly(parts={"motor": Speed(), "j": Inertia(J=1.0)}, series={"s": ["motor", "j"]})),  # no signal
     """\

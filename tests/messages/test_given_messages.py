@@ -12,8 +12,10 @@ from components.interfaces import Flange
 from modelica_like import Component, build, simulate
 from modelica_like.errors import (
     DuplicateName,
+    FreeFlange,
     LanguageError,
     ModelicaLikeError,
+    Overdetermined,
     UnitError,
     UnknownName,
     ValueOutOfRange,
@@ -80,6 +82,19 @@ def no_time() -> Path:
     return path
 
 
+LOOSE = """[parts]
+m = { is = "Torque", tau = 1 }
+g = { is = "IdealGear", ratio = 2 }
+load = { is = "Inertia", J = 1 }
+[series]
+x = ["m", "g"]
+"""
+TWICE = """[parts]
+a = { is = "Fixed" }
+b = { is = "Fixed" }
+[connect]
+x = ["a.flange", "b.flange"]
+"""
 METER = """[parts]
 v = { is = "ConstantVoltage", V = 1 }
 meter = { is = "VoltageSensor" }
@@ -129,6 +144,17 @@ Connect it, or list it: free = ["m.flange"].
 m.an is free, so m (PermanentMagnetDCMachine) carries no current.
   in netlist.toml:3 `m = { is = "PermanentMagnetDCMachine" }`
 Connect it, or list it: free = ["m.an"]."""),
+    "a free end that fits one other": (FreeFlange, lambda: build(loads(LOOSE)), """\
+g.flange_b is free, so g (IdealGear) carries no torque.
+  in netlist.toml:3 `g = { is = "IdealGear", ratio = 2 }`
+Connect it to load.flange_a, or list it: free = ["g.flange_b"]."""),
+    "two speeds in a netlist": (Overdetermined, lambda: build(loads(TWICE)), """\
+b, a fix the same motion or torque more than once.
+  in netlist.toml:3 `b = { is = "Fixed" }`
+  in netlist.toml:2 `a = { is = "Fixed" }`
+  in fixed.py:{fixed.py:yield self.flange.phi == self.phi0} `yield self.flange.phi == self.phi0`
+Two parts prescribe it, or rigid parts form a loop.
+Remove one, or put a spring or clutch between."""),
     "a part without an inlet in a series": (UnknownName, lambda: build(loads(METER)), """\
 meter (VoltageSensor) has no inlet 'flange_a or flange'. It has p, n.
   in netlist.toml:5 `circuit = ["v", "meter"]`

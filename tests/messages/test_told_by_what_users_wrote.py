@@ -244,7 +244,7 @@ def grip(tmp_path: Path) -> str:
 @pytest.mark.parametrize(
     ("given", "what"),
     [
-        ("rotor.j=3", "Inertia has no parameter or variable 'j'. It has J, phi, w."),
+        ("rotor.j=3", "Inertia has no parameter or variable 'j'; did you mean 'J'? It has J, phi, w."),
         ("rotr.J=3", "grip has no part 'rotr'; did you mean 'rotor'? It has push, rotor, grip."),
         ("rotor.J=3 kgm2", "Inertia.J = '3 kgm2': Unknown unit 'kgm' in 'kgm2'; did you mean 'kg.m2'?"),
         ("rotor.J=3*K", "rotor.J: grip has no parameter 'K'. It has J."),
