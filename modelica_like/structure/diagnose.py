@@ -44,6 +44,8 @@ def check_solvable(system: System, incidence: list[list[int]], contradictions: l
     if len(over_rows) > len(over_cols):
         over, under = ([_chain_name(system, chains[c]) for c in block] for block in (over_cols, under_cols))
         raise _overdetermined(system.model, [system.origins[r] for r in over_rows], over, under)
+    if contradictions and len(under_cols) > len(under_rows) and all(o.kind == "free end" for o in contradictions):
+        raise _without_potential(system, contradictions, [chains[c] for c in under_cols])
     if contradictions:
         parts = _parts(contradictions)
         what = (
@@ -98,6 +100,18 @@ def _overdetermined(model: FlatModel, origins: list[Origin], over: list[str], un
         advice = f"Check the equations of {parts[0]}: does one of them use the wrong variable?"
         return Overdetermined(what, where=_places(origins), why=why, advice=advice)
     return doubly_fixed(model, origins, what, "Two rigid parts fix the same {potential} or {flow}.")
+
+
+def _without_potential(system: System, ends: list[Origin], chains: list[int]) -> Underdetermined:
+    """Return the error about parts that only join free ends: their flows are zero twice, no potential is given."""
+    domain, network = _domain(system.model, ends)
+    where = [system.model.components[path].place_of() for path in network][:_SHOWN]
+    return Underdetermined(
+        f"Nothing determines {_list([_chain_name(system, c) for c in chains])}: {_list(_parts(ends))} are free, "
+        f"so they carry no {domain.flow}, and no part gives the {domain.potential}.",
+        where=where,
+        advice=f"Connect a part that has or prescribes a {domain.potential} to one of them.",
+    )
 
 
 def doubly_fixed(model: FlatModel, origins: Sequence[Origin], what: str, why: str) -> Overdetermined:

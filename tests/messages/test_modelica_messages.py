@@ -5,7 +5,14 @@ from pathlib import Path
 import pytest
 
 from modelica_like import load
-from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, ModelicaTextError, UnknownName, ValueOutOfRange
+from modelica_like.errors import (
+    ComponentUnbalanced,
+    ModelicaLikeError,
+    ModelicaTextError,
+    Underdetermined,
+    UnknownName,
+    ValueOutOfRange,
+)
 from modelica_like.netlist.modelica.write import modelica_text
 
 R = "Modelica.Mechanics.Rotational.Components"
@@ -464,6 +471,24 @@ def test_an_input_of_a_part_with_a_connection_and_an_equation(tmp_path: Path, ch
         lambda: build(load(tmp_path / "a.mo")),
         "A declares 2 equations for 1 unknowns (h_u).\n  in a.mo:6 `g.u = time;`\n"
         "g.u is an input of a part: connect it, or write one equation, g.u = …",
+    )
+
+
+def test_rigid_parts_whose_ends_are_all_free(tmp_path: Path, check_message) -> None:
+    from modelica_like import build
+
+    port = "Modelica.Thermal.HeatTransfer.Interfaces.HeatPort"
+    collector = (
+        f"model C parameter Integer m = 3; {port}_a a[m]; {port}_b b; "
+        "equation b.Q_flow + sum(a.Q_flow) = 0; a.T = fill(b.T, m); end C;"
+    )
+    (tmp_path / "a.mo").write_text(model("C c(m = 2);", before=collector))
+    check_message(
+        Underdetermined,
+        lambda: build(load(tmp_path / "a.mo")),
+        "Nothing determines c.a[1].T: c.b, c.a[1], c.a[2] are free, so they carry no heat flow, and no part gives the "
+        "temperature.\n  in a.mo:3 `C c(m = 2);`\n"
+        "Connect a part that has or prescribes a temperature to one of them.",
     )
 
 
