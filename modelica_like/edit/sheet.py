@@ -146,9 +146,10 @@ class Sheet:
     def put_behind(self, path: Path, lines: str) -> None:
         """Write lines behind those of the key at a path, or behind its table and what is in it, as other tables."""
         sections = [section for section in self.tree.sections if section.path[: len(path)] == path]
-        last = self.tree.entries.get(path) or self.tree.homes[path].after
         if sections:
             last = sections[-1].entries[-1] if sections[-1].entries else None
+        else:
+            last = self.tree.entries.get(path) or self.tree.homes[path].after
         end = last.value.end if last else sections[-1].end - 1
         self._put_lines(self.tree.line_end(end), "\n" + lines if sections else lines)
 

@@ -223,6 +223,13 @@ def test_a_part_is_copied() -> None:
     assert '[parts.other]\nis = "Brake"\ncapacity = "20 N.m"\n\n[series]' in edit.duplicate(TEXT, "brake", "other")
 
 
+def test_an_array_of_tables_is_copied() -> None:
+    row = '[[parts.row]]\nis = "Inertia"\nJ = 1\n\n[[parts.row]]\nis = "Spring"\nc = 5\n'
+    text = f"{row}[simulate]\nuntil = 1\n"
+    copy = row.replace("row", "other")
+    assert edit.duplicate(text, "row", "other") == f"{row}\n{copy}[simulate]\nuntil = 1\n"
+
+
 def test_layout_of_lists_stays() -> None:
     text = "[parts]\n" + "".join(f'{name} = {{is="Inertia",J=1}}\n' for name in "abc")
     text += '[series]\nx = [\n  "a", # first\n  "b",\n  "c"\n]\n'
