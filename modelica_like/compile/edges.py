@@ -47,7 +47,9 @@ class Edges:
     in_time: bool
 
 
-def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, guards: ca.Function) -> Edges:
+def find_edges(
+    arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, guards: ca.Function, integrands: Any = None
+) -> Edges:
     """Collect edges of equations and guards, and phases of edges and guards, from the expression graph.
 
     Args:
@@ -55,10 +57,11 @@ def find_edges(arguments: dict[str, Any], ode: ca.Function, alg: ca.Function, gu
         ode: derivatives of the states.
         alg: residuals of the implicit equations.
         guards: of the state events.
+        integrands: what a run integrates besides, an SX column, whose edges are found as those of the equations.
     """
     given = list(arguments.values())
     rates = ode(*given)
-    equations = ca.vertcat(rates, alg(*given))
+    equations = ca.vertcat(rates, alg(*given), ca.SX(0, 1) if integrands is None else integrands)
     kinks, of_guards = (kinks_of(arguments, expressions) for expressions in (equations, guards(*given)))
     smooth = _different([*Narrow(arguments, rates).edges(_operations(arguments, equations, NARROW))])
     edges = kinks + smooth + of_guards

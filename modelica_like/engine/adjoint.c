@@ -12,12 +12,6 @@
 #define MOST_ERROR 10    /* tolerances, as estimated, beside the largest effects on an output: results have less */
 #define MOST_HALVINGS 8  /* of a step: what begins on a kink is wrong in its first part only, of 4e-3 */
 
-/* The derivative at the begin of a step of length 1 of the polynomial through values at its nodes. */
-static const double BY_NODES[N_NODES] = {-8.369800827143091, 46.395023689295286, 445.56742342191916, -46.71499414177189,
-    -475.38545395892027, 38.507801816620784};
-
-static int node_of(int stage) { return stage < N_NODES ? stage : N_NODES - 1; }
-
 /* Adds bars of states, parameters, inputs and d, which lie in `dots`, and of the time. */
 void add_bars(Instance *c, double *vector) {
     const Model *m = c->model;
@@ -67,12 +61,14 @@ static int prepare_step(Instance *c, double begin, double h) {
 }
 
 /* A vector over a step: `x` holds bars of states behind it, and becomes those of states and implicit unknowns before;
- * `rates` become bars of rates at the nodes. */
-static void step_back(Instance *c, double h, double *x, double *rates, int of_error) {
+ * `rates` become bars of rates at the nodes. `integrand`: slopes of what is integrated at the nodes, or NULL. */
+static void step_back(Instance *c, double h, double *x, double *rates, int of_error, const double *integrand) {
     const Gradient *g = c->gradient;
     int n = c->model->n_unknowns, n_x = c->model->n_x;
     size_t size = (size_t)n * sizeof(double), nonzeros = (size_t)c->model->step.n_nonzeros;
     double *stages = g->stages, *points = stages + STAGES * n, *moving = points + n, *changing = moving + n;
+    double of_integral[STAGES], weights[N_NODES], integral_moving = 0;
+    if (integrand != NULL) integral_moving = integral_back(of_error, of_integral, weights);
     memset(stages, 0, (STAGES + 3) * size);
     memset(rates, 0, N_NODES * size);
     memcpy(stages + (STAGES - 1) * n, x, size); /* bars of stages, of the present stage's point, of the slope by time */
@@ -80,8 +76,11 @@ static void step_back(Instance *c, double h, double *x, double *rates, int of_er
     memset(x, 0, size);
     for (int i = STAGES - 1; i >= 0; i--) {
         double *stage = stages + i * n, *at_node = rates + node_of(i) * n;
+        for (int k = 0; k < n && integrand != NULL; k++) stage[k] += h * of_integral[i] * integrand[k];
         solve_step_transposed(c, stage);
         if (i < LAST_POINTS - 1) memset(points, 0, size);
+        for (int k = 0; k < n && integrand != NULL; k++)
+            points[k] += h * of_integral[i] * integrand[node_of(i) * n + k];
         add_product(c, g->matrices + (size_t)node_of(i) * nonzeros, stage, points);
         for (int k = 0; k < n; k++) {
             at_node[k] += stage[k];
@@ -97,6 +96,8 @@ static void step_back(Instance *c, double h, double *x, double *rates, int of_er
     for (int node = 0; node < N_NODES; node++) {
         for (int k = 0; k < n; k++) changing[k] = BY_NODES[node] * moving[k];
         add_product(c, g->matrices + (size_t)node * nonzeros, changing, x);
+        for (int k = 0; k < n && integrand != NULL; k++)
+            x[k] += h * BY_NODES[node] * integral_moving * integrand[node * n + k];
         for (int k = 0; k < n; k++) rates[node * n + k] += changing[k];
     }
 }
@@ -105,18 +106,25 @@ static void step_back(Instance *c, double h, double *x, double *rates, int of_er
 static void rates_back(Instance *c, double begin, double h, const double *rates) {
     Gradient *g = c->gradient;
     const Model *m = c->model;
-    size_t n = (size_t)m->n_unknowns;
-    for (int node = 0; node < N_NODES; node++) {
-        double t = begin + RODAS_TIME[node] * h, *point = g->points + (size_t)node * n;
-        const Tape *ran = evaluate_on_tape(c, &m->tapes.rates, t, point, c->rhs);
-        for (int v = 0; v < g->n_vectors; v++) {
-            memset(c->dots, 0, (size_t)m->slot_results * sizeof(double));
-            tape_adjoint(ran, c->slots, c->dots, rates + ((size_t)v * N_NODES + (size_t)node) * n);
+    size_t n = (size_t)m->n_unknowns, inputs = (size_t)m->slot_results;
+    const double *at_node[MOST_LANES];
+    int lanes[MOST_LANES], count, first = 0;
+    while (first < g->n_vectors) {
+        for (count = 0; count < MOST_LANES && first < g->n_vectors; first++)
+            if (!g->still[first]) lanes[count++] = first;
+        memset(g->lanes, 0, inputs * (size_t)count * sizeof(double));
+        for (int node = 0; node < N_NODES && count > 0; node++) {
+            const Tape *ran = evaluate_on_tape(
+                c, &m->tapes.rates, begin + RODAS_TIME[node] * h, g->points + (size_t)node * n, c->rhs);
+            for (int v = 0; v < count; v++) at_node[v] = rates + ((size_t)lanes[v] * N_NODES + (size_t)node) * n;
+            tape_adjoint_of(count, ran, c->slots, g->lanes, at_node);
+        }
+        for (int v = 0; v < count; v++) {
+            for (size_t k = 0; k < inputs; k++) c->dots[k] = g->lanes[k * (size_t)count + (size_t)v];
             memset(c->dots + m->slot_x, 0, (size_t)m->n_x * sizeof(double));
-            add_bars(c, vector_of(c, v));
+            add_bars(c, vector_of(c, lanes[v]));
         }
     }
-    memset(c->dots + m->n_slots, 0, (size_t)c->known_used * sizeof(double)); /* does not move */
 }
 
 /* The error of a step, which its last stage estimates, beside the largest effects of states, parameters and inputs on
@@ -138,7 +146,7 @@ static double error_back(Instance *c, double h, const double *after) {
             *largest = max_of(*largest, fabs(after[(size_t)v * n + (size_t)k]) * sizes[first + k]);
         for (int k = 0; k < m->n_x && *largest > 0; k++) x[k] += vector[first + k] / *largest;
     }
-    step_back(c, h, x, g->work + n, 1);
+    step_back(c, h, x, g->work + n, 1, NULL);
     for (int k = 0; k < m->n_x; k++) error = max_of(error, fabs(x[k]) * sizes[first + k]);
     return error;
 }
@@ -151,14 +159,19 @@ static void smoothly_back(Instance *c, double begin, double end, int halvings) {
     size_t n = (size_t)m->n_unknowns;
     if (!(h > 0)) return;
     if (!prepare_step(c, begin, h)) lose_back(c);
+    double error = slopes_of_integrands(c, begin, h);
     for (int v = 0; v < g->n_vectors; v++) {
         double *x = after + (size_t)v * n;
+        const double *states = vector_of(c, v) + (c->x - c->numbers);
+        int integral = integrand_of(g, v) >= 0;
         memset(x, 0, n * sizeof(double));
-        memcpy(x, vector_of(c, v) + (c->x - c->numbers), (size_t)m->n_x * sizeof(double));
-        step_back(c, h, x, g->node_bars + (size_t)v * N_NODES * n, 0);
+        g->still[v] = !integral && largest_of(m->n_x, states) == 0;
+        if (g->still[v]) continue;
+        memcpy(x, states, (size_t)m->n_x * sizeof(double));
+        step_back(c, h, x, g->node_bars + (size_t)v * N_NODES * n, 0,
+            integral ? g->integrand_slopes + (size_t)v * N_NODES * n : NULL);
     }
-
-    if (halvings > 0 && error_back(c, h, after) > MOST_ERROR * c->state.tolerance) {
+    if (halvings > 0 && max_of(error, error_back(c, h, after)) > MOST_ERROR * c->state.tolerance) {
         smoothly_back(c, begin + 0.5 * h, end, halvings - 1);
         smoothly_back(c, begin, begin + 0.5 * h, halvings - 1);
         return;
@@ -166,6 +179,7 @@ static void smoothly_back(Instance *c, double begin, double end, int halvings) {
     for (int v = 0; v < g->n_vectors; v++)
         memcpy(vector_of(c, v) + (c->x - c->numbers), after + (size_t)v * n, n * sizeof(double));
     rates_back(c, begin, h, g->node_bars);
+    integrals_back(c, h);
     c->state.t = begin;
     memcpy(c->x, g->points, n * sizeof(double));
     c->state.z_valid = c->variables_valid = 0;
@@ -195,10 +209,6 @@ static void slopes_along(Instance *c, const double *direction, double *slopes) {
     memcpy(dots + m->slot_d, direction + (c->d - c->numbers), (size_t)m->n_d * sizeof(double));
     tangent_of_implicit(c);
     tangent_now(c, &m->tapes.rates, slopes);
-}
-
-static double span_of(const Instance *c) {
-    return c->state.stop_time_defined ? c->state.stop_time - c->state.start_time : 1;
 }
 
 /* By how much slopes along a direction differ that can be felt in the time of a run. */
@@ -281,7 +291,8 @@ static void check_jump(Instance *c, double before, double behind) {
     const Model *m = c->model;
     int n = m->tapes.edges.n_outputs;
     const double *here = c->edges_middle;
-    if (!jumps_between(c, before, behind)) return;
+    int jump = integrands_jump(c, before, behind); /* the other one leaves edges */
+    if (!jumps_between(c, before, behind) && !jump) return;
     c->state.t = behind;
     piece_at(m, c->piece, behind, c->x);
     c->variables_valid = c->state.z_valid = 0;
@@ -306,9 +317,15 @@ void piece_back(Instance *c, const Record *along) {
         ends[parts] = parts < MOST_EDGES ? min_of(edge_ahead(c, begins[parts], &behind), along->end) : along->end;
     } while (parts++ < MOST_EDGES && behind <= along->end && behind < INFINITY);
     while (parts-- > 0) {
+        for (double t; (t = seed_behind(c, begins[parts], 0)) > begins[parts];) {
+            smoothly_back(c, t, ends[parts], MOST_HALVINGS);
+            ends[parts] = min_of(t, ends[parts]);
+            seed_behind(c, t, 1);
+        }
         smoothly_back(c, begins[parts], ends[parts], MOST_HALVINGS);
         if (parts > 0) check_jump(c, ends[parts - 1], begins[parts]);
     }
+    while (seed_behind(c, along->begin, 1) > -INFINITY) continue;
     c->state.t = along->begin;
     piece_at(c->model, c->piece, along->begin, c->x);
     c->variables_valid = c->state.z_valid = 0;

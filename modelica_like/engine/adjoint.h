@@ -7,6 +7,7 @@
 
 enum { N_NODES = LAST_POINTS }; /* of stages: the last ones have one */
 #define MOST_DOUBTFUL 8         /* reasons that are told apart */
+#define MOST_LANES 16           /* vectors that go over a tape together */
 
 typedef struct Record { /* a part of a piece along which the run has moved, or an instant */
     struct Record *previous;
@@ -29,6 +30,24 @@ typedef struct {
     uint32_t by;     /* value reference */
 } Value;
 
+typedef struct {      /* a part of what is differentiated; those at a time come first, the latest one first */
+    int64_t of;       /* row */
+    int64_t instant;  /* before this one, which moves: 0 is that at the start; -1: at a time, behind an instant there */
+    double t, moving; /* that time; derivative by the time of the instant */
+    const double *by; /* derivatives by states, parameters, inputs and d */
+} Seed;
+
+typedef struct {
+    int64_t variable; /* is integrated over the run; -1: nothing */
+    double size;      /* of the integral, beside which errors are measured */
+} Integrand;
+
+typedef struct { /* what is read along a run */
+    const Seed *seeds;
+    const Integrand *integrands; /* by row */
+    int64_t n_seeds, n_of;
+} Along;
+
 struct Gradient {
     size_t n; /* by how many values */
     Value *values;
@@ -48,10 +67,28 @@ struct Gradient {
     double *vectors, *behind; /* of outputs, then of doubts: derivatives by numbers of the state, and by the time */
     double *sides, *slope, *moment, *rates, *work, *sizes, *motions, *largest;
     double *points, *matrices, *stages, *node_bars; /* of a step */
+    double *integrand_slopes, *integrand_bars;      /* by states and implicit unknowns, and by the rest, at the nodes */
+    double *later, *lanes;                          /* derivatives by the time of an instant; bars of several vectors */
+    unsigned char *still;                           /* vectors that a step leaves as they are */
+    const Along *along;                             /* or NULL */
+    int64_t next_seed, instant;
     ptrdiff_t *listed;
     unsigned char *marks; /* numbers that the last instant has felt */
 };
 
+/* The derivative at the begin of a step of length 1 of the polynomial through values at its nodes. */
+static const double BY_NODES[N_NODES] = {-8.369800827143091, 46.395023689295286, 445.56742342191916, -46.71499414177189,
+    -475.38545395892027, 38.507801816620784};
+
+static inline int node_of(int stage) { return stage < N_NODES ? stage : N_NODES - 1; }
+
+static inline double span_of(const Instance *c) {
+    return c->state.stop_time_defined ? c->state.stop_time - c->state.start_time : 1;
+}
+/* The variable that a row integrates, or -1. */
+static inline int integrand_of(const Gradient *g, int row) {
+    return g->along == NULL || row >= g->n_of ? -1 : (int)g->along->integrands[row].variable;
+}
 /* Where numbers of the state lie in a copy. */
 static inline const double *copied(const Instance *c, const void *copy, const double *values) {
     return (const double *)(const void *)((const char *)copy + sizeof(State)) + (values - c->numbers);
@@ -60,12 +97,20 @@ static inline double *vector_of(const Instance *c, int k) {
     return c->gradient->vectors + (size_t)k * (c->n_smooth + 1);
 }
 /* gradient.c */
+Result gradient_along(Instance *c, const Along *along, double *gradient);
 void add_doubt(Instance *c, FailureCode why, const double *slope);
 void lose_back(Instance *c);
+void add_seed(Instance *c, const Seed *seed);
+double seed_behind(Instance *c, double t, int add);
 /* adjoint.c */
 void add_bars(Instance *c, double *vector);
 void slope_of_output(Instance *c, const Tape *tape, int output, double *bars, double *slope);
 void piece_back(Instance *c, const Record *along);
+/* integrals.c */
+double integral_back(int of_error, double *stages, double *weights);
+double slopes_of_integrands(Instance *c, double begin, double h);
+void integrals_back(Instance *c, double h);
+int integrands_jump(Instance *c, double before, double behind);
 /* instants.c */
 void event_back(Instance *c, const Record *at);
 void start_back(Instance *c, const Record *at);

@@ -30,10 +30,12 @@ void run_operations(const Tape *tape, double *slots);
 void tape_run(const Tape *tape, double *slots, double *outputs);
 void tape_tangent(const Tape *tape, const double *slots, double *dots, double *output_dots);
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars);
+void tape_adjoint_of(int count, const Tape *tape, const double *slots, double *bars, const double *const *output_bars);
 void slopes(int operation, double a, double b, double f, double *by_left, double *by_right);
 /* special.c */
 const Tape *run_on_tape(Instance *c, const Tape *tape, double *outputs);
 void run_special(Instance *c, const Tape *tape, double *outputs);
+int output_place(const Tape *tape, const Tape *ran, int output);
 void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int period);
 void evaluate_part(Instance *c, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);

@@ -134,22 +134,25 @@ void gradient_end(Instance *c) {
 static double *take_room(const Instance *c, size_t n_of) {
     Gradient *g = c->gradient;
     size_t n = c->n_smooth + 1, vectors = n_of + MOST_DOUBTFUL, n_y = (size_t)c->model->n_unknowns;
-    size_t nonzeros = (size_t)c->model->step.n_nonzeros;
+    size_t nonzeros = (size_t)c->model->step.n_nonzeros, integrals = g->along != NULL ? n_of * N_NODES : 0;
     const struct {
         double **array;
         size_t size;
     } parts[] = {{&g->vectors, vectors * n}, {&g->behind, vectors * n}, {&g->sides, 2 * n}, {&g->slope, n},
         {&g->moment, n}, {&g->work, n + (N_NODES + 1) * n_y}, {&g->largest, n_of}, {&g->sizes, n}, {&g->motions, n},
         {&g->rates, 2 * n_y}, {&g->points, N_NODES * n_y}, {&g->matrices, N_NODES * nonzeros},
-        {&g->stages, (STAGES + 3) * n_y}, {&g->node_bars, vectors * N_NODES * n_y}};
+        {&g->stages, (STAGES + 3) * n_y}, {&g->node_bars, vectors * N_NODES * n_y},
+        {&g->integrand_slopes, integrals * n_y}, {&g->integrand_bars, integrals * n}, {&g->later, n_of},
+        {&g->lanes, (vectors < MOST_LANES ? vectors : MOST_LANES) * c->n_bars}};
     size_t total = 0;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) total += parts[k].size;
-    double *room = c->allocate(total + 2 * n, sizeof(double));
+    double *room = c->allocate(total + 2 * n + vectors, sizeof(double));
     double *next = room;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0] && room != NULL; next += parts[k++].size)
         *parts[k].array = next;
     g->listed = (ptrdiff_t *)(void *)next;
     g->marks = (unsigned char *)(void *)(next + n);
+    g->still = (unsigned char *)(void *)(next + 2 * n);
     return room;
 }
 
@@ -193,6 +196,25 @@ int modelica_like_gradient_start(void *instance, const uint32_t by[], size_t n) 
     return 0;
 }
 
+void add_seed(Instance *c, const Seed *seed) {
+    const Model *m = c->model;
+    double *vector = vector_of(c, (int)seed->of);
+    const double *by = seed->by, *const parts[] = {c->x, c->p, c->u, c->d};
+    const int sizes[] = {m->n_x, m->n_p, m->n_u, m->n_d};
+    for (int part = 0; part < 4; by += sizes[part++])
+        for (int k = 0; k < sizes[part]; k++) vector[parts[part] - c->numbers + k] += by[k];
+}
+
+/* The time of the next seed on the way back, if it is not before t; it is added then, if that is asked for. */
+double seed_behind(Instance *c, double t, int add) {
+    Gradient *g = c->gradient;
+    if (g->along == NULL || g->next_seed == g->along->n_seeds) return -INFINITY;
+    const Seed *seed = &g->along->seeds[g->next_seed];
+    if (seed->instant >= 0 || seed->t < t) return -INFINITY;
+    if (add) add_seed(c, seed), g->next_seed++;
+    return seed->t;
+}
+
 /* Goes back over all records, from derivatives of outputs at the present point, and comes back to it. */
 static Result go_back(Instance *c, const uint32_t of[]) {
     Gradient *g = c->gradient;
@@ -200,7 +222,11 @@ static Result go_back(Instance *c, const uint32_t of[]) {
     int edges_valid = c->edges_valid, doubts = c->doubts;
     double one = 1;
     if (!state_copy_out(c, &present)) return RESULT_ERROR;
-    for (int k = 0; k < g->n_of; k++) {
+    g->next_seed = g->instant = 0;
+    while (seed_behind(c, c->state.t, 1) > -INFINITY) continue;
+    for (const Record *record = g->last; record != NULL; record = record->previous)
+        g->instant += record->pass != NULL && !record->start;
+    for (int k = 0; k < g->n_of && g->along == NULL; k++) {
         seed_unknowns(c, &of[k], 1, &one);
         add_bars(c, vector_of(c, k));
     }
@@ -213,6 +239,7 @@ static Result go_back(Instance *c, const uint32_t of[]) {
         }
         g->n_rounds = record->n_rounds;
         memcpy(g->rounds, record->rounds, (size_t)record->n_rounds * (size_t)c->model->n_transitions);
+        g->instant -= !record->start;
         (record->start ? start_back : event_back)(c, record);
         g->loaded = NULL;
     }
@@ -245,15 +272,15 @@ static Result write_gradient(Instance *c, double *gradient) {
     return any || fail_with(c, first->why, by, first->t, 0);
 }
 
-int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, double gradient[]) {
-    Instance *c = instance;
-    if (c == NULL || !allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED)) return 1;
+static Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along *along, double *gradient) {
     Gradient *g = c->gradient;
-    if (g == NULL || of == NULL || gradient == NULL) return !fail(c, NOT_ASKED, 0);
-    if (g->lost != 0) return !fail_with(c, g->lost, UINT32_MAX, g->lost_at, 0);
-    if (!check_unknowns(c, of, n_of) || !factor_implicit(c)) return 1;
+    if (g->lost != 0) return fail_with(c, g->lost, UINT32_MAX, g->lost_at, 0);
+    if (!factor_implicit(c)) return RESULT_ERROR;
+    g->along = along;
+    for (size_t row = 0; along != NULL && row < n_of; row++)
+        if (along->integrands[row].variable >= 0) ask_for(c, (int)along->integrands[row].variable);
     double *room = n_of > MOST_VALUES ? NULL : take_room(c, n_of);
-    if (room == NULL) return !fail(c, NO_MEMORY, 0);
+    if (room == NULL) return fail(c, NO_MEMORY, 0);
     g->n_of = g->n_vectors = (int)n_of;
     g->n_doubts = g->singular = 0;
     memset(g->doubts, 0, sizeof g->doubts);
@@ -262,5 +289,17 @@ int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, dou
     if (result && g->singular) result = fail_with(c, FAILURE_LOST_AT_SINGULAR, UINT32_MAX, g->singular_at, 0);
     else if (result) result = write_gradient(c, gradient);
     c->release(room);
-    return !result;
+    return result;
+}
+
+int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, double gradient[]) {
+    Instance *c = instance;
+    if (c == NULL || !allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED)) return 1;
+    if (c->gradient == NULL || of == NULL || gradient == NULL) return !fail(c, NOT_ASKED, 0);
+    return !check_unknowns(c, of, n_of) || !differentiate(c, of, n_of, NULL, gradient);
+}
+
+/* Derivatives of what is read along the run, by rows; places and sizes are unchecked. */
+Result gradient_along(Instance *c, const Along *along, double *gradient) {
+    return differentiate(c, NULL, (size_t)along->n_of, along, gradient);
 }

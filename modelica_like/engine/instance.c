@@ -142,6 +142,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
     c->most_known = (int)(left * MORE_SETS < MORE_OPERATIONS ? left * MORE_SETS : MORE_OPERATIONS);
     c->most_room = (size_t)(room * MORE_SETS < 4 * MORE_OPERATIONS ? room * MORE_SETS : 4 * MORE_OPERATIONS);
     left += (uint64_t)c->most_known;
+    c->n_bars = (size_t)m->n_slots + (size_t)left;
     TAKE(c->room, room + c->most_room);
     TAKE(c->special, N_SETS * N_SPECIALS);
     Special *part = &c->part; /* of guards */

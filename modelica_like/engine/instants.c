@@ -256,6 +256,32 @@ static int matters(Instance *c, const Record *at, const double *before, const do
     return any;
 }
 
+/* By how much integrals grow if the instant comes later, `side` by side, and what else moves with it. */
+static void move_later(Instance *c, double side) {
+    Gradient *g = c->gradient;
+    if (side < 0) memset(g->later, 0, (size_t)g->n_of * sizeof(double));
+    if (g->along == NULL) return;
+    for (int row = 0; row < g->n_of; row++) {
+        if (integrand_of(g, row) < 0) continue;
+        double value = variables_now(c)[integrand_of(g, row)], size = fabs(value) + fabs(g->later[row]);
+        g->later[row] += side * value;
+        if (side > 0 && fabs(g->later[row]) <= FELT_CHANGE * size) g->later[row] = 0;
+    }
+    for (int64_t k = 0; k < g->along->n_seeds && side > 0; k++)
+        if (g->along->seeds[k].instant == g->instant) g->later[g->along->seeds[k].of] += g->along->seeds[k].moving;
+    c->variables_valid = 0;
+}
+
+/* Adds what is read before the instant, and what moves with it, at this speed of its guard. */
+static void read_before(Instance *c, double speed) {
+    Gradient *g = c->gradient;
+    for (int row = 0; row < g->n_of && speed != 0; row++)
+        for (size_t n = 0; n < c->n_smooth && g->later[row] != 0; n++)
+            vector_of(c, row)[n] += g->later[row] / speed * g->moment[n];
+    for (int64_t k = 0; g->along != NULL && k < g->along->n_seeds; k++)
+        if (g->along->seeds[k].instant == g->instant) add_seed(c, &g->along->seeds[k]);
+}
+
 /* From behind an event to before it. */
 void event_back(Instance *c, const Record *at) {
     Gradient *g = c->gradient;
@@ -265,12 +291,15 @@ void event_back(Instance *c, const Record *at) {
     keep_vectors(c);
     state_copy_in(c, at->behind);
     evaluate_now(c, &m->tapes.rates, behind);
+    move_later(c, -1);
     state_copy_in(c, at->before);
     g->speed = find_cause(c, slope);
     evaluate_now(c, &m->tapes.rates, before);
+    move_later(c, 1);
+    double speed = g->speed;
     if (g->speed != 0 && !matters(c, at, before, behind)) g->speed = 0;
-    int tells = g->speed == 0 || isfinite(1 / g->speed);
-    if (!tells) g->speed = 0;
+    int read = largest_of(g->n_of, g->later) > 0, tells = (g->speed == 0 && !read) || speed == 0 || isfinite(1 / speed);
+    if (!tells) g->speed = speed = 0;
     if (plain) {
         stop_back(c, at);
         assign_back(c, at);
@@ -286,6 +315,7 @@ void event_back(Instance *c, const Record *at) {
         for (size_t n = 0; n < c->n_smooth; n++) vector[n] += later / g->speed * slope[n];
     }
     state_copy_in(c, at->before);
+    read_before(c, speed);
     if (!tells) add_doubt(c, FAILURE_LOST_AT_TOUCH, slope);
 }
 

@@ -2,7 +2,7 @@
  * model from the bytes of its file; make a handle of it for every thread, reset it, set what is to be other than in the
  * model, begin, then step, or run into buffers. Functions return NATIVE_OK or NATIVE_FAILED (native_message tells why),
  * runs also NATIVE_MORE or NATIVE_PAUSED. Variables go by value references. Handles share nothing that changes. */
-#include "core.h"
+#include "adjoint.h"
 
 enum { NATIVE_OK, NATIVE_FAILED, NATIVE_MORE, NATIVE_PAUSED };
 #define NEAR_EVENT 2e-7 /* of the distance of results: nearer to an event, its left side stands for the result */
@@ -242,6 +242,11 @@ EXPORTED double native_time(const Native *n) { return n->c->state.t; }
 EXPORTED int native_copy(Native *n, void **copy) { return code(state_copy_out(n->c, copy)); }
 EXPORTED int native_restore(Native *n, const void *copy) { return code(state_copy_in(n->c, copy)); }
 EXPORTED void native_drop(Native *n, void **copy) { state_release(n->c, copy); }
+
+/* Derivatives of what is read along the run since the begin, which modelica_like_gradient_start has been told of. */
+EXPORTED int native_gradient_along(Native *n, const Along *along, double *gradient) {
+    return code(gradient_along(n->c, along, gradient));
+}
 
 /* Since the reset: steps, rejected steps, evaluations of the equations, mode changes. */
 EXPORTED void native_counts(const Native *n, double *counts) {

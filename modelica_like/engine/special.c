@@ -161,6 +161,15 @@ const Tape *run_on_tape(Instance *c, const Tape *tape, double *outputs) {
     return tape;
 }
 
+/* Which output of the tape that has run is an output of a tape; -1: none. */
+int output_place(const Tape *tape, const Tape *ran, int output) {
+    const Special *s = (const Special *)(const void *)ran;
+    if (ran == tape) return output;
+    for (int k = 0; k < ran->n_outputs; k++)
+        if (s->wanted[k] == output) return k;
+    return -1;
+}
+
 /* The same for outputs alone, by compiled code where there is some. */
 void run_special(Instance *c, const Tape *tape, double *outputs) {
     if (!run_code(c, tape, active_guards(c), outputs)) run_on_tape(c, tape, outputs);

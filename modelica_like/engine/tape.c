@@ -70,20 +70,30 @@ void tape_tangent(const Tape *tape, const double *slots, double *dots, double *o
     for (int n = 0; n < tape->n_outputs; n++) output_dots[n] = dots[tape->outputs[n]];
 }
 
-/* Adds to the bars of the arguments. */
-void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars) {
+/* Adds to the bars of the arguments, of several vectors at once, which lie side by side: slopes are worked out once. */
+void tape_adjoint_of(int count, const Tape *tape, const double *slots, double *bars, const double *const *output_bars) {
     int k = tape->n_operations;
-    memset(bars + tape->first_result, 0, (size_t)tape->n_operations * sizeof(double));
-    for (int n = 0; n < tape->n_outputs; n++) bars[tape->outputs[n]] += output_bars[n];
+    double *results = bars + (size_t)tape->first_result * (size_t)count;
+    memset(results, 0, (size_t)tape->n_operations * (size_t)count * sizeof(double));
+    for (int n = 0; n < tape->n_outputs; n++)
+        for (int v = 0; v < count; v++) bars[tape->outputs[n] * count + v] += output_bars[v][n];
     for (int r = tape->n_runs - 1; r >= 0; r--)
         for (int first = k - tape->runs[r].count; k > first;) {
             const Operands *one = &tape->operands[--k];
-            double by_a, by_b, f = slots[tape->first_result + k], bar = bars[tape->first_result + k];
-            if (bar == 0) continue;
-            slopes(tape->runs[r].operation, slots[one->left], slots[one->right], f, &by_a, &by_b);
-            bars[one->left] += product(by_a, bar);
-            bars[one->right] += product(by_b, bar);
+            double *bar = results + (size_t)k * (size_t)count, by_a, by_b, largest = largest_of(count, bar);
+            if (largest == 0) continue;
+            slopes(tape->runs[r].operation, slots[one->left], slots[one->right], slots[tape->first_result + k], &by_a,
+                &by_b);
+            double *left = bars + (size_t)one->left * (size_t)count, *right = bars + (size_t)one->right * (size_t)count;
+            for (int v = 0; v < count; v++) {
+                left[v] += product(by_a, bar[v]);
+                right[v] += product(by_b, bar[v]);
+            }
         }
+}
+
+void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars) {
+    tape_adjoint_of(1, tape, slots, bars, &output_bars);
 }
 
 void evaluate_special(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {

@@ -177,6 +177,7 @@ typedef struct Instance {
     Strike strike;
     int stopped;                       /* something has been stopped at the present instant */
     Special *special, part;            /* by set and tape; see `make_part` */
+    size_t n_bars;                     /* slots, and those of what tapes know */
     size_t most_room, room_used;       /* most: to have room for a set behind it */
     int *room, most_known, known_used; /* for what these consist of, and what they know */
     int set;                           /* the present one; how many there have been */

@@ -96,10 +96,7 @@ class Native:
         self._instance.reset(t0, until, *self._tolerances)
         if given:
             self.set(given)
-        if self._by.size:
-            whole = self._library.instance(self._address)
-            self._instance.check(self._library.gradient_start(whole, self._by.ctypes.data, self._by.size))
-        self._instance.check(self._library.begin(self._address))
+        self._instance.begin_differentiable(self._by)
         if self.inputs.size:
             self._instance.check(self._library.get(self._address, *self._step[:3]))
         self._instance.check(self._library.get(self._address, *self._step[3:]))

@@ -6,6 +6,8 @@ import ctypes as c
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from modelica_like.fmi.build import native_platform
 from modelica_like.fmi.runtime import runtime_library
 
@@ -75,6 +77,17 @@ class Looks(c.Structure):
     ]
 
 
+class Along(c.Structure):
+    """`Along` in adjoint.h; its arrays have rows of `SEED` and `INTEGRAND`."""
+
+    _fields_ = [
+        *((name, _POINTER) for name in ("seeds", "integrands")),
+        *((name, _COUNT) for name in ("n_seeds", "n_of")),
+    ]
+
+
+SEED = np.dtype([("of", np.int64), ("instant", np.int64), ("t", float), ("moving", float), ("by", np.uintp)])
+INTEGRAND = np.dtype([("variable", np.int64), ("size", float)])
 INTEGRATOR = c.CFUNCTYPE(c.c_int, _NUMBER, c.POINTER(Panel))
 """`Integrator` in types.h."""
 
@@ -105,6 +118,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "restore": (_CODE, 2 * [_POINTER]),
     "drop": (None, [_POINTER, c.POINTER(_POINTER)]),
     "counts": (None, 2 * [_POINTER]),
+    "gradient_along": (_CODE, [_POINTER, c.POINTER(Along), _POINTER]),
     "run": (_CODE, [_POINTER, _NUMBER, _COUNT, c.POINTER(Run)]),
     "batch": (_COUNT, [_POINTER, c.POINTER(BatchArguments)]),
     "instance": (_POINTER, [_POINTER]),

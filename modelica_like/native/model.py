@@ -192,6 +192,11 @@ class Instance:
         """Start at a consistent point, before its events."""
         self.check(self.at(self.library.begin_at, point))
 
+    def begin_differentiable(self, by: np.ndarray[Any, np.dtype[np.uint32]]) -> None:
+        """Start as the model says, before the events there, and keep the run for its derivatives by references."""
+        self.check(self.library.gradient_start(self.library.instance(self.address), by.ctypes.data, by.size))
+        self.check(self.library.begin(self.address))
+
     def at(self, function: Callable[..., int], point: Point, *arguments: Any) -> int:
         """Call a function of the run-time that goes to a point, and return its code."""
         arrays = [np.ascontiguousarray(part, dtype=float) for part in (point.x, point.z, point.d)]

@@ -12,6 +12,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.native import library
+from modelica_like.native.along import Row, gradient_along
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.endless import chattering
 from modelica_like.native.library import INTEGRATOR
@@ -87,11 +88,12 @@ class EngineLoop:
         end: end time in s.
         progress: called with the time reached.
         idas: whether IDAS integrates; without states there is nothing to integrate.
+        by: parameters and inputs by which the run is to be differentiated: its start is found again, and it is kept.
     """
 
     def __init__(
         self, model: CompiledDae, options: Options, start: Point, end: float, progress: Progress | None = None,
-        *, idas: bool = False,
+        *, idas: bool = False, by: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self.model, self.options, self.progress = model, options, progress
         self.record, self._span = Recorder(), end - start.t
@@ -103,7 +105,11 @@ class EngineLoop:
         self._instance.reset(start.t, end, options.rtol, options.atol)
         if options.max_step < end - start.t:
             self._instance.limit(options.max_step)
-        self._instance.begin_at(start)
+        self._by = self._instance.native.references(by)
+        if by:
+            self._instance.begin_differentiable(self._by)
+        else:
+            self._instance.begin_at(start)
         by_idas = idas and bool(model.states)
         self._idas = _ByIdas(self._instance, Panels(model, options, start.t, end), progress) if by_idas else None
         unknowns = len(model.states) + len(model.implicit)
@@ -153,6 +159,20 @@ class EngineLoop:
         self._instance.check(code, self.record.events, self.options)
         note_rest(self.record, self.options, self._span)
         return self.record
+
+    def gradient(self, rows: Sequence[Row]) -> Vector:
+        """Return derivatives of what is read along a run that is done, by what it was made for.
+
+        Args:
+            rows: what to differentiate.
+
+        Returns:
+            Shape (rows, by); nan by what has none, where others have.
+
+        Raises:
+            NoGradient: by nothing there are any.
+        """
+        return gradient_along(self._instance, rows, len(self._by))
 
     def begin(self) -> None:
         """Let happen what happens at the start, or raise its error."""

@@ -149,7 +149,7 @@ def _read_there(chain: Replay, readings: Sequence[Reading], outputs: Sequence[Ou
                 yield _edge(chain, jump, instant, reading, output)
         if output.kind in ("end", "at"):
             node = reading.parts[0][0]
-            for late, by in kinks_at(chain, output.path, node):
+            for late, by in kinks_at(chain.model, output.path, node):
                 yield Edge(Reading(late, ((node, by),)), _ROUNDING * _NEAR, _bent(node.t, output.name))
 
 
@@ -163,7 +163,7 @@ def _edge(chain: Replay, jump: Jump, instant: float, reading: Reading, output: O
             return True
         if not reading.parts:
             return False
-        return _differ(chain, *(slopes_of(chain, output.path, point) for point in points))
+        return _differ(chain, *(slopes_of(chain.model, output.path, point) for point in points))
 
     where = "at the end of the run" if instant == chain.nodes[-1].t else f"when {output.name} is read"
     late = jump.before.t + trigger.shift - instant

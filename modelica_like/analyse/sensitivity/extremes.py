@@ -38,7 +38,7 @@ def extreme(replay: Replay, path: str, sign: float) -> Reading:
     Raises:
         NoGradient: it is where the value has a kink, or jumps, and nothing tells how the time of that moves.
     """
-    rate: Callable[[Point], float] = lambda point: sign * float(slopes_of(replay, path, point).rate[0])  # noqa: E731
+    rate: Callable[[Point], float] = lambda point: sign * float(slopes_of(replay.model, path, point).rate[0])  # noqa: E731
     values: Callable[[list[Point]], Vector] = lambda points: sign * along(replay, path, points)  # noqa: E731
     at_nodes = values(replay.nodes)
     inside = [values(move.inside()) if isinstance(move, Step) else np.zeros(0) for move in replay.moves]
@@ -82,8 +82,8 @@ def _inside(replay: Replay, path: str, k: int, width: float) -> Reading:
     the kink g(t, x, p) = 0: by -g_p/g', g' being the rate of g.
     """
     node = replay.nodes[k]
-    part, reading = slopes_of(replay, path, node), value_at(replay, path, node)
-    shifts = [by for _, by in kinks_at(replay, path, node)]
+    part, reading = slopes_of(replay.model, path, node), value_at(replay, path, node)
+    shifts = [by for _, by in kinks_at(replay.model, path, node)]
     if shifts:
         first, *others = shifts
         apart = max((float(np.max(np.abs(other - first))) for other in others), default=0.0)
@@ -91,7 +91,7 @@ def _inside(replay: Replay, path: str, k: int, width: float) -> Reading:
             raise _unknown(replay, path, node, "Kinks that move differently meet there.")
         return Reading(reading.value, ((node, part.by[0] + float(part.rate[0]) * first),))
     steps = [move for move in replay.moves[k - 1 : k + 1] if isinstance(move, Step)]
-    largest = max(abs(float(slopes_of(replay, path, point).rate[0])) for step in steps for point in step.inside())
+    largest = max(abs(float(slopes_of(replay.model, path, point).rate[0])) for step in steps for point in step.inside())
     rate, longest = abs(float(part.rate[0])), max(step.h for step in steps)
     if rate > _MOVES * largest and rate * longest > max(_RISES * width, _FLAT * abs(reading.value)):
         raise _unknown(replay, path, node, "It has a kink there, and nothing tells how its time moves.")

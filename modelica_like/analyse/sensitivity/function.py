@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import zip_longest
 from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.sensitivity.by_run_time import adjoint
 from modelica_like.analyse.sensitivity.callback import NamedCallback
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
 from modelica_like.analyse.sensitivity.formulas import free_formulas
@@ -66,22 +68,39 @@ class SimulationFunction(NamedCallback):
         self._last: tuple[Solution, Sensitivities] | None = None
         self._simulated: tuple[bytes, Solution] | None = None
         self._sequence: list[tuple[str, str, str]] | None = None
-        for name in outputs:
-            read_output(self._model, name)
+        self._read = [read_output(self._model, name) for name in outputs]
         end, chosen = plan(self._model, run["until"], options=run["options"])
         rtol = min(chosen.rtol, precision * _FINER)
         self._tight = {"until": end, "rtol": rtol, "atol": min(chosen.atol, rtol / 100)}
         solution = quick_run(self._model, **{**self._run, **self._tight}, readings=outputs)
-        first = self._differentiate(solution)
-        self.start_values = np.array([parameter.value for parameter in first.parameters])
+        self._first: Sensitivities | None = None
+        self._first = self._differentiate(solution)
+        self._names = [parameter.name for parameter in self._first.parameters]
+        self.start_values = np.array([parameter.value for parameter in self._first.parameters])
         self._sequence = None if any_sequence else mode_sequence(solution.events)
         self._jacobian = _Jacobian(self)
         dense = ca.Sparsity.dense
         self.declare("simulation", {"p": dense(len(self.inputs))}, {"y": dense(len(self.outputs))})
 
     def _differentiate(self, solution: Solution) -> Sensitivities:
-        start = self._run.get("start")
-        return sensitivities(solution, self.outputs, self.inputs, start=start, precision=self._precision)
+        """Differentiate a run: by the run-time, unless it is the first one or has something that only the replay can.
+
+        What refuses derivatives for all values, as a motion that begins at rest, the first one tells.
+        """
+        slopes = None if self._first is None else adjoint(solution, self._read, self._names)
+        if self._first is None or slopes is None:
+            start = self._run.get("start")
+            return sensitivities(solution, self.outputs, self.inputs, start=start, precision=self._precision)
+        model = solution.model
+        places = [model.fixed_position[name] for name in self._names]
+        fixed = np.concatenate([model.p, model.u])[places]
+        outputs, parameters = (
+            tuple(replace(quantity, value=float(value)) for quantity, value in zip(quantities, values, strict=True))
+            for quantities, values in (
+                (self._first.outputs, solution.read(*self.outputs)), (self._first.parameters, fixed)
+            )
+        )  # fmt: skip
+        return replace(self._first, outputs=outputs, parameters=parameters, derivatives=slopes, method="adjoint")
 
     def at(self, p: Vector | Sequence[float]) -> Sensitivities:
         """Simulate at parameter values and return outputs with derivatives; kept until the next values.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay.chain import Replay
 from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.sensitivity.values import slopes_of
 from modelica_like.compile.buffers import Vector
@@ -25,13 +24,12 @@ _FELT = 1e-6
 """Jump of a value or of its rate, relative to those on both sides, that is more than rounding."""
 
 
-def kinks_at(replay: Replay, path: str, node: Point) -> list[tuple[float, Vector]]:
+def kinks_at(model: CompiledDae, path: str, node: Point) -> list[tuple[float, Vector]]:
     """Return how much later than a node the value or its rate jumps, and the derivatives of that by (x, theta) there.
 
     Kinks of the value itself, and of what it follows from, come first: others that the run passes at the same time, as
     those of a table in the equations of states, leave its rate as it is unless they jump.
     """
-    model = replay.model
     kinks, of_value = model.once((Cached.KINKS_OF, path), lambda: _kinks_of(model, path))
     rates, size = call(model, model.equations.ode, node), max(1.0, abs(node.t))
 
@@ -39,7 +37,7 @@ def kinks_at(replay: Replay, path: str, node: Point) -> list[tuple[float, Vector
         """Value and rate a moment from the node."""
         point = Point(node.t + time, node.x + time * rates, node.z.copy(), node.d)
         solve_implicit(model, point)
-        part = slopes_of(replay, path, point)
+        part = slopes_of(model, path, point)
         return np.array([part.value[0], part.rate[0]])
 
     def jumps(late: float) -> bool:

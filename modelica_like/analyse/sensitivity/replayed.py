@@ -82,7 +82,7 @@ def _first(replay: Replay, output: Output) -> Reading:
                 step = shortened(move, value, low, high, STILL)
                 # Without a length it is where the step begins, as where another condition has split it.
                 node = replay.at(move.before.t + low[0]) if step is None else replay.split(k, step)
-                part = slopes_of(replay, output.path, node)
+                part = slopes_of(replay.model, output.path, node)
                 return Reading(node.t, ((node, -part.by[0] / float(part.rate[0])),))
     raise UnknownName(f"'{output.name}' does not happen in this run.")
 

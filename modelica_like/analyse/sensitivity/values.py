@@ -17,16 +17,16 @@ from modelica_like.solve.initialize.slopes import Slopes, slopes
 
 def value_at(replay: Replay, path: str, node: Point, jump: Jump | None = None) -> Reading:
     """Read a variable at a node, or at a jump that moves with it."""
-    part = slopes_of(replay, path, node)
+    part = slopes_of(replay.model, path, node)
     parts = [(node, part.by[0])]
     if jump is not None:
         parts.append((jump.before, float(part.rate[0]) * jump.time().by))
     return Reading(float(part.value[0]), tuple(parts))
 
 
-def slopes_of(replay: Replay, path: str, node: Point) -> Slopes:
+def slopes_of(model: CompiledDae, path: str, node: Point) -> Slopes:
     """Value, derivatives and rate of a variable at a point."""
-    return slopes(replay.model, node, (Cached.VALUE, path), None, lambda: _function(replay.model, path))
+    return slopes(model, node, (Cached.VALUE, path), None, lambda: _function(model, path))
 
 
 def along(replay: Replay, path: str, points: list[Point]) -> Vector:

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ModelicaLikeError, ValueOutOfRange
-from modelica_like.language.units import ONE
 from modelica_like.native.batch import Batch, Reading
+from modelica_like.native.expressions import key_of, with_expressions
 from modelica_like.runs.readings import Output, Part, joined, leaves
 from modelica_like.simulation import plan
 
@@ -47,7 +44,7 @@ class NativeRuns:
         self._model, self._names, self._outputs, self._begin = model, names, outputs, span[0]
         # The last reading is the time at the end, where a component may end a run earlier.
         parts = [*(x.parts(model) for x in leaves(outputs)), [Part("end", "time")]]
-        extended = _with_expressions(model, [part for some in parts for part in some])
+        extended = with_expressions(model, [part for some in parts for part in some])
         readings = [[reading for part in some for reading in _readings(model, extended, part)] for some in parts]
         self._lasts = np.cumsum([len(some) for some in readings])
         self._batch = Batch(
@@ -105,32 +102,6 @@ def _within(values: Vector, low: float | None, high: float | None) -> Any:
     return (values >= (-np.inf if low is None else low)) & (values <= (np.inf if high is None else high))
 
 
-def _key(part: Part) -> str:
-    return f"{part.text} ({part.form} {part.change[1]})"
-
-
-def _with_expressions(model: CompiledDae, parts: Sequence[Part]) -> CompiledDae:
-    """Return the model with the values of parts among its variables."""
-    more = {_key(part): part for part in parts if part.kind not in ("change", "impact")}
-    return model.once((Cached.EXPRESSIONS, *more), lambda: _with(model, more)) if more else model
-
-
-def _with(model: CompiledDae, more: Mapping[str, Part]) -> CompiledDae:
-    column = ca.vertcat(
-        model.equations.variables(*model.arguments.values()), *(part.expression(model) for part in more.values())
-    )
-    names = model.equations.variables.name_in()
-    variables = ca.Function("variables", [*model.arguments.values()], [ca.densify(column)], names, ["variables"])
-    equations = replace(model.equations, variables=variables)
-    like = model.flat_variables[0]
-    further = [replace(like, path=path, unit=ONE, kind="local") for path in more]
-    return replace(
-        model, equations=equations, flat_variables=(*model.flat_variables, *further), _cache={},
-        _make_energy=lambda: model.energy,
-        _make_start=lambda rest: model.rest_system if rest else model.start_system,
-    )  # fmt: skip
-
-
 def _readings(model: CompiledDae, extended: CompiledDae, part: Part) -> list[Reading]:
     """Return what a part is in the run-time: their sum."""
     if part.kind == "change":
@@ -138,4 +109,4 @@ def _readings(model: CompiledDae, extended: CompiledDae, part: Part) -> list[Rea
     if part.kind == "impact":
         places = [k for k, hold in enumerate(model.held.motions) if part.text in ("", hold.component)]
         return [Reading("impact", k) for k in places]
-    return [Reading(part.kind, extended.position[_key(part)], moment=part.moment)]
+    return [Reading(part.kind, extended.position[key_of(part)], moment=part.moment)]
