@@ -30,6 +30,8 @@ _OPTIONS = {
     "print_level": 0, "sb": "yes", "hessian_approximation": "limited-memory", "mu_init": 1e-3, "max_iter": MOST_STEPS,
     # Relative to sizes: gradients are known to 1e-7.
     "tol": 1e-7, "acceptable_tol": 1e-6, "acceptable_iter": 4,
+    # With a Hessian that is not known yet, corrections of second order jump to and fro across a limit: thrice the runs.
+    "max_soc": 0,
     # Bounds are those of parameters, which may not be left.
     "bound_relax_factor": 0.0,
 }  # fmt: skip
