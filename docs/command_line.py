@@ -15,6 +15,7 @@ MORE = {
     "draw": ("schematics.md", "schematics"), "describe": ("components/README.md", "components"),
     "schema": ("how_to/editor.md", "an editor that knows netlists"), "trust": ("security.md", "security"),
     "lsp": ("how_to/editor.md", "an editor that knows netlists"),
+    "mcp": ("how_to/programs.md", "netlists for programs"),
     "simulate": ("plots.md", "pictures"),
     "report": ("reports.md", "reports"), "explore": ("explore.md", "explore"), "modes": ("analysis.md", "analysis"),
     "steady": ("analysis.md", "analysis"), "sweep": ("how_to/sweep.md", "sweeps"),

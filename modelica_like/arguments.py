@@ -9,7 +9,7 @@ from numbers import Complex, Integral, Real
 from types import NoneType, SimpleNamespace, UnionType
 from typing import Any, Literal, ParamSpec, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
-from modelica_like.errors import ValueOutOfRange
+from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -155,3 +155,32 @@ def _is_list(value: Any, kind: Any) -> bool:
         return isinstance(value, Iterator) or all(fits(element, kind) for element in value)
     except TypeError:
         return False
+
+
+def takes(function: Callable[..., Any]) -> dict[str, Parameter]:
+    """Return the arguments of an operation that are given by name, without what it works on."""
+    known = signature(function).parameters
+    return {name: known[name] for name in known if name not in ("self", "sheet", "more")}
+
+
+def check_names(what: str, function: Callable[..., Any], given: Iterable[str]) -> None:
+    """Refuse arguments that an operation does not take, and missing ones.
+
+    Args:
+        what: name of the operation.
+        function: does it; `more` takes any names.
+        given: names of the arguments.
+
+    Raises:
+        UnknownName: it has no such argument.
+        NetlistError: one is missing.
+    """
+    known, given = takes(function), list(given)
+    listed = f"It takes {', '.join(known)}." if known else "It takes none."
+    takes_more = "more" in signature(function).parameters
+    for key in given:
+        if key not in known and (not takes_more or key == "sheet"):
+            raise UnknownName(f"{what} has no argument '{key}'{did_you_mean(key, known) or '.'} {listed}")
+    missing = [key for key, argument in known.items() if argument.default is Parameter.empty and key not in given]
+    if missing:
+        raise NetlistError(f"{what} needs {' and '.join(missing)}.", advice=listed)

@@ -1,4 +1,4 @@
-"""Trusted folders: modules beside a netlist run only there, because a module can do all that its user can."""
+"""What may be used: modules beside a netlist in trusted folders only, because a module can do all that its user can."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ def _nobody(folder: Path) -> bool:
 
 
 _decision: ContextVar[Decide] = ContextVar("decision", default=_nobody)
+_confinement: ContextVar[Path | None] = ContextVar("confinement", default=None)
 
 
 @contextmanager
@@ -41,6 +42,33 @@ def trusting(decide: Decide | None = None) -> Generator[None]:
         yield
     finally:
         _decision.reset(token)
+
+
+@contextmanager
+def confined(folder: Path) -> Generator[None]:
+    """Read no netlist, and nothing that it uses, outside of a folder."""
+    token = _confinement.set(folder.resolve())
+    try:
+        yield
+    finally:
+        _confinement.reset(token)
+
+
+def require_confined(path: Path) -> None:
+    """Refuse a file outside of the folder to which reading is confined, also one behind a link.
+
+    Raises:
+        NetlistError: it is there.
+    """
+    folder = _confinement.get()
+    if folder is None:
+        return
+    try:
+        inside = path.resolve().is_relative_to(folder)
+    except (OSError, RuntimeError, ValueError):  # links in a circle, half characters
+        inside = False
+    if not inside:
+        raise NetlistError(f"'{path}' is outside of the folder '{folder}'.", advice="Name a file in this folder.")
 
 
 def may_run(folder: Path) -> bool:

@@ -11,7 +11,7 @@ from importlib import import_module
 TASKS = {
     "Write a drive": {
         "new": "starters", "check": "models", "draw": "pictures", "library": "types", "describe": "types",
-        "schema": "types", "lsp": "starters", "docs": "types", "trust": "starters",
+        "schema": "types", "lsp": "starters", "mcp": "starters", "docs": "types", "trust": "starters",
     },
     "Run it": {
         "simulate": "models", "report": "pictures", "explore": "pictures", "compare": "validation",

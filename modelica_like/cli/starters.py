@@ -1,4 +1,4 @@
-"""Commands to begin with: new and trust."""
+"""Commands to begin with, new and trust, and servers for editors and programs."""
 
 from __future__ import annotations
 
@@ -68,3 +68,20 @@ def lsp(*, debug: Debug = False) -> None:
 
         extra_module("pygls", "lsp")
         extra_module("modelica_like.lsp.server", "lsp").serve(__version__)
+
+
+def mcp(
+    folder: Annotated[Path, Argument(metavar="FOLDER", help="With the netlists.")] = Path(),
+    *, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Answer a program about the netlists of a folder, on standard input and output (extra `mcp`).
+
+    The program starts it, and speaks the Model Context Protocol: operations, check, simulate and analyses are tools.
+    No file outside of the folder is read or written. Modules of folders that are not trusted do not run.
+    """
+    with told(debug):
+        from modelica_like import __version__
+        from modelica_like.errors import extra_module
+
+        extra_module("mcp", "mcp")
+        extra_module("modelica_like.mcp.server", "mcp").serve(__version__, folder)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, Self
 
-from modelica_like.arguments import checked
+from modelica_like.arguments import check_names, checked
 from modelica_like.edit import grouping, suggested, values, wires
 from modelica_like.edit.sheet import Sheet
 from modelica_like.errors import DuplicateName, ModelicaLikeError, NetlistError, UnknownName, did_you_mean
@@ -75,15 +74,7 @@ def apply(
     if operation is None:
         names = ", ".join(known)
         raise UnknownName(f"There is no operation '{name}'{did_you_mean(name, known) or '.'} There are {names}.")
-    known = inspect.signature(operation).parameters
-    takes = [key for key in known if key not in ("sheet", "more")]
-    listed = f"It takes {', '.join(takes)}."
-    for key in arguments:
-        if key not in takes and ("more" not in known or key == "sheet"):
-            raise UnknownName(f"{name} has no argument '{key}'{did_you_mean(key, takes) or '.'} {listed}")
-    missing = [key for key in takes if known[key].default is inspect.Parameter.empty and key not in arguments]
-    if missing:
-        raise NetlistError(f"{name} needs {' and '.join(missing)}.", advice=listed)
+    check_names(name, operation, arguments)
     return _do(text, file, files or {}, operation, **arguments)
 
 

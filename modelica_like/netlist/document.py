@@ -22,6 +22,7 @@ from modelica_like.errors import (
 from modelica_like.language.units import parse_unit, to_si
 from modelica_like.netlist.locate import Lines, locate
 from modelica_like.netlist.optimization import OPTIMIZE, tolerances
+from modelica_like.trust import require_confined
 
 _ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
@@ -82,8 +83,9 @@ def read_text(path: Path, *, as_written: bool = False) -> str:
         as_written: whether line breaks of Windows, and a mark of the byte order, are left in it.
 
     Raises:
-        NetlistError: the file is missing, not text, or too large.
+        NetlistError: the file is missing, not text, too large, or outside of a folder; see `confined`.
     """
+    require_confined(path)
     try:
         if not path.is_file():
             what = "is a folder" if path.is_dir() else "does not exist"
