@@ -1,6 +1,7 @@
 """Builds the site from docs/, the declarations of the components and the files that pages point to.
 
-`python docs/site/build.py` writes build/site/html, with warnings as errors, and checks every link of it.
+`python docs/site/build.py` writes build/site/html, with warnings as errors, and checks every link of it; programs find
+the pages by llms.txt.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from base64 import b64decode
 from pathlib import Path
 
 from links import broken
+from llms import llms
 
 from modelica_like import load, schematic
 from modelica_like.errors import NetlistError
@@ -52,6 +54,7 @@ def main() -> None:
     paths = os.pathsep.join(filter(None, [str(HERE), os.environ.get("PYTHONPATH", "")]))
     command = [Path(sys.executable).parent / "zensical", "build", "--strict", "--config-file", work / "zensical.toml"]
     subprocess.run(command, check=True, cwd=work, env=os.environ | {"PYTHONPATH": paths})
+    (work / "html" / "llms.txt").write_text(llms(pages, HERE / "zensical.toml"), encoding="utf-8")
     if found := broken(work / "html"):
         raise SystemExit("\n".join(found))
 
