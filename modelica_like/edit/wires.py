@@ -22,6 +22,7 @@ from modelica_like.edit.sheet import Sheet
 from modelica_like.edit.tree import joined
 from modelica_like.edit.values import add
 from modelica_like.errors import DuplicateName, NetlistError, WrongConnection
+from modelica_like.flatten.wiring import side_of
 from modelica_like.language import Connector, Input, Output
 from modelica_like.language.assembly import end_at
 from modelica_like.netlist.further import head
@@ -127,7 +128,7 @@ def _upstream(sheet: Sheet, end: str) -> int:
     owner, name = assembly(sheet, [end]).find(end.rpartition(".")[0]), end.rpartition(".")[2]
     if name in owner.fields:
         return 1 if isinstance(owner.fields[name], Output) else -1
-    return (name in type(owner).outlet.split()) - (name in type(owner).inlet.split())
+    return side_of(owner.connectors[name])
 
 
 def _two_sides(sheet: Sheet, name: str, beside: str) -> tuple[str, str]:

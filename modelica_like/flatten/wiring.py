@@ -167,7 +167,7 @@ class Wiring:
         It is on the other side of its part, has no connection, and no path of connected parts leads there already. An
         end that may be free is not meant, unless nothing of its part is connected.
         """
-        owner, network, side = inside(component).owner, self._networks.get(id(component)), _side(connector)
+        owner, network, side = inside(component).owner, self._networks.get(id(component)), side_of(connector)
         # A connection that was refused may be the one that is missing.
         is_known = len(self.errors) < _PARTNERS_OF and all(isinstance(error, FreeFlange) for error in self.errors)
         if not isinstance(owner, Component) or not side or not is_known:
@@ -178,7 +178,7 @@ class Wiring:
             if part is not component and inside(part).owner is owner
             and (network is None or self._networks.get(id(part)) != network)
             for name, end in part.connectors.items()
-            if type(end) is type(connector) and _side(end) == -side
+            if type(end) is type(connector) and side_of(end) == -side
             and not (end.optional or self.is_connected(end) or id(end) in self.freed)
             and not (end.may_be_free and id(part) in self._networks)
         ]  # fmt: skip
@@ -201,7 +201,7 @@ class Wiring:
         return {part: top(part) for part in above}
 
 
-def _side(connector: Connector) -> int:
+def side_of(connector: Connector) -> int:
     """Return 1 for the outlet of its part, -1 for the inlet, 0 for what is both or none."""
     kind, name = type(inside(connector).owner), inside(connector).name
     if not issubclass(kind, Component):

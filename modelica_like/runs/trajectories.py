@@ -243,15 +243,6 @@ def needs_equations(run: Trajectories) -> NetlistError:
     )
 
 
-def matching(model: Any, patterns: Sequence[str]) -> list[str]:
-    """Return the variables and modes of a model that match patterns, before a run.
-
-    Raises:
-        UnknownName: nothing matches a pattern.
-    """
-    return fitting((*model.position, *model.discrete_position), patterns, f"{model.name} has no variable")
-
-
 def fitting(candidates: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
     """Return the names that match patterns, a name itself before all; `missing` begins the message where none does.
 
