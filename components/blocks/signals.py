@@ -11,6 +11,7 @@ from typing import Literal
 from components import icons
 from components.tabulated import GUESSED
 from modelica_like.language import (
+    BoundMode,
     Component,
     Discrete,
     Equations,
@@ -225,13 +226,26 @@ class Periodic(Component, partial=True):
         goes_on = any_of(self.periods < 0, self.done < self.periods)
         return self.start_time + self.period * where(goes_on, self.done, _NEVER)
 
-    def completed(self, end: Expr) -> Expr:
-        """Return the number of completed shapes at the end of one, which is this long after its beginning.
+    def length(self) -> Expr:
+        """Return how long a shape lasts."""
+        raise NotImplementedError
 
-        A run may start late: then all earlier shapes count as completed at once.
-        """
-        passed = floor((self.time - self.start_time - end) / self.period) + 1
-        return maximum(self.done + 1, where(self.periods < 0, passed, minimum(passed, self.periods)))
+    def passed(self) -> Expr:
+        """Return the number of shapes that have ended: a run may start late."""
+        passed = floor((self.time - self.start_time - self.length()) / self.period + _INSTANT) + 1
+        return maximum(where(self.periods < 0, passed, minimum(passed, self.periods)), 0)
+
+    def completed(self) -> Expr:
+        """Return the number of completed shapes where one ends."""
+        return maximum(self.done + 1, self.passed())
+
+    def begins(self, stage: BoundMode, *parts: tuple[str, Expr | float]) -> Events:
+        """Yield the stage in which a run starts, of parts that begin so long after a shape does, the last one first."""
+        for name, since in parts:
+            yield stage.initially(name, when=self.time >= self.begin() + since - _INSTANT * self.period)
+
+    def initial_equations(self) -> Equations:
+        yield self.done == self.passed()
 
 
 class Pulse(Periodic):
@@ -247,8 +261,11 @@ class Pulse(Periodic):
     def events(self) -> Events:
         begin = self.begin()
         yield self.stage.go("low", "high", at=begin)
-        high = self.width * self.period
-        yield self.stage.go("high", "low", at=begin + high, reset={self.done: self.completed(high)})
+        yield self.stage.go("high", "low", at=begin + self.length(), reset={self.done: self.completed()})
+        yield from self.begins(self.stage, ("high", 0))
+
+    def length(self) -> Expr:
+        return self.width * self.period
 
 
 class Trapezoid(Periodic):
@@ -274,8 +291,12 @@ class Trapezoid(Periodic):
         yield self.stage.go("low", "rising", at=begin)
         yield self.stage.go("rising", "high", at=high)
         yield self.stage.go("high", "falling", at=fall)
-        done = self.completed(self.rising + self.width + self.falling)
-        yield self.stage.go("falling", "low", at=fall + self.falling, reset={self.done: done})
+        yield self.stage.go("falling", "low", at=fall + self.falling, reset={self.done: self.completed()})
+        parts = ("falling", self.rising + self.width), ("high", self.rising), ("rising", 0)
+        yield from self.begins(self.stage, *parts)
+
+    def length(self) -> Expr:
+        return self.rising + self.width + self.falling
 
 
 class Rowwise(Component, partial=True):
@@ -291,13 +312,18 @@ class Rowwise(Component, partial=True):
         """Return the times of the rows."""
         raise NotImplementedError
 
+    def passed(self) -> Expr | float:
+        """Return the number of the last row that was passed: a run may start late."""
+        now, passed = self.time / self.time_scale, -1.0
+        for moment in self.moments():
+            passed = passed + where(now < moment, 0, 1)
+        return passed
+
     def events(self) -> Events:
-        now, following, passed = self.time / self.time_scale, _NEVER, -1.0
+        following = _NEVER
         for k, moment in reversed(list(enumerate(self.moments()))):
             following = where(self.row < k, moment, following)
-            passed = passed + where(now < moment, 0, 1)
-        # A run may start late: then all earlier rows count as passed at once.
-        ahead = {self.row: maximum(self.row + 1, passed)}
+        ahead = {self.row: maximum(self.row + 1, self.passed())}
         yield self.kinks.go("ahead", "ahead", at=following * self.time_scale, reset=ahead)
 
 

@@ -20,7 +20,14 @@ from modelica_like.language import (
 )
 
 
-class StepTable(Rowwise):
+class Stepped(Rowwise, partial=True):
+    """Signal whose value is that of the last row that was passed."""
+
+    def initial_equations(self) -> Equations:
+        yield self.row == self.passed()
+
+
+class StepTable(Stepped):
     """Signal that keeps the value of a row until the next one; before the first row it has the first value."""
 
     table: tuple[tuple[float, float], ...] = rows(
@@ -38,7 +45,7 @@ class StepTable(Rowwise):
         yield self.y == self.scale * value
 
 
-class BooleanTable(Rowwise):
+class BooleanTable(Stepped):
     """Signal 0 or 1 that changes at every time of a table."""
 
     times: tuple[float, ...] = rows(column("time of a change", scale="time_scale", rising=True), flat=True)

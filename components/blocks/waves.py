@@ -111,7 +111,11 @@ class SawTooth(Periodic):
     def events(self) -> Events:
         begin = self.begin()
         yield self.stage.go("low", "rising", at=begin)
-        yield self.stage.go("rising", "low", at=begin + self.period, reset={self.done: self.done + 1})
+        yield self.stage.go("rising", "low", at=begin + self.period, reset={self.done: self.completed()})
+        yield from self.begins(self.stage, ("rising", 0))
+
+    def length(self) -> Expr:
+        return self.period
 
 
 class LogFrequencySweep(Component):

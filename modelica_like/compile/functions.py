@@ -84,6 +84,15 @@ def _settings(root: Any) -> dict[str, Any]:
 
 def _discrete_starts(flat: FlatModel) -> Any:
     starts = [ca.SX(discrete.start) for discrete in flat.discretes]
+    places = {discrete.path: k for k, discrete in enumerate(flat.discretes)}
+    # Initial equations of discrete variables have no variables; a start value that is given takes their place.
+    for number, column in evaluate(flat, "discrete_starts", ca.SX.zeros(len(flat.nodes))).items():
+        instance = flat.instances[number]
+        for name, value in zip(instance.template.started, ca.vertsplit(column), strict=True):
+            full = f"{instance.path}.{name}".lstrip(".")
+            owner, _, own = full.rpartition(".")
+            if own not in inside(flat.components[owner]).starts:
+                starts[places[full]] = value
     return ca.vertcat(*starts, ca.SX.zeros(flat.d.numel() - len(starts)))
 
 

@@ -12,7 +12,19 @@ from modelica_like.errors import LanguageError, Source, did_you_mean
 from modelica_like.flatten.steps import with_events
 from modelica_like.language.component import Component
 from modelica_like.language.delay import Part, parts
-from modelica_like.language.discrete import INITIAL, Assertion, Ending, Marker, Pre, When, edge, eventful, is_a, moves
+from modelica_like.language.discrete import (
+    INITIAL,
+    Assertion,
+    Ending,
+    Marker,
+    Pre,
+    When,
+    edge,
+    eventful,
+    is_a,
+    is_fixed,
+    moves,
+)  # fmt: skip
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, Expr, Symbol, is_expression, symbols_in
 from modelica_like.language.fields import Discrete, Input, Variable
@@ -68,21 +80,26 @@ class DiscreteEquations:
         equations: those of discrete variables.
         events: transitions, start modes and whens.
         others: other expressions of the component with their places.
+        initial: initial equations of discrete variables.
 
     Attributes:
+        starts: discrete variables and their values at the start, of parameters and time, by initial equations.
         updates: new values at events.
         events: transitions and start modes, with those of relations.
         hidden: discrete values that these need.
         delays: delayed values, with their places.
 
     Raises:
-        LanguageError: an equation of a discrete variable changes between events, or `pre(…)` is in the wrong place.
+        LanguageError: an equation of a discrete variable changes between events, an initial one has more than
+            parameters and time, or `pre(…)` is in the wrong place.
     """
 
     def __init__(
-        self, component: Component, equations: list[Equation], events: list[Any], others: Iterable[Located]
-    ) -> None:
+        self, component: Component, equations: list[Equation], events: list[Any], others: Iterable[Located],
+        initial: Iterable[Equation],
+    ) -> None:  # fmt: skip
         self._component, self._kind = component, type(component).__name__
+        self.starts = [self._of_start(equation) for equation in initial]
         self.updates = [self._of_equation(equation) for equation in equations]
         self.events: list[Transition | StartMode] = [e for e in events if isinstance(e, Transition | StartMode)]
         self.hidden: list[Hidden] = []
@@ -126,6 +143,17 @@ class DiscreteEquations:
             )
         return Update(target, _ONE, value, equation.source, at_start=True)
 
+    def _of_start(self, equation: Equation) -> tuple[Symbol, Any]:
+        target, value = symbols_in(equation.left)[0], ca.SX(cast(Any, equation.right))
+        for symbol in symbols_in(value):
+            if symbol is not TIME and (symbol.owner is None or not is_fixed(symbol)):
+                raise LanguageError(
+                    f"{self._kind}: the initial equation of {target.name} has {symbol.name}; what is discrete starts "
+                    "before states and other variables do.",
+                    where=equation.source, advice="Use parameters and time only.",
+                )  # fmt: skip
+        return target, value
+
     def _of_when(self, event: When) -> list[Update]:
         targets: dict[int, tuple[Symbol, Any, Any]] = {}
         for active, values in reversed(event.branches):
@@ -164,7 +192,12 @@ class DiscreteEquations:
             if id(target) in places and not isinstance(target, Marker) and is_a(target, Discrete):
                 what = f"{self._kind}: {target.name} is set by a transition and determined by an equation or a `when`."
                 raise LanguageError(what, where=[places[id(target)], transition.source], advice="Keep one of the two.")
-        determined = {id(target) for target, _ in resets} | {*places}
+        begun = [id(target) for target, _ in self.starts]
+        for target, _ in self.starts:
+            if begun.count(id(target)) > 1:
+                what = f"{self._kind}: {target.name} has more than one initial equation."
+                raise LanguageError(what, advice="Keep one of them.")
+        determined = {id(target) for target, _ in resets} | {*places, *begun}
         for name, field in self._component.fields.items():
             if not isinstance(field, Discrete) or id(getattr(self._component, name)) in determined:
                 continue

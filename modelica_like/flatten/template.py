@@ -117,6 +117,8 @@ class Template:
     resets: ca.Function
     start_modes: tuple[tuple[str, int, Source], ...]
     start_conditions: ca.Function
+    started: tuple[str, ...]
+    discrete_starts: ca.Function
     hidden: tuple[Hidden, ...]
     updates: ca.Function
     update_forms: tuple[UpdateForm, ...]
@@ -224,7 +226,8 @@ def template_of(component: Component) -> Template:
 
 def _build(component: Component) -> Template:
     kind = type(component).__name__
-    equations, determined, initial, wiring = _statements(component)
+    equations, determined, at_start, wiring = _statements(component)
+    initial = [e for e in at_start if not is_discrete(e)]
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
     residuals = [with_events(between_events(e.left - e.right)) for e in equations]
@@ -233,7 +236,7 @@ def _build(component: Component) -> Template:
     holds, hold_terms = hold_forms(component, residuals)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
     others = [*zip(residuals, sources, strict=True), *((term, NOWHERE) for term in energy_terms)]
-    discrete = DiscreteEquations(component, determined, events, others)
+    discrete = DiscreteEquations(component, determined, events, others, [e for e in at_start if is_discrete(e)])
     checked = [*equations, *initial], discrete.events, discrete.updates, discrete.delays
     inferred = check_units(component, *checked) if component.units_checked else {}
     changes = _Changes(component, discrete)
@@ -259,6 +262,7 @@ def _build(component: Component) -> Template:
         **changes.functions(names),
         transitions=changes.transition_forms(),
         start_modes=changes.start_modes(),
+        started=tuple(path_of(symbol, component) for symbol, _ in discrete.starts),
         hidden=tuple(discrete.hidden),
         update_forms=discrete.forms(lambda symbol: path_of(symbol, component)),
         delay_parts=tuple(tuple(part.name for part in parts(delay)) for delay, _ in discrete.delays),
@@ -297,10 +301,9 @@ class _Changes:
     """Events of a component: conditions and changes."""
 
     def __init__(self, component: Component, discrete: DiscreteEquations) -> None:
-        self.component = component
+        self.component, self.begun = component, [value for _, value in discrete.starts]
         self.transitions = [e for e in discrete.events if isinstance(e, Transition)]
-        declared = (e for e in discrete.events if isinstance(e, StartMode))
-        self.starts = list(starts_at_rest(component, declared))
+        self.starts = list(starts_at_rest(component, (e for e in discrete.events if isinstance(e, StartMode))))
         self.updates = [part for update in discrete.updates for part in (update.active, update.value)]
         self.targets = [update.target for update in discrete.updates]
         self.guards = [ca.SX(0) if t.when is None else guard_of(t.when, t.source) for t in self.transitions]
@@ -311,12 +314,9 @@ class _Changes:
     def expressions(self) -> Iterator[Any]:
         """Yield all expressions, and the symbols of the modes."""
         yield from (
-            *self.guards,
-            *self.moments,
-            *self.updates,
-            *self.delays,
+            *self.guards, *self.moments, *self.updates, *self.delays, *self.begun,
             *(ca.SX(target) for target in self.targets),
-        )
+        )  # fmt: skip
         for pair in self.resets:
             yield from pair
         yield from (s.when for s in self.starts)
@@ -329,6 +329,7 @@ class _Changes:
             "moments": self.moments,
             "resets": [value for _, value in self.resets],
             "start_conditions": [s.when for s in self.starts],
+            "discrete_starts": self.begun,
             "updates": self.updates,
             "delays": self.delays,
         }

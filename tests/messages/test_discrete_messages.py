@@ -22,6 +22,7 @@ from modelica_like.language import (
     boolean,
     clock,
     der,
+    discrete,
     edge,
     hold,
     integer,
@@ -387,3 +388,33 @@ def test_what_stops_once_goes_on_by_a_mode(solver: Any) -> None:
 def test_no_fmu_lets_a_ball_fall_through_the_floor(tmp_path: Path) -> None:
     with pytest.raises(FmuFailed, match=r"the condition of relation\[1\] stays true: what is set there is at rest"):
         run_fmu(export_fmu(Rebound(e=0.1), tmp_path / "ball.fmu", kind=("cs",), check=False).path, stop=3.0)
+
+
+class Early(Basis):
+    T: Parameter = param("s", "time", default=0.1)
+    n: Discrete = discrete("1")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == self.n
+
+    def initial_equations(self) -> Equations:
+        yield self.n == self.x  # early
+
+
+class Double(Early):
+    def initial_equations(self) -> Equations:
+        yield self.n == 1
+        yield self.n == 2
+
+
+EARLY = """\
+Early: the initial equation of n has x; what is discrete starts before states and other variables do.
+  in test_discrete_messages.py:{early} `yield self.n == self.x`
+Use parameters and time only."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"), [(Early, EARLY), (Double, "Double: n has more than one initial equation.\nKeep one of them.")]
+)
+def test_initial_equations_of_what_is_discrete(kind: type[Component], message: str, check_message: Any) -> None:
+    check_message(LanguageError, lambda: build(kind()), message)
