@@ -145,6 +145,9 @@ class DiscreteEquations:
 
     def _of_start(self, equation: Equation) -> tuple[Symbol, Any]:
         target, value = symbols_in(equation.left)[0], ca.SX(cast(Any, equation.right))
+        while steps := [s for s in symbols_in(value) if isinstance(s, Marker) and s.kind in ("relation", "floor")]:
+            plain = [ca.floor(s.of) if s.kind == "floor" else s.of for s in steps]
+            value = ca.substitute([value], [ca.SX(s) for s in steps], [ca.SX(one) for one in plain])[0]
         for symbol in symbols_in(value):
             if symbol is not TIME and (symbol.owner is None or not is_fixed(symbol)):
                 raise LanguageError(

@@ -12,6 +12,7 @@ from modelica_like import Assembly, build, export_fmu, load, run_fmu, simulate
 from modelica_like.errors import LimitPassed, ModelicaTextError
 from modelica_like.language import (
     Component,
+    Discrete,
     Equations,
     Events,
     Mode,
@@ -19,6 +20,8 @@ from modelica_like.language import (
     Variable,
     any_of,
     der,
+    discrete,
+    floor,
     param,
     terminate,
     var,
@@ -43,6 +46,26 @@ class Rising(Component):
 
     def events(self) -> Events:
         yield when(self.x > self.x_top, terminate("is at the top, {x_top} m"))
+
+
+class Begins(Component):
+    """A decay whose start, offset and rate are determined by initial equations."""
+
+    T: Parameter = param("s", "unit of time", default=0.5)
+    a: Parameter = param("1", "value at the start", default=3.0)
+    n: Discrete = discrete("1", "whole units of time before the start")
+    x: Variable = var("1", "decays")
+    offset: Variable = param("1", "offset", fixed=False)
+    y: Variable = var("1", "with the offset")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == -self.n * self.x
+        yield self.y == self.x + self.offset
+
+    def initial_equations(self) -> Equations:
+        yield self.n == floor(self.time / self.T) + 1
+        yield self.x == self.a
+        yield self.y == 5.0
 
 
 def drive(name: str):
@@ -221,6 +244,15 @@ def test_initial_equations_determine_a_preload() -> None:
     assert result["x"] == pytest.approx(2 + step, abs=1e-8)
     inside = np.abs(4 * result.time - np.round(4 * result.time)) > 1e-9
     assert np.array_equal(result["steps"][inside], np.floor(4 * result.time)[inside])
+
+
+def test_initial_equations_are_written(tmp_path: Path) -> None:
+    part = Assembly("drive", parts={"part": Begins()})
+    (tmp_path / "drive.mo").write_text(modelica_text(part))
+    for model in (part, load(tmp_path / "drive.mo")):
+        result = simulate(model, 1.75, t0=1.25, rtol=1e-10)
+        # T·x' = -3·x, y - x = 5 - 3
+        assert result.final["part.y"] == pytest.approx(2 + 3 * np.exp(-3 * 0.5 / 0.5), rel=1e-8)
 
 
 def test_the_energy_balance_closes_with_own_classes() -> None:

@@ -11,7 +11,7 @@ import casadi as ca
 from modelica_like.errors import ModelicaTextError
 from modelica_like.flatten.steps import event_steps
 from modelica_like.flatten.template import relative_path
-from modelica_like.language import Component, Connector, Input, Output, Parameter, Variable
+from modelica_like.language import Component, Connector, Equations, Input, Output, Parameter, Variable
 from modelica_like.language.discrete import Ending, Marker, When, silence
 from modelica_like.language.equation import Equation, as_statement
 from modelica_like.language.expr import TIME, Symbol, operands, symbols_in
@@ -68,14 +68,22 @@ def class_of_equations(
             advice="Impacts, shared loads and states that modes take away are no equations of Modelica text.",
         )
     lines = [f"model {name}", *_declarations(component, write_formula, driven), "equation"]
-    for item, source in located(component.equations()):
+    lines += [*_equations(component, component.equations()), *_events(component)]
+    if begin := _equations(component, component.initial_equations()):
+        lines += ["initial equation", *begin]
+    return "\n".join([*lines, f"end {name};"])
+
+
+def _equations(component: Component, written: Equations) -> list[str]:
+    lines: list[str] = []
+    for item, source in located(written):
         statement = as_statement(item, source, type(component).__name__)
         if isinstance(statement, Equation):
             sides = ca.vertsplit(ca.cse(ca.vertcat(statement.left, statement.right)))
             events = event_steps(sides[0] - sides[1])
             left, right = (_value(side, component, events=events) for side in sides)
             lines.append(f"  {left} = {right};")
-    return "\n".join([*lines, *_events(component), f"end {name};"])
+    return lines
 
 
 def _events(component: Component) -> list[str]:
@@ -172,7 +180,9 @@ def _declarations(component: Component, write_formula: Callable[[Formula], str],
         elif isinstance(field, Variable):
             begin = f"start = {field.default!r}" if isinstance(field.default, int | float) else ""
             chosen = "" if field.state == "default" else f"stateSelect = StateSelect.{field.state}"
-            lines.append(f"  Real {identifier(key)}{_attributes(field.unit_text, begin, chosen)};")
+            # What initial equations determine is a parameter.
+            kind, chosen = ("parameter Real", "fixed = false") if field.constant else ("Real", chosen)
+            lines.append(f"  {kind} {identifier(key)}{_attributes(field.unit_text, begin, chosen)};")
         elif isinstance(field, Discrete):
             start = component.start(key)
             number = 0.0 if start is None else start.number
