@@ -70,7 +70,9 @@ class KinematicPTP2(Component):
 
     def events(self) -> Events:
         begin = self.start_time
-        yield self.stage.go("waiting", "accelerating", at=begin)
-        yield self.stage.go("accelerating", "cruising", at=begin + self.rise)
-        yield self.stage.go("cruising", "braking", at=begin + self.duration - self.rise)
-        yield self.stage.go("braking", "arrived", at=begin + self.duration)
+        ends = begin, begin + self.rise, begin + self.duration - self.rise, begin + self.duration
+        stages = ("waiting", "accelerating", "cruising", "braking", "arrived")
+        for stage, end in zip(reversed(stages), reversed(ends), strict=False):
+            yield self.stage.initially(stage, when=self.time >= end)
+        for before, after, end in zip(stages, stages[1:], ends, strict=False):
+            yield self.stage.go(before, after, at=end)

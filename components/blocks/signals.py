@@ -22,6 +22,7 @@ from modelica_like.language import (
     Mode,
     Output,
     Parameter,
+    all_of,
     any_of,
     column,
     discrete,
@@ -155,10 +156,15 @@ class CoilForce(Started):
         yield self.y == self.offset + self.stage.choose(waiting=0, running=rising, falling=falling, off=0)
 
     def events(self) -> Events:
-        yield from super().events()
         if self.given("stop_time"):
+            settled = self.stop_time + _SETTLED * self.falling_time
+            yield self.stage.initially("off", when=all_of(self.time >= self.start_time, self.time >= settled))
+            yield self.stage.initially(
+                "falling", when=all_of(self.time >= self.start_time, self.time >= self.stop_time)
+            )
             yield self.stage.go("running", "falling", at=self.stop_time)
-            yield self.stage.go("falling", "off", at=self.stop_time + _SETTLED * self.falling_time)
+            yield self.stage.go("falling", "off", at=settled)
+        yield from super().events()
 
 
 class TimeFormula(Component):

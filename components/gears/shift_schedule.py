@@ -16,6 +16,7 @@ from modelica_like.language import (
     Mode,
     Output,
     Parameter,
+    all_of,
     column,
     discrete,
     param,
@@ -103,12 +104,19 @@ class ShiftSchedule(Component):
             yield pressure == before + (self.in_row(level) - before) * done
         yield self.gear == self.in_row(lambda k: _gear_number(self.shifts[k][1]))
 
+    def initial_equations(self) -> Equations:
+        begun: Expr | float = 0.0
+        for moment, *_ in self.shifts[1:]:
+            begun = begun + where(self.time / self.time_scale < moment, 0, 1)
+        yield self.row == begun
+
     def events(self) -> Events:
         moments = [row[0] for row in self.shifts]
         following = _NEVER
         for k in reversed(range(1, len(moments))):
             following = where(self.row < k, moments[k], following)
         end = self.in_row(lambda k: self.shifts[k][0] + self.shifts[k][2])
+        yield self.stage.initially("shifting", when=all_of(self.row > 0, self.time < end * self.time_scale))
         yield self.stage.go("holding", "shifting", at=following * self.time_scale, reset={self.row: self.row + 1})
         yield self.stage.go("shifting", "holding", at=end * self.time_scale)
 
