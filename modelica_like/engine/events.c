@@ -293,6 +293,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     const Model *m = c->model;
     double *before = c->d_before, *jumped = c->edge_guards;
     int changes = m->n_updates > 0, rounds = ROUNDS + ALONE * (m->n_holds + m->n_ideals), met, jolts = may_jolt(m);
+    int due = 0; /* time events are no crowd: they were to come, and those that come ever faster meet in one instant */
     double events = c->state.n_events;
     c->stopped = 0;
     memset(c->entered, 0, (size_t)m->n_holds);
@@ -305,6 +306,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         if (m->n_ideals > 0 && !pushed(c) && !meet(c, -1, &met)) return RESULT_ERROR;
         if (!share_anew(c, wanting)) return RESULT_ERROR;
     }
+    for (int k = 0; k < m->n_transitions; k++) due |= wanting[k] && m->transitions[k].timed;
     for (int round = 0; round < rounds; round++) {
         int any = 0;
         if (!changes && (round > 0 || pushed(c)) && !any_of(wanting, m->n_transitions)) {
@@ -313,7 +315,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         }
         for (int k = 0; k < m->n_transitions; k++) any |= wanting[k] = wanting[k] && (!any || round < TOGETHER);
         if (!gradient_round(c, round, wanting, any | changes))
-            return refuse_contradiction(c) && (c->state.n_events == events || crowded(c));
+            return refuse_contradiction(c) && (c->state.n_events == events || due || crowded(c));
         any = any_of(wanting, m->n_transitions); /* it may have told others to fire */
         if (c->bounded && --c->budget < 1) {
             c->state.at_event = 1; /* the rest comes at the beginning of the next step */

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components import BearingFriction, Inertia
+from components import BearingFriction, Inertia, Pulse, Torque
 from modelica_like import Assembly, Options, Solution, simulate
 from modelica_like.errors import Chattering, Source, StepFailed
 from modelica_like.language import (
@@ -82,6 +82,40 @@ def test_25_instants_in_a_millionth_of_the_run_are_too_many():
         simulate(ShortSaw(x=0.0, width=1e-8, most=25), 1.0)
     # Somewhat wider, the last instant lies a whole window behind the first.
     assert len(simulate(ShortSaw(x=0.0, width=1.001e-6 / 24, most=40), 1.0).events) == 40
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_burst_of_pulses_in_a_long_run_is_no_chattering(solver: Any) -> None:
+    """200 pulses of 2 N.m · 0.05 ms at 1 kg.m2, each of which was to come."""
+    parts = {"pulse": Pulse(amplitude=2.0, period=1e-4, periods=200, start_time=5.0), "torque": Torque(),
+             "mass": Inertia(J=1.0, phi=0.0, w=0.0)}  # fmt: skip
+    drive = Assembly("d", parts=parts, series={"s": ["torque", "mass"]}, connect={"c": ["pulse.y", "torque.tau"]})
+    run = simulate(drive, 1e4, solver=solver)
+    assert len(run.events) == 400
+    assert run.final["mass.w"] == pytest.approx(200 * 2 * 0.5e-4, rel=1e-6)
+
+
+class Hurried(Component):
+    """Each half of its time takes half as long as the one before: all ends at 1 s."""
+
+    x: Variable = var("s", default=0.0)
+    end: Parameter = param("s", "where it ends", default=1.0)
+    following: Discrete = discrete("s", "time of the next event", start=0.5)
+    turn = Mode("up", "down")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.turn.choose(up=1, down=-1)
+
+    def events(self) -> Events:
+        sooner = {self.following: 0.5 * (self.following + self.end)}
+        for before, after in (("up", "down"), ("down", "up")):
+            yield self.turn.go(before, after, at=self.following, reset=sooner)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_time_events_without_end_are_told(solver: Any) -> None:
+    with pytest.raises(Chattering, match="turn switched"):
+        simulate(Hurried(), 2.0, solver=solver)
 
 
 @pytest.mark.parametrize("count", [1, 3])
