@@ -155,8 +155,8 @@ def test_a_gearbox_finds_what_sticks_without_a_run():
 
 
 def test_a_gear_that_locks_itself_is_told():
-    """A worm of efficiency 0.4 is not turned by its load."""
-    point = steady(EXAMPLES / "components" / "self_locking_worm.toml")
+    """A worm of efficiency 0.4 is not turned by its load, before its motor is switched on."""
+    point = steady(EXAMPLES / "components" / "self_locking_worm.toml", parameters={"on.start_time": 1.0})
     assert point.stuck == ("worm",)
     assert point["worm.w_a"] == 0.0
 
