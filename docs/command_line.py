@@ -45,7 +45,8 @@ fish) complete commands, options, values and component types.
 
 Options can stand anywhere behind the command. Those marked with … can be given as often as needed. Times are numbers in
 seconds or quantities: `2s`, `0.1ms`. `--json` prints tables and problems as data. `--trust`, with any command, runs
-Python modules beside the netlists: [security](security.md). Errors are sentences on standard error; `--debug`
+Python modules beside the netlists: [security](security.md). `--library PATH`, as often as needed, names a library of
+[Modelica text](modelica_text.md). Errors are sentences on standard error; `--debug`
 shows where in the code they were raised. Exit codes and files: [scripts](how_to/scripts.md)."""
 
 

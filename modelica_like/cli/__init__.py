@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
 
 # Tasks with their commands and the modules of these, in the order in which the help lists them.
@@ -37,12 +38,13 @@ def command(name: str) -> Callable[..., None]:
 
 
 def main() -> None:
-    """Run the command line. All commands know `--trust`, which is taken from their words here."""
+    """Run the command line. All commands know `--trust` and `--library`, which are taken from their words here."""
     from modelica_like.cli.trusted import decide
     from modelica_like.trust import trusting
 
     words = [word for word in sys.argv[1:] if word != "--trust"]
     everything = len(words) < len(sys.argv) - 1
+    words, libraries = _libraries(words)
     try:
         if COMPLETE in os.environ:
             from modelica_like.cli.overview import complete
@@ -50,7 +52,7 @@ def main() -> None:
             complete(words)
             return
         try:
-            with trusting(None if everything else decide()):
+            with trusting(None if everything else decide()), _known(libraries):
                 run(words)
         finally:
             sys.stdout.flush()
@@ -59,6 +61,29 @@ def main() -> None:
         raise SystemExit(1) from None
     except KeyboardInterrupt:  # while modules are loaded
         raise SystemExit(130) from None
+
+
+def _libraries(words: list[str]) -> tuple[list[str], list[str]]:
+    """Return the words without `--library PATH`, and these paths."""
+    rest, places, pending = list[str](), list[str](), iter(words)
+    for word in pending:
+        name, equals, place = word.partition("=")
+        if name != "--library":
+            rest.append(word)
+        elif path := place if equals else next(pending, ""):
+            places.append(path)
+    return rest, places
+
+
+def _known(libraries: list[str]) -> AbstractContextManager[None]:
+    """Return what makes libraries of Modelica text known."""
+    if not libraries:
+        return nullcontext()
+    from modelica_like.cli.shared import told
+    from modelica_like.netlist.modelica.classes import with_libraries
+
+    with told(False):
+        return with_libraries(libraries)
 
 
 def run(words: Sequence[str]) -> None:

@@ -18,7 +18,8 @@ _ABOUT = (
     "Acausal drive-train models: check, simulate, analyse and export netlists.",
     "Exit codes: 0 done; 1 the model cannot be solved, or a check failed; 2 the input is wrong, or a file cannot be "
     "read or written; 130 stopped by Ctrl-C.",
-    "`--trust`, with any command, runs Python modules beside the netlists.",
+    "`--trust`, with any command, runs Python modules beside the netlists; `--library PATH` names a library of "
+    "Modelica text, as often as needed.",
 )
 # Files of the user that shells read, and what they need there: it asks this program with the words up to the cursor.
 _SHELLS = {

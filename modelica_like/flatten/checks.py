@@ -49,7 +49,7 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
     unknowns = [n for n in variables if n not in joined]
     used = {name: c for name, c in component.connectors.items() if c.used and name not in joined}
     unknowns += [f"{name}.{n}" for name, c in used.items() for n, f in c.quantities.items() if f.is_flow]
-    if len(equations) == len(unknowns):
+    if len(equations) + inside(component).lent == len(unknowns):
         return
     kind = type(component).__name__
     count = f"{len(equations)} equation{'s' if len(equations) != 1 else ''}"

@@ -28,6 +28,7 @@ from modelica_like.language.discrete import (
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, Expr, Symbol, is_expression, symbols_in
 from modelica_like.language.fields import Discrete, Input, Variable
+from modelica_like.language.inside import inside
 from modelica_like.language.mode import BoundMode, Mode, StartMode, Transition
 from modelica_like.language.transition import NAME_IN_NOTICE
 
@@ -203,6 +204,8 @@ class DiscreteEquations:
         determined = {id(target) for target, _ in resets} | {*places, *begun}
         for name, field in self._component.fields.items():
             if not isinstance(field, Discrete) or id(getattr(self._component, name)) in determined:
+                continue
+            if name in inside(self._component).elsewhere:
                 continue
             if field.kind != "number" or (name in used and field.default == 0.0):
                 what = f"{self._kind}: nothing determines the discrete variable {name}."

@@ -117,6 +117,8 @@ class InsideComponent(Inside):
         given_tables: tables as they were written.
         measured: scale parameters that must have no value, by name: the table with quantities that forbids it.
         elements: parts, with those of lists one by one; made on first use.
+        elsewhere: own discrete variables that an owner's equations determine.
+        lent: equations of own variables that stand in an owner, less those of parts that stand here.
     """
 
     values: dict[str, Value] = field(default_factory=_empty)
@@ -127,6 +129,8 @@ class InsideComponent(Inside):
     given_tables: dict[str, Any] = field(default_factory=_empty)
     measured: dict[str, str] = field(default_factory=_empty)
     elements: Mapping[str, Component] | None = None
+    elsewhere: frozenset[str] = frozenset()
+    lent: int = 0
 
     def detached(self) -> Self:
         """Return a copy without what is valid in one process, and for one instance, only."""
@@ -152,6 +156,7 @@ class InsideAssembly(InsideComponent):
         sizing: path of its sizing file.
         optimize: what is optimised, as written in the netlist.
         tolerances: how parameters scatter, as written there.
+        libraries: of Modelica text, as written there.
         places: in the netlist, by section and name.
         made: the call that created it.
     """
@@ -168,6 +173,7 @@ class InsideAssembly(InsideComponent):
     sizing: str = ""
     optimize: dict[str, Any] = field(default_factory=_empty)
     tolerances: dict[str, Any] = field(default_factory=_empty)
+    libraries: dict[str, list[str]] = field(default_factory=_empty)
     places: dict[str, Source] = field(default_factory=_empty)
     made: Source = NOWHERE
 

@@ -52,6 +52,7 @@ class Document:
         sizing: path of a sizing file, whose checks stand in reports.
         optimize: what is optimised, as written.
         tolerances: how parameters scatter, by path.
+        modelica: libraries of Modelica text.
         errors: of entries that have another form, and are left out.
     """
 
@@ -72,6 +73,7 @@ class Document:
     sizing: str = ""
     optimize: dict[str, Any] = field(default_factory=dict)
     tolerances: dict[str, Any] = field(default_factory=dict)
+    modelica: dict[str, list[str]] = field(default_factory=dict)
     errors: list[ModelicaLikeError] = field(default_factory=list)
 
 
@@ -396,5 +398,6 @@ READERS: Mapping[str, Reader] = {
     "sizing": whole(as_text),
     "optimize": options(OPTIMIZE),
     "tolerances": whole(tolerances),
+    "modelica": options({"libraries": _names}),
 }
 """Of the sections of a netlist."""

@@ -79,6 +79,7 @@ def sections() -> dict[str, Any]:
     chain = "chains of parts: the outlet of each is joined to the inlet of the next"
     values = "parameters of the drive: numbers, quantities or formulas of earlier ones"
     scatter = "how parameters scatter: ranges, distributions, files of measured values"
+    texts = {"type": "array", "items": _TEXT, "description": "folders or files, from the netlist's folder"}
     units = "units in which results are shown, by quantity, path or pattern"
     return {
         "name": {**_TEXT, "description": "name of the model; default: that of the file"},
@@ -96,6 +97,12 @@ def sections() -> dict[str, Any]:
         "display": _map(_TEXT, units, {"speed": "rpm", "*.phi": "deg"}),
         "optimize": _optimize(),
         "tolerances": _map({"anyOf": [_TEXT, {"type": ["object", "array"]}]}, scatter, {"clutch.capacity": "±10 %"}),
+        "modelica": {
+            "type": "object",
+            "description": "libraries of Modelica text",
+            "additionalProperties": False,
+            "properties": {"libraries": {**texts, "examples": [["library/Drives"]]}},
+        },
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -62,6 +62,15 @@ def _modelica(path: str | Path) -> Assembly:
     from modelica_like.netlist.modelica.read import load_modelica  # it makes components, and most netlists have no text
 
     return load_modelica(path)
+
+
+def _libraries(document: Document, folder: Path) -> AbstractContextManager[None]:
+    """Return what makes the libraries of Modelica text known that a netlist names."""
+    if not document.modelica:
+        return nullcontext()
+    from modelica_like.netlist.modelica.classes import with_libraries
+
+    return with_libraries([folder / place for place in document.modelica.get("libraries", [])])
 
 
 @without_garbage_search()
@@ -155,11 +164,13 @@ class _Loader:
         if document.sizing:
             record.sizing = str(chain[-1].parent / document.sizing)
         record.optimize, record.tolerances = document.optimize, document.tolerances
+        record.libraries = document.modelica
         Assembly.place(assembly, "tolerances", document.lines.source("tolerances"))
         for key in document.optimize:
             Assembly.place(assembly, f"optimize.{key}", document.lines.source("optimize", key))
         task = _Task(document, assembly, chain, self)
-        task.run()
+        with _libraries(document, chain[-1].parent):
+            task.run()
         if task.errors and self.thorough and len(chain) == 1:
             task.errors += further(assembly, task.broken(), task.refused)
         if task.errors:

@@ -82,6 +82,7 @@ class _Writer:
             "display": inside(assembly).display,
             "optimize": _as_written(inside(assembly).optimize),
             "tolerances": _as_written(inside(assembly).tolerances),
+            "modelica": dict(inside(assembly).libraries),
         }
         top: dict[str, Any] = {"name": inside(assembly).name}
         if inside(assembly).description:

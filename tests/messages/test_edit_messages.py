@@ -169,7 +169,7 @@ CASES: dict[str, tuple[type[ModelicaLikeError], dict[str, Any], str]] = {
     "unknown section": (
         UnknownName, {"op": "set", "path": "until", "value": 3, "section": "simulat"},
         "A netlist has no section 'simulat'; did you mean 'simulate'? It has name, description, parameters, parts, "
-        "series, connect, start, guess, free, expose, simulate, display, sizing, optimize, tolerances.",
+        "series, connect, start, guess, free, expose, simulate, display, sizing, optimize, tolerances, modelica.",
     ),
     "value of a part": (
         NetlistError, {"op": "set", "path": "rotor", "value": 3},

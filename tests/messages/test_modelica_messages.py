@@ -62,7 +62,10 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model(f"{R}.Inertia a;", "connect(a.flange_b, b.flange_a);"),
         "A has no 'b'.\n  in a.mo:5 `connect(a.flange_b, b.flange_a);`",
     ),
-    "inner": (model("inner Real x;"), "'inner' before x: that is not supported here.\n  in a.mo:3 `inner Real x;`"),
+    "outer without inner": (
+        model("outer Real g; Real x;", "x = g;"),
+        "outer g has no inner g above it.\n  in a.mo:5 `x = g;`",
+    ),
     "a displayUnit that is no text": (
         model(f"{R}.Inertia a(w(displayUnit = true));"),
         f"a.w.displayUnit is a String, and true is none.\n  in a.mo:3 `{R}.Inertia a(w(displayUnit = true));`",
@@ -133,8 +136,8 @@ MESSAGES: dict[str, tuple[str, str]] = {
     ),
     "external function": (
         model("Real x = f(1);", before='function f input Real u; output Real y; external "C"; end f;'),
-        "External functions: that is not supported here.\n"
-        '  in a.mo:1 `function f input Real u; output Real y; external "C"; end f;`',
+        "The function f, which is written in another language,: that is not supported here.\n"
+        "  in a.mo:3 `Real x = f(1);`",
     ),
     "overdetermined connectors": (
         model("Real x;", "Connections.branch(a.R, b.R);"),
@@ -149,9 +152,33 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("Real x;", "x = subSample(x, 2);"),
         "A clock that follows another: that is not supported here.\n  in a.mo:5 `x = subSample(x, 2);`",
     ),
-    "algorithm": (
-        "model A\n  Real x;\nalgorithm\n  x := 1;\nend A;\n",
-        "An algorithm outside a function: that is not supported here.\n  in a.mo:3 `algorithm`",
+    "algorithm for a part": (
+        "model A\n  Real x;\nalgorithm\n  z := 1;\nend A;\n",
+        "An assignment to z: that is not supported here.\n  in a.mo:4 `z := 1;`",
+    ),
+    "a 'when' and more in an algorithm": (
+        "model A\n  Integer n;\nalgorithm\n  n := 1;\n  when time > 1 then\n    n := 2;\n  end when;\nend A;\n",
+        "n, which a 'when' and other statements give a value,: that is not supported here.\n"
+        "  in a.mo:5 `when time > 1 then`",
+    ),
+    "a loop that may end": (
+        model(
+            "Real x = f({time, 1});",
+            before="function f input Real u[:]; output Real y; algorithm y := 0; for i in 1:2 loop "
+            "if u[i] > 1 then break; end if; y := y + 1; end for; end f;",
+        ),
+        "A loop that ends where only a run knows: that is not supported here.\n"
+        "  in a.mo:1 `function f input Real u[:]; output Real y; algorithm y := 0; for i in 1:2 loop "
+        "if u[i] > 1 then break; end if; y := y + 1; end for; end f;`",
+    ),
+    "a start of a discrete variable that changes": (
+        "model A\n  Real x = time + 1;\n  discrete Real n;\ninitial equation\n  pre(n) = x;\n"
+        "equation\n  when time > 1 then\n    n = 2;\n  end when;\nend A;\n",
+        "An initial value of n that only a run knows: that is not supported here.\n  in a.mo:5 `pre(n) = x;`",
+    ),
+    "a type of arrays": (
+        model("Axis a;", before="type Axis = Real[3];"),
+        "A short class definition of an array: that is not supported here.\n  in a.mo:1 `type Axis = Real[3];`",
     ),
     "a text as a number": (
         model("Real x;", 'x = 2*"two";'),
@@ -159,7 +186,7 @@ MESSAGES: dict[str, tuple[str, str]] = {
     ),
     "two results": (
         model("Real x;", "(x, y) = f(1);"),
-        "Functions with several results are not supported.\n  in a.mo:5 `(x, y) = f(1);`",
+        "There is no 'y'.\n  in a.mo:5 `(x, y) = f(1);`",
     ),
     "pre of what changes all the time": (
         model("Real x;", "x = pre(x) + 1;"),
@@ -321,11 +348,6 @@ MESSAGES: dict[str, tuple[str, str]] = {
     ),
     "a comment without an end": (model() + "/* x", "A comment has no end.\n  in a.mo:7 `/* x`"),
     "a text without an end": (model('Real x "speed;'), 'A text has no end.\n  in a.mo:3 `Real x "speed;`'),
-    "a binding from outside": (
-        model("B b(f(tau = 3));", before="model B Modelica.Mechanics.Rotational.Interfaces.Flange_a f; end B;"),
-        "An equation for f.tau in the modification of its component: that is not supported here.\n"
-        "  in a.mo:3 `B b(f(tau = 3));`",
-    ),
     "no array": (model("Real x;", "x = sum(1);"), "sum(…) needs an array.\n  in a.mo:5 `x = sum(1);`"),
     "too few arguments": (
         model("Real x;", "der() = 1;"),
@@ -404,7 +426,7 @@ MESSAGES: dict[str, tuple[str, str]] = {
 
 NAMES = (
     "unknown parameter", "unknown name", "unknown variable of a part", "unknown end", "a modification of nothing",
-    "a modification of nothing in a base",
+    "a modification of nothing in a base", "outer without inner", "two results",
 )  # fmt: skip
 
 

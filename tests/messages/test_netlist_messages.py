@@ -73,7 +73,7 @@ MESSAGES = {
         "A netlist has no entry 'part'; did you mean 'parts'? "
         "It has name, description, "
         "parameters, parts, series, connect, start, guess, free, expose, simulate, display, sizing, "
-        "optimize, tolerances.\n"
+        "optimize, tolerances, modelica.\n"
         "  in bad.toml:1 `[part]`",
     ),
     "no type": (

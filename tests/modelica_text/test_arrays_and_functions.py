@@ -145,9 +145,7 @@ WRONG = {
     "z[5] := u; y := z[1];": ("f(time)", "The index 5 is not one of 1 to 3."),
     "u[1] := 2; y := u;": ("f(time)", "u is an input and cannot be assigned."),
     "y[1] := 2;": ("f(time)", "What is no array has no subscript."),
-    "z[2:3] := {1, 2}; y := z[2];": (
-        "f(time)", "An assignment to several elements of an array: that is not supported here.",
-    ),
+    "z[2:3] := {1, 2, 3}; y := z[2];": ("f(time)", "z is given 3 elements for 2."),
     "z := {1, 2}; y := z[1];": ("f(true)", "u of f is a Real, and true is none."),
     "y := n;": ("f(1, n = 2.5)", "n of f is an Integer, and 2.5 is none."),
     "y := w[1];": ("f(1, w = {1, 2})", "w of f has 3 elements, not 2."),

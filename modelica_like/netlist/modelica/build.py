@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
-
-import casadi as ca
 
 from modelica_like.errors import (
     ModelicaLikeError,
@@ -34,7 +31,7 @@ from modelica_like.language.assembly import declare, end_at
 from modelica_like.language.fields import Discrete, Field, Input, Parameter
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.attributes import check_attributes, check_declared
-from modelica_like.netlist.modelica.fold import numbered
+from modelica_like.netlist.modelica.fold import KNOWN, number, numbered
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
 from modelica_like.netlist.modelica.library import Known, connector_type
@@ -44,7 +41,7 @@ from modelica_like.netlist.modelica.statements import Statements
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_signal
 from modelica_like.netlist.modelica.values import Notes, known, nominal_of, number_of, shown_unit, unit_of, value_of
-from modelica_like.netlist.modelica.wiring import Wire, groups
+from modelica_like.netlist.modelica.wiring import Wire, paths, rank
 from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConnector, as_formula, written_class
 
 
@@ -61,6 +58,9 @@ def build_component(instance: Instance, notes: Notes) -> Written:
     return _Builder(instance, notes).run()
 
 
+_MEMORIES: dict[str, Any] = {
+    "Boolean": boolean, "Real": lambda description: discrete("1", description, start=0.0)
+}  # fmt: skip
 _STATE_SELECT = {"always": "always", "prefer": "prefer", "avoid": "avoid", "never": "avoid"}
 
 
@@ -79,7 +79,7 @@ class _Builder:
         kind: Any = written_class(text.name)
         component: Written = kind(text.name, description=text.description)
         self.component = component
-        self.wires = groups(self.statements.connections, self.instance)
+        self.wires = self.statements.wires
         for name, bound in self.statements.bound.items():
             declare(component, name, signal_out(unit_of(bound.basic, self.notes), f"value of {bound.end}"))
             self.wires.append(Wire([name, bound.end], bound.source))
@@ -92,9 +92,10 @@ class _Builder:
             raise raise_together_or_one(self.errors)
         self._drive()
         record, statements = inside(component), self.statements
-        record.text, record.statements = text.path, tuple(statements.equations)
+        record.text, record.statements = text.path, (*statements.equations, *self.instance.adopted)
+        record.elsewhere, record.lent = frozenset(self.instance.lent), self.instance.balance
         record.initial, record.happenings = tuple(statements.initial), tuple(statements.happenings)
-        record.instants = frozenset(name for name, instant in statements.outputs.items() if instant)
+        record.instants = frozenset(name for name, (_, instant) in statements.outputs.items() if instant)
         self._connect()
         if self.errors:
             raise raise_together_or_one(self.errors)
@@ -107,11 +108,11 @@ class _Builder:
         flows = (f"{name}.{key}" for name, c in ends for key, quantity in c.quantities.items() if quantity.is_flow)
         own = [name for name, field in component.fields.items() if not isinstance(field, Input | Parameter)]
         own = [name for name in (*own, *flows) if name.partition(".")[0] not in joined]
-        rows = [([*_paths(left), *_paths(right)], source) for left, right, source in self.statements.equations]
+        rows = [([*paths(left), *paths(right)], source) for left, right, source in self.statements.equations]
         for names, source in list(rows):
             end = next((end for end in names if self._is_open(end) and end not in joined), "")
             rest = [row for row in rows if row[0] is not names]
-            if end and _rank(rest, own) == _rank(rows, own):
+            if end and rank(rest, own) == rank(rows, own):
                 rows = rest
                 joined.add(end)
                 signal = end.replace(".", "_")
@@ -140,7 +141,7 @@ class _Builder:
     # -- members -----------------------------------------------------------------------------------------------------
 
     def _member(self, name: str, member: Member) -> None:
-        if not exists(self.instance, member):
+        if "outer" in member.declaration.prefixes or not exists(self.instance, member):
             self.absent.add(name)
             return
         basic = basic_type(self.instance, member)
@@ -189,7 +190,7 @@ class _Builder:
     def _basic(self, name: str, member: Member, basic: Basic) -> None:
         declared = member.declaration
         check_declared(self.instance, member, basic)
-        if "constant" in declared.prefixes or basic.kind in ("String", "StateSelect"):
+        if "constant" in declared.prefixes or basic.kind in ("String", "StateSelect", "object"):
             return
         if "parameter" in declared.prefixes:
             if basic.kind == "Real" and not declared.dimensions:
@@ -252,7 +253,7 @@ class _Builder:
             declared = boolean(description)
         elif basic.kind in ("Integer", "enumeration") and not signal:
             declared = integer(description)
-        elif path in self.statements.assigned or "discrete" in basic.prefixes:
+        elif (path in self.statements.assigned and not signal) or "discrete" in basic.prefixes:
             declared = discrete(unit_of(basic, self.notes), description, start=0.0)
         elif "input" in basic.prefixes and signal:
             declared = signal_in(unit_of(basic, self.notes), description)
@@ -263,7 +264,7 @@ class _Builder:
             declared = var(unit_of(basic, self.notes), description, state=select)
         declared.nominal = nominal_of(basic)
         if path in self.statements.outputs:
-            memory = boolean(description)
+            memory = _MEMORIES.get(basic.kind, integer)(description)
             declare(self.component, f"{path}{MEMORY}", memory)
             self._start(path, basic, memory)
         declare(self.component, path, declared)
@@ -279,7 +280,10 @@ class _Builder:
         fixed = known(basic.given.inner.get("fixed")) is True
         if isinstance(declared, Discrete):
             before = self.statements.memory.get(path)
-            value = value_of(given) if before is None else Resolver(self.instance, self.instance.text).known()(before)
+            resolver = Resolver(self.instance, self.instance.text, {"time": number(0.0)}, numeric=True)
+            value = value_of(given) if before is None else resolver(before)
+            if before is not None and (value is None or value.kind not in KNOWN):
+                raise refused(f"an initial value of {path} that only a run knows", self.instance.text, before.line)
             start = None if value is None else numbered(value).args[0]
             first = 1.0 if basic.kind == "enumeration" else 0.0
             declared.default = float(start) if isinstance(start, bool | int | float) else first
@@ -354,25 +358,6 @@ class _Builder:
                     f"{end} is true for instants only, which a connection does not carry here.",
                     advice="Write the 'when' in the class of the sample, or name the variable: when block.y then.",
                 )
-
-
-def _paths(node: Expr) -> Iterator[str]:
-    """Yield the paths of variables in a resolved expression."""
-    if node.kind in ("name", "condition"):
-        yield node.args[0][0]
-        return
-    inner = node.args[1] if node.kind == "call" else node.args
-    for one in inner:
-        if isinstance(one, Expr):
-            yield from _paths(one)
-
-
-def _rank(rows: list[tuple[list[str], Source]], columns: list[str]) -> int:
-    """Return how many columns rows with these names can determine, one each."""
-    place = {name: k for k, name in enumerate(columns)}
-    entries = [(k, place[name]) for k, (names, _) in enumerate(rows) for name in names if name in place]
-    lists = map(list, zip(*entries, strict=True)) if entries else ([], [])
-    return ca.sprank(ca.DM(ca.Sparsity.triplet(len(rows), len(columns), *lists)))
 
 
 def _elements(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:

@@ -1,3 +1,4 @@
+type AssertionLevel = enumeration(warning, error);
 // What Modelica texts use without a component behind it: units, constants, enumerations, bases of elements.
 // The names are those of the Modelica Standard Library; the text is this package's own.
 package Modelica

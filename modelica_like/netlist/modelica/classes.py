@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
+from functools import lru_cache
 from pathlib import Path
 
 from modelica_like.errors import ModelicaTextError
@@ -19,29 +24,70 @@ _RENAMED = (
 )
 _MOST_STEPS = 1_000_000
 """Of about 10 microseconds; 10,000 parts of own classes, or 100,000 equations."""
+_KEPT_FILES = 3_000
+"""Files whose classes are kept by their text: the standard library has 2,555."""
+_libraries: ContextVar[tuple[Path, ...]] = ContextVar("libraries", default=())
 Found = ClassText | Known | str
 """A class with its text, one with a component, or the name of a basic type or a connector of the standard library."""
+
+
+def with_libraries(places: Sequence[str | Path]) -> AbstractContextManager[None]:
+    """Read all texts inside with libraries of classes.
+
+    Args:
+        places: a package's folder or file each, or a folder of packages; the first wins, and all win over those that
+            are given outside.
+
+    Raises:
+        ModelicaTextError: one of them is not there.
+    """
+    for place in places:
+        if not Path(place).exists():
+            raise ModelicaTextError(
+                f"There is no library of Modelica text at '{place}'.",
+                advice="Name a package's folder or file, or a folder with packages.",
+            )
+    return _known(places)
+
+
+@contextmanager
+def _known(places: Sequence[str | Path]) -> Generator[None]:
+    token = _libraries.set((*map(Path, places), *_libraries.get()))
+    try:
+        yield
+    finally:
+        _libraries.reset(token)
+
+
+def given_libraries() -> tuple[Path, ...]:
+    """Return the libraries of `with_libraries`."""
+    return _libraries.get()
 
 
 class Classes:
     """The classes that a file can name.
 
     Args:
-        file: a `.mo` file; its package's other files are found beside it, by its `within`.
+        file: a `.mo` file; its package's other files are found beside it, by its `within`. Libraries are those of
+            `with_libraries`, then those of the variable MODELICAPATH of the environment.
+        table: whether components stand for classes of the standard library.
 
     Raises:
         NetlistError: the file cannot be read.
         ModelicaTextError: it is not Modelica.
     """
 
-    def __init__(self, file: Path) -> None:
+    def __init__(self, file: Path, *, table: bool = True) -> None:
         self.file = file
-        self.own = parse_modelica(read_text(file), str(file))
+        self.table = table
+        self.own = _parsed(file)
         within = self.own[0].within.split(".") if self.own[0].within else []
         # package.mo is the class of its folder.
         above = len(within) + (file.name == "package.mo")
-        self.folder = file.resolve().parents[above] if above < len(file.resolve().parents) and within else None
-        self.read: dict[Path, list[ClassText]] = {}
+        around = [file.resolve().parents[above]] if above and above < len(file.resolve().parents) else []
+        everywhere = filter(None, os.environ.get("MODELICAPATH", "").split(os.pathsep))
+        self.places = (*around, *_libraries.get(), *map(Path, everywhere))
+        self.tops: dict[str, ClassText | None] = {}
         self.open: set[tuple[int, str]] = set()
         self.found: dict[tuple[int, str], Found | None] = {}
         self.steps = 0
@@ -105,18 +151,26 @@ class Classes:
         outermost = scope
         while level is not None:
             class_text = (
-                self._inside(level, name) or self._imported(level, head, rest) or _tabled(f"{level.path}.{name}")
+                self._inside(level, name) or self._imported(level, head, rest) or self.tabled(f"{level.path}.{name}")
             )
             if class_text is not None:
                 return class_text
             outermost, level = level, level.owner
         package = outermost.within
         while package:
-            class_text = self.full(f"{package}.{name}")
+            around = self.full(package)
+            class_text = self.full(f"{package}.{name}") or (
+                self._imported(around, head, rest) if isinstance(around, ClassText) else None
+            )
             if class_text is not None:
                 return class_text
             package = package.rpartition(".")[0]
         return self.full(f"Modelica.Units.SI.{rest}" if head in _SI else name)
+
+    def around(self, text: ClassText) -> ClassText | None:
+        """Return the class that encloses another one, which may have a file of its own."""
+        outer = text.owner or (self.full(text.within) if text.within else None)
+        return outer if isinstance(outer, ClassText) else None
 
     def _imported(self, level: ClassText, head: str, rest: str) -> Found | None:
         after = f".{rest}" if rest else ""
@@ -134,8 +188,8 @@ class Classes:
     def _inside(self, level: ClassText, name: str) -> Found | None:
         """Return a class declared or inherited in a class."""
         head, _, rest = name.partition(".")
-        if head in level.classes:
-            inner = level.classes[head]
+        inner = level.classes.get(head) or self._beside(level, head)
+        if inner is not None:
             return self._inside(inner, rest) if rest else inner
         key = id(level), head
         if key in self.open:  # a base is looked up among what its own class inherits
@@ -164,39 +218,61 @@ class Classes:
             if path == class_text.path:
                 return class_text
             if path.startswith(f"{class_text.path}."):
-                return self._inside(class_text, path[len(class_text.path) + 1 :])
-        if path in BASIC or _tabled(path):
-            return _tabled(path) or path
+                own = self._inside(class_text, path[len(class_text.path) + 1 :])
+                if own is not None:
+                    return own
+        if path in BASIC or self.tabled(path):
+            return self.tabled(path) or path
         head, _, rest = path.partition(".")
-        built = built_in().get(head)
-        inner = self._inside(built, rest) if built is not None and rest else None
-        return inner if inner is not None else self._on_disk(path)
-
-    def _on_disk(self, path: str) -> ClassText | Known | str | None:
-        """Return a class of the package that the file belongs to."""
-        if self.folder is None:
-            return None
-        names, place = path.split("."), self.folder
-        for k, name in enumerate(names):
-            for file in (place / f"{name}.mo", place / name / "package.mo"):
-                if file.is_file():
-                    class_text = self._of_file(file, name)
-                    if class_text is not None and k + 1 == len(names):
-                        return class_text
-                    inner = self._inside(class_text, ".".join(names[k + 1 :])) if class_text is not None else None
-                    if inner is not None:
-                        return inner
-            place = place / name
+        for top in (self._top(head), built_in().get(head)):
+            inner = self._inside(top, rest) if top is not None and rest else top
+            if inner is not None:
+                return inner
         return None
 
-    def _of_file(self, file: Path, name: str) -> ClassText | None:
-        if file.resolve() == self.file.resolve():
-            return next((candidate for candidate in self.own if candidate.name == name), None)
-        if file not in self.read:
-            self.read[file] = parse_modelica(read_text(file), str(file))
-        return next((candidate for candidate in self.read[file] if candidate.name == name), None)
+    def tabled(self, path: str) -> Known | str | None:
+        """Return a class of the standard library that a component or a connector stands for."""
+        if not self.table:
+            return None
+        return known_classes().get(path) or (path if path in table()["connectors"] else None)
+
+    def _top(self, name: str) -> ClassText | None:
+        """Return an outermost class of the package that the file belongs to, or of a library."""
+        if name not in self.tops:
+            files = (file for place in self.places for file in _homes(place, name))
+            self.tops[name] = next((top for file in files for top in _parsed(file) if top.name == name), None)
+        return self.tops[name]
+
+    def _beside(self, level: ClassText, name: str) -> ClassText | None:
+        """Return a class of a package that has a file of its own."""
+        if level.owner is not None or Path(level.file).name != "package.mo":
+            return None
+        folder = Path(level.file).parent
+        for file in (folder / f"{name}.mo", folder / name / "package.mo"):
+            if file.is_file():
+                for inner in _parsed(file):
+                    if inner.name == name:
+                        inner.within = level.path  # also of a file that does not say it
+                        return inner
+        return None
 
 
-def _tabled(path: str) -> Known | str | None:
-    """Return a class of the standard library that a component or a connector stands for."""
-    return known_classes().get(path) or (path if path in table()["connectors"] else None)
+def _homes(place: Path, name: str) -> Iterator[Path]:
+    """Yield the files of a library that may have an outermost class: `Modelica 4.1.0` is a folder of Modelica."""
+    if place.is_file():
+        yield place
+    elif (place / "package.mo").is_file():
+        yield place / "package.mo"
+    else:
+        folders = sorted(place.glob(f"{name} *"), reverse=True)
+        files = (place / f"{name}.mo", *(folder / "package.mo" for folder in (place / name, *folders)))
+        yield from (file for file in files if file.is_file())
+
+
+def _parsed(file: Path) -> list[ClassText]:
+    return _parsed_text(read_text(file), str(file))
+
+
+@lru_cache(maxsize=_KEPT_FILES)
+def _parsed_text(text: str, file: str) -> list[ClassText]:
+    return parse_modelica(text, file)

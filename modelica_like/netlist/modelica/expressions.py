@@ -88,11 +88,13 @@ class Expressions(Tokens):
             self.at += 1
             return Expr("name", (("end", ()),), line)
         if self.take("("):
-            result = self.expression()
-            if self.kind == ",":
-                self.refuse("Functions with several results are not supported.", line)
+            items = [self._result()]
+            while self.take(","):
+                items.append(self._result())
             self.need(")")
-            return result
+            return items[0] if len(items) == 1 and items[0].kind != "all" else Expr("tuple", tuple(items), line)
+        if self.take("function"):  # partial application, an argument that is a function
+            return Expr("function", (self._named(line),), line)
         if self.take("{"):
             return self._array(line)
         if self.take("["):
@@ -100,6 +102,10 @@ class Expressions(Tokens):
         raise self.error(
             f"Expected an expression before '{text}'." if text else "The file ends in an expression.", line
         )
+
+    def _result(self) -> Expr:
+        """Read one of the results of a function; one that is left out is `all`."""
+        return Expr("all", (), self.line) if self.kind in (",", ")") else self.expression()
 
     def _array(self, line: int) -> Expr:
         items = [] if self.kind == "}" else [self.expression()]

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from modelica_like.errors import ModelicaTextError
 from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.algorithms import Algorithm
 from modelica_like.netlist.modelica.instance import Given, Instance, refused
-from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
-from modelica_like.netlist.modelica.types import basic_type, misfit
+from modelica_like.netlist.modelica.members import value_of
+from modelica_like.netlist.modelica.natives import NATIVE
+from modelica_like.netlist.modelica.tree import ClassText, Empty, Expr
+from modelica_like.netlist.modelica.types import basic_type, is_external_object, misfit
 
 if TYPE_CHECKING:
     from modelica_like.netlist.modelica.resolve import Resolver
@@ -21,8 +23,16 @@ def _filled(value: Expr, shape: tuple[Expr, ...], line: int) -> Expr:
     for size in reversed(shape):
         if size.kind != "number":
             raise fold.Unfit("The size of an array must be known")
-        value = Expr("array", (value,) * fold.count(size.args[0]), line)
+        count = fold.count(size.args[0])
+        value = Expr("array", (value,) * count, line) if count else Empty("array", (), line, further=_sizes(value))
     return value
+
+
+def _sizes(value: Expr) -> tuple[int, ...]:
+    if value.kind != "array":
+        return ()
+    inner = _sizes(value.args[0]) if value.args else value.further if isinstance(value, Empty) else ()
+    return (len(value.args), *inner)
 
 
 def _line(args: tuple[Expr, ...], line: int) -> Expr:
@@ -101,10 +111,7 @@ def size(items: Expr, dimension: float | None, line: int) -> Expr:
     Raises:
         Unfit: there is no such dimension.
     """
-    numbers: list[Expr] = []
-    while items.kind == "array":
-        numbers.append(fold.number(len(items.args), line))
-        items = items.args[0] if items.args else fold.number(0)
+    numbers = [fold.number(count, line) for count in _sizes(items)]
     if dimension is None:
         return Expr("array", tuple(numbers), line)
     if not 1 <= dimension <= len(numbers) or dimension != int(dimension):
@@ -130,46 +137,71 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
         if len(given) != 1:
             raise fold.Unfit(f"Integer(…) has 1 argument, not {len(given)}")
         return fold.numbered(given[0])
+    if isinstance(text, ClassText) and is_external_object(text) and "constructor" in text.classes:
+        text = text.classes["constructor"]
     if not isinstance(text, ClassText) or text.kind not in ("function", "record"):
         raise refused(f"the function {name}", resolver.text, line, "Own functions with an algorithm are read.")
     if text.kind == "record":
-        raise refused(f"the record {name}(…) as a value", resolver.text, line)
+        return _record(resolver, text, given, named)
     if resolver.depth > _DEEPEST:
         raise refused(f"{name}, which calls itself,", resolver.text, line)
     result = _Call(resolver, text).result(given, named, line)
-    is_constant = result.kind in (*fold.KNOWN, "array")
+    if result.kind == "tuple":
+        return Expr("tuple", tuple(_silent(item, line) for item in result.args), line)
+    return _silent(result, line)
+
+
+def _record(resolver: Resolver, text: ClassText, given: tuple[Expr, ...], named: Mapping[str, Expr]) -> Expr:
+    """Return a record with values; those that are left out have their defaults."""
+    inside = Instance(resolver.classes, text, Given())
+    values = {**dict(zip(inside.members, given, strict=False)), **named}
+    unknown = [key for key in values if key not in inside.members]
+    if unknown or len(given) > len(inside.members):
+        raise fold.Unfit(f"{text.name} has no '{unknown[0]}'" if unknown else f"{text.name} has fewer values")
+    every = (values[key] if key in values else value_of(inside, key, text, text.line) for key in inside.members)
+    return Expr("record", (tuple(inside.members), *every), text.line)
+
+
+def _silent(result: Expr, line: int) -> Expr:
+    """Return what a function gives: its relations make no events."""
+    is_constant = result.kind in (*fold.KNOWN, "array", "object", "curve", "record")
     return result if is_constant else Expr("call", ("noEvent", (result,), ()), line)
 
 
-class _Call:
+class _Call(Algorithm):
     def __init__(self, resolver: Resolver, text: ClassText) -> None:
-        self.resolver, self.text = resolver, text
+        super().__init__(resolver.classes, text)
+        self.resolver = resolver
         self.inside = Instance(resolver.classes, text, Given())
         self.declared = {name: member.declaration for name, member in self.inside.members.items()}
-        self.local: dict[str, Expr] = {}
 
     def result(self, given: tuple[Expr, ...], named: Mapping[str, Expr], line: int) -> Expr:
         inputs = [name for name, d in self.declared.items() if "input" in d.prefixes]
         outputs = [name for name, d in self.declared.items() if "output" in d.prefixes]
-        if len(outputs) != 1:
-            raise refused(f"{self.text.name}, a function with {len(outputs)} results,", self.text, self.text.line)
+        native = NATIVE.get(self.text.external) or NATIVE.get(self.text.path)
+        if self.text.external and native is None:
+            raise refused(f"the function {self.text.name}, which is written in another language,", self.text, line)
         positional = dict(zip(inputs, given, strict=False))
         if len(given) > len(inputs) or any(name not in inputs or name in positional for name in named):
             raise refused(f"these arguments of {self.text.name}", self.resolver.text, line)
         taken = {**positional, **named}
+        if native is not None:
+            self.local.update(taken)
+            values = {name: taken[name] if name in taken else self._start(name, line) for name in inputs}
+            return native(self.resolver.classes, values, line)
         # A function of numbers is applied to each element of an array.
         scalar = [name for name in taken if not self.declared[name].dimensions and taken[name].kind == "array"]
         if not scalar:
-            return self._one(taken, outputs[0], line)
+            return self._one(taken, outputs, line)
 
         def of(values: tuple[Expr, ...]) -> Expr:
             return _Call(self.resolver, self.text)._one(
-                {**taken, **dict(zip(scalar, values, strict=True))}, outputs[0], line
+                {**taken, **dict(zip(scalar, values, strict=True))}, outputs[:1], line
             )
 
         return fold.each(self.text.name, tuple(taken[name] for name in scalar), line, of)
 
-    def _one(self, taken: dict[str, Expr], output: str, line: int) -> Expr:
+    def _one(self, taken: dict[str, Expr], outputs: list[str], line: int) -> Expr:
         self.local.update(taken)
         for name in taken:
             self._check(name)
@@ -177,12 +209,15 @@ class _Call:
             if name not in self.local:
                 self.local[name] = self._start(name, line)
         outer_text = self.text
-        for statement, text in self.inside.algorithm:
+        texts = {id(text): text for _, text in self.inside.algorithm}
+        for text in texts.values():
             self.text = text
-            self.run([statement])
+            self.run([statement for statement, owner in self.inside.algorithm if owner is text])
         self.text = outer_text
-        self._check(output)
-        return self.local[output]
+        for output in outputs:
+            self._check(output)
+        results = tuple(self.local[output] for output in outputs)
+        return results[0] if len(results) == 1 else Expr("tuple", results, line)
 
     def _check(self, name: str) -> None:
         """Refuse a value whose sizes or type are not those declared, as far as they are known."""
@@ -194,7 +229,9 @@ class _Call:
                 raise fold.Unfit(f"{label} is an array")
             if size.kind == "number" and size.args[0] != len(value.args):
                 raise fold.Unfit(f"{label} has {size.args[0]:g} elements, not {len(value.args)}")
-            value = value.args[0] if value.args else fold.number(0)
+            if not value.args:
+                break
+            value = value.args[0]
         basic = basic_type(self.inside, self.inside.members[name])
         wrong = misfit(self.local[name], basic) if basic is not None else ""
         if wrong:
@@ -213,107 +250,3 @@ class _Call:
     def here(self, text: ClassText | None = None) -> Resolver:
         kind = type(self.resolver)
         return kind(None, text or self.text, self.local, classes=self.resolver.classes, depth=self.resolver.depth + 1)
-
-    def run(self, statements: list[Statement]) -> None:
-        for statement in statements:
-            self.resolver.classes.spend(5, self.text, statement.line)
-            if statement.kind == ":=":
-                self.assign(statement.parts[0], self.here()(statement.parts[1]))
-            elif statement.kind == "if":
-                self.branch(list(statement.parts), statement.line)
-            elif statement.kind == "for":
-                self.loop(list(statement.parts[0]), statement.parts[1])
-            elif statement.kind == "while":
-                while self.known_to_hold(statement):
-                    self.resolver.classes.spend(5, self.text, statement.line)
-                    self.run(statement.parts[1])
-            elif statement.kind == "call" and statement.parts[0].args[0] == "assert":
-                self.insist(statement)
-            elif statement.kind != "call" or statement.parts[0].args[0] != "Modelica.Utilities.Streams.print":
-                raise refused(f"'{statement.kind}' in a function", self.text, statement.line)
-
-    def known_to_hold(self, loop: Statement) -> bool:
-        """Whether a loop goes on; that must be known when the text is read."""
-        holds = self.here()(loop.parts[0])
-        if holds.kind != "boolean":
-            raise refused("a 'while' whose end only a run knows", self.text, loop.line)
-        return holds.args[0]
-
-    def insist(self, statement: Statement) -> None:
-        """Refuse what an assertion excludes; what only a run knows is not checked."""
-        given = statement.parts[0].args[1]
-        holds = self.here()(given[0]) if given else None
-        if holds is not None and holds.kind == "boolean" and not holds.args[0]:
-            said = given[1].args[0] if len(given) > 1 and given[1].kind == "string" else "no reason is given"
-            raise fold.Unfit(f"{self.text.name} refuses its arguments: {said}")
-
-    def assign(self, target: Expr, value: Expr) -> None:
-        if target.kind != "name" or len(target.args) != 1 or target.args[0][0] not in self.declared:
-            raise refused("this target of an assignment", self.text, target.line)
-        name, subscripts = target.args[0]
-        if "input" in self.declared[name].prefixes:
-            raise ModelicaTextError(f"{name} is an input and cannot be assigned.", where=self.text.place(target.line))
-        places, whole = list[int](), self.local[name]
-        for dimension, subscript in enumerate(subscripts):
-            open_size = [size.kind for size in self.declared[name].dimensions[dimension : dimension + 1]] == ["all"]
-            places.append(self.place(whole, subscript, open_size=open_size))
-            whole = whole.args[places[-1]] if places[-1] < len(whole.args) else fold.number(0)
-        self.local[name] = _replaced(self.local[name], places, value)
-
-    def place(self, whole: Expr, subscript: Expr, *, open_size: bool) -> int:
-        """Return the place of an element, from 0; an array of open size may grow."""
-        if subscript.kind in ("all", "range", "array"):
-            raise refused("an assignment to several elements of an array", self.text, subscript.line)
-        if whole.kind != "array":
-            raise ModelicaTextError("What is no array has no subscript.", where=self.text.place(subscript.line))
-        position, size = self.here().number(subscript), len(whole.args)
-        if position != int(position) or position < 1 or (position > size and not open_size):
-            raise ModelicaTextError(
-                f"The index {position:g} is not one of 1 to {size}.", where=self.text.place(subscript.line)
-            )
-        return int(position) - 1
-
-    def branch(self, branches: list[tuple[Expr | None, list[Statement]]], line: int) -> None:
-        """Run the branch that is taken; where that is not known, all of them."""
-        if not branches:
-            return
-        condition, statements = branches[0]
-        holds = Expr("boolean", (True,)) if condition is None else self.here().condition(condition, "if", line)
-        if holds.kind == "boolean":
-            if holds.args[0]:
-                self.run(statements)
-            else:
-                self.branch(branches[1:], line)
-            return
-        before = dict(self.local)
-        self.run(statements)
-        taken, self.local = self.local, before
-        self.branch(branches[1:], line)
-        for name, other in self.local.items():
-            if taken[name] != other:
-                self.local[name] = fold.choice([holds, taken[name]], other, line)
-
-    def loop(self, iterators: list[tuple[str, Expr | None]], statements: list[Statement]) -> None:
-        (name, over), rest = iterators[0], iterators[1:]
-        if over is None:
-            raise refused("an iterator without a range", self.text, self.text.line)
-        hidden = self.local.get(name)
-        for value in self.here().array(over):
-            self.local[name] = value
-            if rest:
-                self.loop(rest, statements)
-            else:
-                self.run(statements)
-        self.local.pop(name, None)
-        if hidden is not None:  # a variable of the same name
-            self.local[name] = hidden
-
-
-def _replaced(whole: Expr, places: list[int], value: Expr) -> Expr:
-    if not places:
-        return value
-    items = list(whole.args)
-    while len(items) <= places[0]:  # an output of open size grows
-        items.append(fold.number(0))
-    items[places[0]] = _replaced(items[places[0]], places[1:], value)
-    return Expr("array", tuple(items), whole.line)

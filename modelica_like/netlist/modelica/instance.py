@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from modelica_like.errors import ModelicaTextError, UnknownName, did_you_mean
+from modelica_like.errors import ModelicaTextError, Source, UnknownName, did_you_mean
 from modelica_like.netlist.modelica.classes import Classes, Found
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.tree import (
@@ -18,6 +18,7 @@ from modelica_like.netlist.modelica.tree import (
 )
 
 _DEEPEST = 40
+_NO_DECLARATION = Declaration(frozenset(), "", "", (), Modification(), None, "", 0)
 
 
 @dataclass(slots=True)
@@ -122,6 +123,13 @@ class Instance:
         given: modifications from outside.
         owner: instance it is a part of.
         name: in its owner.
+
+    Attributes:
+        members: by name, those of bases first.
+        adopted: equations of parts that use what is in this instance; `adopted_connections` likewise.
+        lent: own discrete variables whose equations stand in an instance above.
+        driving: protected signals that drive parts.
+        balance: equations of continuous variables that are lent, less those that are adopted.
     """
 
     def __init__(
@@ -134,6 +142,12 @@ class Instance:
         self.algorithm: list[tuple[Statement, ClassText]] = []
         self.folded: set[str] = set()
         self.free: dict[str, str] = {}
+        self.values: dict[str, Expr] = {}
+        self.adopted: list[tuple[Expr, Expr, Source]] = []
+        self.adopted_connections: list[tuple[Expr, Expr, Source]] = []
+        self.lent: set[str] = set()
+        self.balance = 0
+        self.driving: set[str] = set()
         self._replaced = {name: entry for name, entry in given.inner.items() if isinstance(entry.redeclared, ClassText)}
         self._demand(given, self._collect(text, given, 0), text)
 
@@ -148,11 +162,18 @@ class Instance:
         head, _, rest = name.partition(".")
         replaced = self._replaced.get(head)
         if replaced is not None and isinstance(replaced.redeclared, ClassText) and not rest:
-            new, scope = replaced.redeclared, replaced.scope
-            assert scope is not None
-            new.owner = new.owner or scope[1]
-            return new
+            return replaced.redeclared
         return self.classes.find(name, text)
+
+    def inner(self, name: str) -> Instance | None:
+        """Return the instance above whose part an `outer` declaration means, None if there is none."""
+        level = self.owner
+        while (
+            level is not None
+            and "inner" not in getattr(level.members.get(name), "declaration", _NO_DECLARATION).prefixes
+        ):
+            level = level.owner
+        return level
 
     def scope_of(self, text: ClassText) -> Instance:
         """Return the instance whose names a short class uses: that of the redeclaration, or this one."""
@@ -209,14 +230,13 @@ class Instance:
         if isinstance(base, Known):
             what = f"{text.name} extends {base.path}, for which a component of its own stands here"
             raise refused(what, text, clause.line, "Write it as a part, and connect its ends.")
-        if ".Icons." not in f".{clause.base}" and not clause.base.endswith(".Icon"):
+        if ".Icons." not in f".{clause.base}" and not clause.base.endswith((".Icon", "ExternalObject")):
             raise unknown_class(clause.base, text, clause.line)
         return set()
 
     def _declare(self, declaration: Declaration, text: ClassText, outer: Given) -> None:
-        for word in ("inner", "outer", "stream"):
-            if word in declaration.prefixes:
-                raise refused(f"'{word}' before {declaration.name}", text, declaration.line)
+        if "stream" in declaration.prefixes:
+            raise refused(f"'stream' before {declaration.name}", text, declaration.line)
         entered = given(declaration.modification, (self, text), declaration.line)
         entered.final = "final" in declaration.prefixes
         bound = declaration.constrained

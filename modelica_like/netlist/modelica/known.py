@@ -118,7 +118,8 @@ class _Part:
                 record = record_of(entry.scope[0], entry.value)
                 if record is None:
                     raise refused(f"this value for {self.name}.{name}", entry.scope[1], entry.value.line)
-                for key in record.members:
+                known = set(self.known.names.values())
+                for key in (key for key in record.members if f"{name}.{key}" in known):
                     path = Expr("name", (*entry.value.args, (key, ())), entry.value.line)
                     yield f"{name}.{key}", Given(path, entry.scope, line=entry.line)
 

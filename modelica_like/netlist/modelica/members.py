@@ -77,12 +77,21 @@ def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
     """
     member = owner.members[name]
     given = member.given
-    if given.value is None and "start" in given.inner:
+    free = member.declaration.dimensions and known_false(given.inner.get("fixed"))
+    if given.value is None and "start" in given.inner and not free:
         given = given.inner["start"]
     if given.value is None or given.scope is None:
+        value = _from_the_start(owner, name) if member.declaration.dimensions and name not in owner.folded else None
+        if value is not None:
+            owner.values[name] = value
+            return value
+        if member.declaration.dimensions and 0 in sizes(owner, member):
+            return Expr("array", ())
         raise ModelicaTextError(
             f"{name} has no value.", where=[text.place(line), member.text.place(member.declaration.line)]
         )
+    if name in owner.values:
+        return owner.values[name]
     if name in owner.folded:
         raise ModelicaTextError(f"{name} depends on itself.", where=member.text.place(member.declaration.line))
     owner.folded.add(name)
@@ -90,8 +99,30 @@ def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
         value = resolve.Resolver(*given.scope, numeric=True)(given.value)
     finally:
         owner.folded.remove(name)
+    owner.values[name] = value  # its size may be that of the value
     check_value(owner, member, value)
     return value
+
+
+def _from_the_start(owner: Instance, name: str) -> Expr | None:
+    """Return the value of an array that initial equations of known numbers give, None if there is none."""
+    pending = list(owner.initial_equations)
+    for statement, text in pending:
+        resolver = resolve.Resolver(owner, text, numeric=True)
+        if statement.kind == "if":
+            for condition, body in statement.parts:
+                holds = Expr("boolean", (True,)) if condition is None else resolver(condition)
+                if holds.kind == "boolean" and holds.args[0]:
+                    pending += [(inner, text) for inner in body]
+                    break
+        elif statement.kind == "=":
+            left = statement.parts[0]
+            targets = left.args if left.kind == "tuple" else (left,)
+            places = [k for k, target in enumerate(targets) if target.path == name and not target.args[0][1]]
+            if places:
+                value = resolver(statement.parts[1])
+                return value.args[places[0]] if value.kind == "tuple" else value
+    return None
 
 
 def check_value(owner: Instance, member: Member, value: Expr) -> None:
@@ -140,6 +171,13 @@ def _shape(value: Expr) -> tuple[int, ...] | None:
     inner = {_shape(item) for item in value.args}
     row = inner.pop() if inner else ()
     return None if inner or row is None else (len(value.args), *row)
+
+
+def known_false(given: Given | None) -> bool:
+    """Tell whether an attribute is given the value false."""
+    if given is None or given.value is None or given.scope is None:
+        return False
+    return resolve.Resolver(*given.scope, numeric=True)(given.value).args == (False,)
 
 
 def undetermined(owner: Instance, formula: Expr) -> str:
@@ -262,6 +300,8 @@ def _instance(owner: Instance, member: Member, text: ClassText, name: str, given
             if instance is None:
                 raise unknown_name(f"{value.path} is not a record.", inside, value.line)
             return instance
+        else:
+            raise refused(f"this value for {name}, a record,", inside, value.line)
     return Instance(owner.classes, text, given, owner, name)
 
 

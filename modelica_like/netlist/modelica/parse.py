@@ -51,6 +51,9 @@ def parse_expression(text: str) -> Expr:
 
 
 class _Parser(Expressions):
+    current: ClassText | None = None
+    """The class whose text is read."""
+
     def stored(self) -> list[ClassText]:
         within = ""
         if self.take("within"):
@@ -89,14 +92,20 @@ class _Parser(Expressions):
         class_text = ClassText(
             name, kind, line, self.file, owner, within, partial, unsupported=unsupported, lines=self.lines
         )
+        around, self.current = self.current, class_text
         if self.take("="):
             self._short(class_text)
             self.depth -= 1
+            self.current = around
             return class_text
         if self.kind == "(":
             self.modification()
         class_text.description = self.strings()
         self._composition(class_text)
+        bases = [element for element in class_text.elements if isinstance(element, Extends)]
+        if kind == "type" and bases:  # the long form of `type A = B`
+            class_text.short, class_text.elements = bases[0], []
+        self.current = around
         self.need("end")
         if self.text != name:
             self.refuse(f"{kind} {name} of line {line} ends with 'end {self.text}'.", self.line)
@@ -113,15 +122,20 @@ class _Parser(Expressions):
                 self.strings()
                 self.annotation(None)
                 self.take(",")
+            if self.take(":"):
+                class_text.unsupported.append(("an enumeration that is open", self.line))
             class_text.literals = tuple(literals)
             self.need(")")
         else:
             while word := self.take("input", "output", "flow"):
                 class_text.prefixes |= {word}
-            line, base = self.line, self.dotted()
-            if self.kind == "[":
-                class_text.unsupported.append(("a short class definition of an array", line))
-                self.subscripts()
+            line = self.line
+            if self.take("der"):  # the derivative of a function by some of its arguments
+                class_text.unsupported.append(("a function that is a derivative of another", line))
+                self._given()
+                return
+            base = self.dotted()
+            class_text.dimensions = self.subscripts() if self.kind == "[" else ()
             class_text.short = Extends(base, self.modification(), line)
         class_text.description = self.strings()
         self.annotation(class_text)
@@ -138,17 +152,16 @@ class _Parser(Expressions):
             elif self.kind in ("initial", "equation", "algorithm"):
                 initial = bool(self.take("initial"))
                 if self.take("algorithm"):
-                    if class_text.kind != "function":
-                        class_text.unsupported.append(("an algorithm outside a function", line))
-                    class_text.algorithm += self.statements()
+                    section = Statement("algorithm", (self.statements(),), line)
+                    if class_text.kind == "function":
+                        class_text.algorithm += section.parts[0]
+                    else:
+                        (class_text.initial_equations if initial else class_text.equations).append(section)
                 else:
                     self.need("equation")
                     (class_text.initial_equations if initial else class_text.equations).extend(self.statements())
             elif self.take("external"):
-                class_text.unsupported.append(("external functions", line))
-                while self.kind not in (";", "end of file"):
-                    self.at += 1
-                self.need(";")
+                self._external(class_text, line)
             elif self.kind == "end of file":
                 self.refuse(
                     f"{class_text.kind} {class_text.name} of line {class_text.line} has no 'end {class_text.name};'.",
@@ -157,6 +170,17 @@ class _Parser(Expressions):
             else:
                 self._element(class_text, hidden)
                 self.need(";")
+
+    def _external(self, class_text: ClassText, line: int) -> None:
+        self.take("string")
+        left = self.simple() if self.kind == "name" else Expr("all", (), line)
+        right = self.expression() if self.take("=") else left
+        class_text.external = right.args[0] if right.kind == "call" else class_text.name
+        self.annotation(None)
+        self.need(";")
+        if self.kind == "annotation":
+            self.annotation(class_text)
+            self.need(";")
 
     def _element(self, class_text: ClassText, hidden: bool) -> None:
         line = self.line
@@ -270,7 +294,7 @@ class _Parser(Expressions):
             argument = Argument(name, self.modification(), line, each, None, final)
             self.strings()
             return argument
-        redeclared = self._element_class(None) if self.is_class() else self.declarations(single=True)[0]
+        redeclared = self._element_class(self.current) if self.is_class() else self.declarations(single=True)[0]
         return Argument(redeclared.name, Modification(), line, each, redeclared, final)
 
     def annotation(self, class_text: ClassText | None) -> None:

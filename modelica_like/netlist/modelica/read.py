@@ -7,7 +7,7 @@ from pathlib import Path
 from modelica_like.errors import ModelicaTextError
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.build import build_component
-from modelica_like.netlist.modelica.classes import Classes
+from modelica_like.netlist.modelica.classes import Classes, given_libraries
 from modelica_like.netlist.modelica.instance import Given, Instance
 from modelica_like.netlist.modelica.values import Notes
 from modelica_like.netlist.modelica.written import Written
@@ -27,9 +27,15 @@ def load_modelica(path: str | Path) -> Written:
     return read_modelica(Path(f"{file}.mo"), name)[0] if dot else read_modelica(Path(path))[0]
 
 
-def read_modelica(path: Path, name: str = "") -> tuple[Written, list[str]]:
-    """Read a model, and what its reader should know; see `load_modelica`."""
-    classes = Classes(path)
+def read_modelica(path: Path, name: str = "", *, table: bool = True) -> tuple[Written, list[str]]:
+    """Read a model, and what its reader should know; see `load_modelica`.
+
+    Args:
+        path: of the text.
+        name: of the class.
+        table: whether components stand for classes of the standard library; without, its own text is needed.
+    """
+    classes = Classes(path, table=table)
     text = classes.chosen(name)
     notes = Notes()
     try:
@@ -48,6 +54,8 @@ def read_modelica(path: Path, name: str = "") -> tuple[Written, list[str]]:
         {"until": f"{text.experiment['StopTime']:g} s"} if "StopTime" in text.experiment else {}
     )
     inside(component).simulate, inside(component).display = settings, notes.display
+    if given := given_libraries():
+        inside(component).libraries = {"libraries": [str(place.resolve()) for place in given]}
     for part in component.walk():
         if isinstance(part, Written):
             inside(part).origin = f"{path.resolve()}:{inside(part).text}"

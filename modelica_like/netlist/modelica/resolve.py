@@ -11,6 +11,7 @@ from modelica_like.netlist.modelica import fold, members
 from modelica_like.netlist.modelica.classes import Classes
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
+from modelica_like.netlist.modelica.lifting import way
 from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Import
 from modelica_like.netlist.modelica.types import Basic, basic_type
 
@@ -67,10 +68,10 @@ class Resolver:
             ModelicaTextError: it uses what is not supported, or a name that does not exist.
         """
         kind, args, line = expression.kind, expression.args, expression.line
-        if kind in ("number", "string", "boolean", "literal", "all"):
+        if kind in ("number", "string", "boolean", "literal", "all", "object"):
             return expression
-        if kind == "name":
-            return self._name(expression)
+        if kind in ("name", "condition"):
+            return self._name(Expr("name", args, line))
         if kind == "call":
             return self._call(expression)
         if kind == "for":
@@ -91,6 +92,9 @@ class Resolver:
             start, step, stop = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
             return self._told(lambda: fold.row(start, step, stop, line), line)
         values = tuple(map(self, args))
+        if kind == "tuple":
+            return Expr(kind, values, line)
+        values = tuple(value.args[0] if value.kind == "tuple" else value for value in values)
         return self._told(lambda: fold.operation(kind, values, line), line)
 
     def condition(self, expression: Expr, word: str, line: int) -> Expr:
@@ -166,8 +170,13 @@ class Resolver:
 
     def _name(self, expression: Expr) -> Expr:
         head, subscripts = expression.args[0]
-        if head in self.local and len(expression.args) == 1:
-            return self.indexed(self.local[head], subscripts, expression.line)
+        if head in self.local:
+            value = self.indexed(self.local[head], subscripts, expression.line)
+            for name, subs in expression.args[1:]:
+                if value.kind != "record" or name not in value.args[0]:
+                    raise members.unknown_name(f"{head} has no '{name}'.", self.text, expression.line)
+                value = self.indexed(value.args[1 + value.args[0].index(name)], subs, expression.line)
+            return value
         if head == "time" and len(expression.args) == 1:
             return Expr("name", (("time", ()),), expression.line)
         if self.instance is not None and head in self.instance.members:
@@ -216,6 +225,11 @@ class Resolver:
         """Resolve a path that begins with a member of an instance."""
         (name, subscripts), rest = parts[0], parts[1:]
         member = owner.members.get(name)
+        if member is not None and "outer" in member.declaration.prefixes:
+            inner = owner.inner(name)
+            if inner is None:
+                raise members.unknown_name(f"outer {name} has no inner {name} above it.", self.text, line)
+            return self._member(inner, way(self.instance, inner), parts, line)
         if member is None:
             hint = did_you_mean(name, owner.members) or "."
             raise members.unknown_name(f"{owner.path or owner.text.name} has no '{name}'{hint}", self.text, line)
@@ -235,6 +249,9 @@ class Resolver:
             return Expr("array", tuple(self._member(owner, before, item, line) for item in items), line)
         part = members.part_of(owner, member, chosen)
         path = f"{before}{name}[{chosen}]" if chosen else f"{before}{name}"
+        if not rest and isinstance(part, Instance) and part.text.kind == "record":
+            values = (self._member(part, f"{path}.", ((key, ()),), line) for key in part.members)
+            return Expr("record", (tuple(part.members), *values), line)
         if not rest:
             raise refused(f"{name}, a component, as a value", self.text, line)
         if isinstance(part, Instance):
@@ -317,15 +334,15 @@ class Resolver:
                         element.path if name in element.names else element.path.rpartition(".")[0]
                     )
                     return class_text if isinstance(class_text, ClassText) else None
-            level = level.owner
+            level = self.classes.around(level)
         return None
 
     def _around(self, name: str) -> ClassText | None:
-        level: ClassText | None = self.text if self.instance is None else self.text.owner
+        level = self.text if self.instance is None else self.classes.around(self.text)
         while level is not None:
             if any(isinstance(element, Declaration) and element.name == name for element in level.elements):
                 return level
-            level = level.owner
+            level = self.classes.around(level)
         return None
 
     def find(self, name: str) -> Any:

@@ -8,13 +8,16 @@ from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known
+from modelica_like.netlist.modelica.lifting import above, height, levels_between, outside, owner_above, renamed
 from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
 from modelica_like.netlist.modelica.resolve import Resolver
+from modelica_like.netlist.modelica.sections import Section
+from modelica_like.netlist.modelica.signals import Memories, inner_signals
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement, calls_in
-from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside, misfit
-from modelica_like.netlist.modelica.written import ASSERT, MEMORY, TERMINATE, Happening
-
-_INSTANTS = ("sample", "edge", "change", "initial", "terminal")
+from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside, is_signal
+from modelica_like.netlist.modelica.whens import Whens, as_condition, is_ending
+from modelica_like.netlist.modelica.wiring import Wire, groups
+from modelica_like.netlist.modelica.written import ASSERT, MEMORY, Happening
 
 
 @dataclass(frozen=True)
@@ -27,31 +30,30 @@ class Bound:
 
 
 @dataclass
-class Statements:
+class Statements(Whens):
     """What the text of one instance says.
 
     Args:
         instance: with its members.
+        initially: whether the statements are those of the start.
 
     Attributes:
         equations: sides and place.
         initial: the same, of the start.
         connections: two ends each, with the place.
-        happenings: whens and assertions.
-        assigned: names that only events change.
         memory: values of discrete variables before the start, from initial equations of `pre(…)`.
-        outputs: Boolean signals with an equation, and whether they are true for instants only.
+        wires: connections, gathered.
+        outputs: types of the signals that change at events, and whether they are true for instants only.
         bound: inputs of parts with an equation in the part's modification, by the names of signals that drive them.
     """
 
-    instance: Instance
+    initially: bool = False
     equations: list[tuple[Expr, Expr, Source]] = field(default_factory=list)
     initial: list[tuple[Expr, Expr, Source]] = field(default_factory=list)
     connections: list[tuple[Expr, Expr, Source]] = field(default_factory=list)
-    happenings: list[Happening] = field(default_factory=list)
-    assigned: set[str] = field(default_factory=set)
     memory: dict[str, Expr] = field(default_factory=dict)
-    outputs: dict[str, bool] = field(default_factory=dict)
+    wires: list[Wire] = field(default_factory=list[Wire])
+    outputs: dict[str, tuple[Basic, bool]] = field(default_factory=dict)
     bound: dict[str, Bound] = field(default_factory=dict[str, "Bound"])
 
     def read(self) -> None:
@@ -62,18 +64,34 @@ class Statements:
         """
         self._bindings()
         for happening, text in self.instance.equations:
-            self._statement(happening, text, {})
-        start = Statements(self.instance)
+            self.statement(happening, text, {})
+        inner = inner_signals(self.instance, groups(self.connections, self.instance))
+        self.wires = inner.wires
+        resolver = Resolver(self.instance, self.instance.text)
+        for left, right, source in inner.equal:
+            before = len(self.equations)
+            self.equate(resolver(left), resolver(right), self.instance.text, 0)
+            self.equations[before:] = [(one, other, source) for one, other, _ in self.equations[before:]]
+        start = Statements(self.instance, initially=True)
         for happening, text in self.instance.initial_equations:
-            start._statement(happening, text, {})
+            start.statement(happening, text, {})
         if start.connections or any(not h.text for h in start.happenings):
             happening, text = self.instance.initial_equations[0]
             raise refused("a connection or a 'when' among initial equations", text, happening.line)
         for left, right, source in start.equations:
-            if left.kind == "call" and left.args[0] == "pre":
+            if left.kind == right.kind == "number":  # of parameters that are known when the text is read
+                continue
+            if self._is_discrete(left):
+                self.memory[left.args[0][0]] = right
+            elif left.kind == "call" and left.args[0] == "pre":
                 self.memory[left.args[1][0].args[0][0]] = right
             else:
                 self.initial.append((left, right, source))
+        memories = Memories(self.instance, self.assigned)
+        others = [v for h in self.happenings for conditions, new in h.branches for v in (*conditions, *new.values())]
+        memories.read(self.equations, others, self.instance.text.place(self.instance.text.line))
+        self.equations, self.outputs = memories.equations, memories.of
+        self._lift()
         for left, right, source in self.equations:
             for call in (*calls_in(left), *calls_in(right)):
                 self._check_memory(call, source)
@@ -82,12 +100,42 @@ class Statements:
         for happening in self.happenings:
             for conditions, new in happening.branches:
                 demanded = (value.args[0] for name, value in new.items() if name.startswith(ASSERT))
-                numbers = [*conditions, *demanded, *(value for name, value in new.items() if not _is_ending(name))]
+                numbers = [*conditions, *demanded, *(value for name, value in new.items() if not is_ending(name))]
                 values += numbers
                 sources += [happening.source] * len(numbers)
         for value, source in zip(values, sources, strict=True):
             if not _is_numeric(value):
                 raise ModelicaTextError("A text, an array or a choice stands where a number belongs.", where=source)
+
+    def _lift(self) -> None:
+        """Give equations that use what is outside to the instance that has it all."""
+        kept: list[tuple[Expr, Expr, Source]] = []
+        for left, right, source in self.equations:
+            levels = max(height(left), height(right))
+            if not levels:
+                kept.append((left, right, source))
+                continue
+            target, path_there = owner_above(self.instance, levels), above(self.instance, levels)
+            target.adopted.append((renamed(left, path_there), renamed(right, path_there), source))
+            if self._is_discrete(left):
+                self.instance.lent.add(left.args[0][0])
+            else:
+                self.instance.balance += 1
+                target.balance -= 1
+        self.equations = kept
+
+    def _is_discrete(self, left: Expr) -> bool:
+        """Tell whether a side of an equation is a variable that changes at events only."""
+        if left.kind not in ("name", "condition"):
+            return False
+        path = left.args[0][0]
+        member = self.instance.members.get(path.removesuffix(MEMORY).partition("[")[0])
+        basic = basic_type(self.instance, member) if member is not None else None
+        if basic is None or member is None:
+            return False
+        if path.endswith(MEMORY) or path in self.assigned or "discrete" in basic.prefixes:
+            return True
+        return basic.kind != "Real" and not is_signal(self.instance, member, basic)
 
     def _check_memory(self, call: Expr, source: Source) -> None:
         """Refuse `pre` and `change` of a variable that changes all the time."""
@@ -112,7 +160,7 @@ class Statements:
         """Collect declarations `Real x = …`."""
         for name, member in self.instance.members.items():
             declared, basic = member.declaration, basic_type(self.instance, member)
-            if {"parameter", "constant"} & declared.prefixes:
+            if {"parameter", "constant", "outer"} & declared.prefixes or not exists(self.instance, member):
                 continue
             if basic is None:
                 self._part_bindings(name, member)
@@ -120,10 +168,8 @@ class Statements:
                 continue  # an equation of the part's owner
             elif member.given.value is not None and member.given.scope is not None:
                 scope, text = member.given.scope
-                if scope is not self.instance:
-                    raise refused(f"an equation for {name} in the modification of its component", text, declared.line)
-                left = Resolver(self.instance, text)(Expr("name", ((name, ()),), declared.line))
-                self._equate(left, Resolver(scope, text)(member.given.value), text, declared.line)
+                left = Resolver(self.instance, member.text)(Expr("name", ((name, ()),), declared.line))
+                self.equate(left, self._seen(member.given.value, scope, text), text, member.given.value.line)
 
     def _part_bindings(self, name: str, member: Member) -> None:
         """Collect `Flange_a flange(tau = …)` and `Own part(input = …)`: such values are equations."""
@@ -137,11 +183,15 @@ class Statements:
             for last, entry in (element(member.given, k) if k else member.given).inner.items():
                 if entry.value is None or entry.scope is None:
                     continue
-                if entry.scope[0] is not self.instance:
-                    what = f"an equation for {name}.{last} in the modification of its component"
-                    raise refused(what, entry.scope[1], entry.line)
                 path = Expr("name", ((f"{name}[{k}].{last}" if k else f"{name}.{last}", ()),), entry.line)
-                self._equate(path, Resolver(*entry.scope)(entry.value), entry.scope[1], entry.line)
+                self.equate(path, self._seen(entry.value, *entry.scope), entry.scope[1], entry.line)
+
+    def _seen(self, value: Expr, scope: Instance, text: ClassText) -> Expr:
+        """Return a value of a modification that an instance around this one gives, by names from here."""
+        levels = levels_between(self.instance, scope)
+        if levels is None:
+            raise refused("a value from an instance that is not around this one", text, value.line)
+        return outside(Resolver(scope, text)(value), levels)
 
     def _input_bindings(self, path: str, part: Instance) -> None:
         """Collect `Own part(input = …)`: a signal of this class has the value, and drives the input."""
@@ -154,13 +204,14 @@ class Statements:
             while signal in self.instance.members or signal in self.bound:
                 signal += "_"
             self.bound[signal] = Bound(f"{path}.{name}", basic, scope[1].place(given.line))
-            self._equate(Expr("name", ((signal, ()),), given.line), Resolver(*scope)(given), scope[1], given.line)
+            self.equate(Expr("name", ((signal, ()),), given.line), Resolver(*scope)(given), scope[1], given.line)
 
-    def _statement(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
+    def statement(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
+        """Read one equation."""
         resolver = Resolver(self.instance, text, local)
         self.instance.classes.spend(10, text, statement.line)
         if statement.kind == "=":
-            self._equate(resolver(statement.parts[0]), resolver(statement.parts[1]), text, statement.line)
+            self.equate(resolver(statement.parts[0]), resolver(statement.parts[1]), text, statement.line)
         elif statement.kind == "connect":
             left, right = (self._end(side, resolver) for side in statement.parts)
             self.connections.append((left, right, text.place(statement.line)))
@@ -169,11 +220,14 @@ class Statements:
         elif statement.kind == "if":
             self._branches(statement, text, local)
         elif statement.kind == "when":
-            self._when(statement, text, local)
+            self.read_when(statement, text, local)
+        elif statement.kind == "algorithm":
+            place = text.place(statement.line)
+            Section(self, text, place, initial=self.initially).equations(statement.parts[0])
         elif statement.kind == "call":
             if statement.parts[0].args[0] != "assert":
                 raise refused(f"{statement.parts[0].args[0]}(…) among equations", text, statement.parts[0].line)
-            demand = self._demanded(statement.parts[0], resolver, text)
+            demand = self.demanded(statement.parts[0], resolver, text)
             if demand is not None:
                 condition, words = demand
                 self.happenings.append(
@@ -207,7 +261,7 @@ class Statements:
                 self._loop(rest, body, text, inner)
             else:
                 for statement in body:
-                    self._statement(statement, text, inner)
+                    self.statement(statement, text, inner)
 
     def _branches(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
         """Take the branch that parameters decide; else make one equation of those at the same place in all branches."""
@@ -221,7 +275,7 @@ class Statements:
                 continue
             target = Statements(self.instance) if open_branches or holds.kind != "boolean" else self
             for inner in body:
-                target._statement(inner, text, local)
+                target.statement(inner, text, local)
             if target is self:
                 return
             if target.connections or target.happenings:
@@ -240,142 +294,50 @@ class Statements:
         for k in range(counts.pop()):
             rows = [(condition, *branch.equations[k]) for condition, branch in branches]
             left = rows[0][1]
-            if all(row[1].kind == "name" and _text(row[1]) == _text(left) for row in rows):
-                self.equations.append((left, _choice([(row[0], row[2]) for row in rows], line), rows[0][3]))
+            if all(
+                row[1].kind == left.kind and left.kind in ("name", "condition") and _text(row[1]) == _text(left)
+                for row in rows
+            ):
+                value = _choice([(row[0], row[2]) for row in rows], line)
+                self.equations.append((left, as_condition(value) if left.kind == "condition" else value, rows[0][3]))
                 continue
             zero = [(row[0], fold.operation("-", (row[1], row[2]), line)) for row in rows]
             self.equations.append((_choice(zero, line), fold.number(0, line), text.place(line)))
 
-    def _equate(self, left: Expr, right: Expr, text: ClassText, line: int) -> None:
-        if left.kind == "array" or right.kind == "array":
+    def equate(self, left: Expr, right: Expr, text: ClassText, line: int) -> None:
+        """Add an equation; of arrays and of several results element by element."""
+        right = right.args[0] if right.kind == "tuple" and left.kind != "tuple" else right
+        if left.kind == "tuple" == right.kind:
+            for part, result in zip(left.args, right.args, strict=False):
+                if part.kind != "all":
+                    self.equate(part, result, text, line)
+        elif left.kind == "array" or right.kind == "array":
             if left.kind != right.kind or len(left.args) != len(right.args):
                 raise ModelicaTextError("The sizes of both sides differ.", where=text.place(line))
             for argument, other in zip(left.args, right.args, strict=True):
-                self._equate(argument, other, text, line)
+                self.equate(argument, other, text, line)
         elif left.kind == "condition":
-            self._check_type(left, right, text, line)
-            right = _condition(right)
+            self.check_type(left, right, text, line)
+            right = as_condition(right)
             member = self.instance.members.get(left.args[0][0].partition("[")[0])
             if member is None:
                 raise refused(
                     f"An equation for {left.args[0][0]}, a Boolean of a part", text, line, "Connect a signal."
                 )
-            basic = basic_type(self.instance, member)
-            if basic is not None and basic.prefixes & {"input", "output"}:
-                path = left.args[0][0]
-                self.outputs[path] = any(call.args[0] in _INSTANTS for call in calls_in(right))
-                signal = Expr("if", (left, fold.number(1), fold.number(0)), line)
-                self.equations.append((Expr("name", left.args, line), signal, text.place(line)))
-                left = Expr("name", ((f"{path}{MEMORY}", ()),), line)
             self.equations.append((left, right, text.place(line)))
         else:
             if left.kind == "number" and right.kind == "name":
                 left, right = right, left
-            fitting = self._fitting(left, right, text, line)
+            fitting = self.fitting(left, right, text, line)
             if fold.is_condition(left) is not fold.is_condition(right):
                 what = "A condition is no number: write `if … then 1 else 0`."
                 raise ModelicaTextError(what, where=text.place(line))
             self.equations.append((left, fitting, text.place(line)))
 
-    def _check_type(self, left: Expr, right: Expr, text: ClassText, line: int) -> Basic | None:
-        """Return the type of an own variable; refuse a value of another one."""
-        name = left.args[0][0] if left.kind in ("name", "condition") and len(left.args) == 1 else ""
-        member = self.instance.members.get(name.partition("[")[0])
-        basic = basic_type(self.instance, member) if member is not None else None
-        wrong = misfit(right, basic) if basic is not None else ""
-        if wrong:
-            raise ModelicaTextError(f"{name} {wrong}.", where=text.place(line))
-        return basic
-
-    def _fitting(self, left: Expr, right: Expr, text: ClassText, line: int) -> Expr:
-        """Return a value that has the type of an own variable; those of an enumeration are numbers."""
-        target = left.args[1][0] if left.kind == "call" and left.args[0] == "pre" else left
-        basic = self._check_type(target, right, text, line)
-        return fold.numbered(right) if basic is not None and basic.kind == "enumeration" else right
-
-    # -- events ------------------------------------------------------------------------------------------------------
-
-    def _when(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
-        resolver, source = Resolver(self.instance, text, local), text.place(statement.line)
-        branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]] = []
-        assigned: set[str] = set()
-        for condition, body in statement.parts:
-            if condition is None:
-                raise refused("'else' of a 'when'", text, statement.line)
-            holds = resolver.condition(condition, "when", statement.line)
-            conditions = holds.args if holds.kind == "array" else (holds,)
-            if any(each.kind == "boolean" for each in conditions):
-                raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
-            values = self._changes(body, text, local)
-            calls = (s.parts[0] for s in body if s.kind == "call" and s.parts[0].args[0] == "reinit")
-            states = {state.args[0][0] for call in calls for state in fold.elements(resolver(call.args[1][0]))}
-            assigned |= {name for name in values if name not in states and not _is_ending(name)}
-            branches.append((conditions, values))
-        for name in assigned & self.assigned:
-            raise ModelicaTextError(f"Two whens determine {name}.", where=source)
-        self.assigned |= assigned
-        self.happenings.append(Happening(tuple(branches), source))
-
-    def _changes(self, body: list[Statement], text: ClassText, local: dict[str, Expr]) -> dict[str, Expr]:
-        """Return the new values of a branch of a when."""
-        resolver = Resolver(self.instance, text, local)
-        values: dict[str, Expr] = {}
-        for statement in body:
-            call = statement.parts[0] if statement.kind == "call" else None
-            if statement.kind == "=":
-                target, value = resolver(statement.parts[0]), resolver(statement.parts[1])
-                if target.kind not in ("name", "condition"):
-                    raise refused("a 'when' with an equation that is not solved for a variable", text, statement.line)
-                fitting = self._fitting(target, value, text, statement.line)
-                values[target.args[0][0]] = _condition(value) if target.kind == "condition" else fitting
-            elif call is not None and call.args[0] == "reinit" and len(call.args[1]) == 2:
-                targets, given = (fold.elements(resolver(side)) for side in call.args[1])
-                if len(targets) != len(given) or any(target.kind != "name" for target in targets):
-                    what = "reinit(…) needs states, and as many values."
-                    raise ModelicaTextError(what, where=text.place(statement.line))
-                values |= {target.args[0][0]: value for target, value in zip(targets, given, strict=True)}
-            elif call is not None and call.args[0] == "terminate":
-                values[TERMINATE] = Expr("string", (_words(call.args[1][0]),), statement.line)
-            elif call is not None and call.args[0] == "assert":
-                demand = self._demanded(call, resolver, text)
-                values |= {} if demand is None else {f"{ASSERT}{len(values)}": Expr("demand", demand, statement.line)}
-            else:
-                raise refused(f"'{statement.kind}' in a 'when'", text, statement.line)
-        return values
-
-    def _demanded(self, call: Expr, resolver: Resolver, text: ClassText) -> tuple[Expr, Expr] | None:
-        """Return the condition of an assertion and its words; None of a warning and of what always holds."""
-        _, given, named = call.args
-        level = given[2] if len(given) > 2 else dict(named).get("level")
-        if level is not None and not (level.kind == "name" and level.args[-1][0] == "error"):
-            return None
-        condition = resolver.condition(given[0], "assert", call.line)
-        words = _words(given[1]) if len(given) > 1 else "an assertion is broken"
-        if condition.kind != "boolean":
-            return condition, Expr("string", (words,), call.line)
-        if not condition.args[0]:
-            raise ModelicaTextError(f"An assertion is broken: {words}.", where=text.place(call.line))
-        return None
-
-
-def _is_ending(name: str) -> bool:
-    return name.startswith((TERMINATE, ASSERT))
-
-
-def _condition(node: Expr) -> Expr:
-    """Return a choice between conditions as one condition."""
-    if node.kind != "if":
-        return node
-    condition, value, *rest = node.args
-    other = _condition(rest[0] if len(rest) == 1 else Expr("if", tuple(rest), node.line))
-    taken = fold.operation("and", (condition, _condition(value)), node.line)
-    left = fold.operation("and", (fold.operation("not", (condition,), node.line), other), node.line)
-    return fold.operation("or", (taken, left), node.line)
-
 
 def _is_numeric(node: Expr) -> bool:
     inner = node.args[1] if node.kind == "call" else [argument for argument in node.args if isinstance(argument, Expr)]
-    return node.kind not in ("string", "array", "literal") and all(map(_is_numeric, inner))
+    return node.kind not in ("string", "array", "literal", "record") and all(map(_is_numeric, inner))
 
 
 def _choice(branches: list[tuple[Expr | None, Expr]], line: int) -> Expr:
@@ -390,10 +352,3 @@ def _text(node: Expr) -> str:
     if node.kind == "call":
         inner = (node.args[0], *(_text(argument) for argument in node.args[1]))
     return f"{node.kind}:{','.join(inner)}"
-
-
-def _words(node: Expr) -> str:
-    """Return the text of a message; numbers in it are left out."""
-    if node.kind == "string":
-        return node.args[0].replace("{", "(").replace("}", ")")
-    return "".join(_words(argument) for argument in node.args if isinstance(argument, Expr)) or "…"

@@ -59,6 +59,17 @@ class Expr:
         return ".".join(part[0] for part in self.args) if self.kind == "name" else ""
 
 
+@dataclass(frozen=True, slots=True)
+class Empty(Expr):
+    """An array without elements, whose further dimensions are known.
+
+    Attributes:
+        further: sizes of these.
+    """
+
+    further: tuple[int, ...] = field(default=(), kw_only=True)
+
+
 @dataclass(slots=True)
 class Modification:
     """What stands behind a name: `(arguments) = value`."""
@@ -145,6 +156,8 @@ class ClassText:
         prefixes: of a short definition, `connector In = input Real`.
         short: base and modification of a short definition, `model A = B(k = 1)`.
         constrained: modification behind `constrainedby`.
+        external: name of the function of another language that does the work.
+        dimensions: of a short definition of an array, `type Axis = Real[3]`.
         experiment: numbers of the annotation `experiment`, such as `StopTime`.
         file: it was read from.
         owner: enclosing class; at the outermost level None.
@@ -170,6 +183,8 @@ class ClassText:
     initial_equations: list[Statement] = field(default_factory=list)
     algorithm: list[Statement] = field(default_factory=list)
     experiment: dict[str, float] = field(default_factory=dict)
+    external: str = ""
+    dimensions: tuple[Expr, ...] = ()
     unsupported: list[tuple[str, int]] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
 

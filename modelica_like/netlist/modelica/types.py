@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from modelica_like.netlist.modelica import fold
-from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, unknown_class
-from modelica_like.netlist.modelica.tree import ClassText, Expr
+from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, refused, unknown_class
+from modelica_like.netlist.modelica.tree import ClassText, Expr, Extends
 
 SCALARS = ("Real", "Integer", "Boolean", "String")
 _FIT = {
-    "Real": ("number", "+", "-", "*", "/", "^", "neg"),
+    "Real": ("number", "+", "-", "*", "/", "^", "neg", "curve"),
     "Integer": ("number", "+", "-", "*", "/", "^", "neg"),
     "Boolean": (),
     "String": ("string",),
@@ -56,14 +56,23 @@ def basic_type(instance: Instance, member: Member) -> Basic | None:
     while isinstance(base, ClassText):
         if base.literals:
             return Basic("enumeration", attributes, prefixes, base.name)
+        if is_external_object(base):
+            return Basic("object", attributes, prefixes)
         if base.short is None:
             return None
+        if base.dimensions:
+            raise refused("a short class definition of an array", base, base.line)
         scope = base.owner or base
         attributes = attributes.over(given(base.short.modification, (instance, scope), base.line), declaration.name)
         prefixes = prefixes | base.prefixes
         base = instance.classes.find(base.short.base, scope)
     plain = isinstance(base, str) and base in (*SCALARS, "StateSelect")
     return Basic(str(base), attributes, prefixes) if plain else None
+
+
+def is_external_object(text: ClassText) -> bool:
+    """Tell whether a class is what functions of another language keep."""
+    return any(isinstance(base, Extends) and base.base == "ExternalObject" for base in text.elements)
 
 
 def is_bound_outside(instance: Instance, member: Member, basic: Basic | None) -> bool:
@@ -83,10 +92,13 @@ def is_bound_outside(instance: Instance, member: Member, basic: Basic | None) ->
 
 def is_signal(instance: Instance, member: Member, basic: Basic) -> bool:
     """Return whether a member is an input or output to connect: an input with an equation of its own class is none."""
+    connector = not {"input", "output"} & member.declaration.prefixes
+    if connector and "protected" in member.declaration.prefixes:
+        return member.declaration.name in instance.driving
     if "input" in basic.prefixes:
-        return member.given.value is None or is_bound_outside(instance, member, basic)
-    is_connector = not {"input", "output"} & member.declaration.prefixes
-    return "output" in basic.prefixes and (is_connector or member.text.kind == "block")
+        optional = member.declaration.condition is not None and connector and instance.owner is not None
+        return member.given.value is None or is_bound_outside(instance, member, basic) or optional
+    return "output" in basic.prefixes and (connector or member.text.kind == "block")
 
 
 def with_article(basic: Basic) -> str:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
+
+import casadi as ca
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Instance, refused
 from modelica_like.netlist.modelica.library import Known
-from modelica_like.netlist.modelica.members import part_of, sizes, unknown_name
+from modelica_like.netlist.modelica.members import exists, part_of, sizes, unknown_name
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import basic_type
 
@@ -35,6 +38,8 @@ def groups(connections: list[tuple[Expr, Expr, Source]], instance: Instance) -> 
     wires: list[Wire] = []
     for left, right, source in connections:
         for pair in _pairs(left, right, instance, source):
+            if "" in pair:
+                continue
             touched = [w for w in wires if set(pair) & set(w.ends)]
             wire = Wire([], touched[0].source if touched else source)
             for end in (*(end for t in touched for end in t.ends), *pair):
@@ -70,6 +75,8 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
     heads = [f"{name}{index}" for index in indices]
     if basic_type(instance, member) is not None or not rest:
         return heads
+    if not exists(instance, member):
+        return [""] * len(heads)
     inner = _inside(rest, instance, end.line)
     part = part_of(instance, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0)
     if isinstance(part, Known):
@@ -80,6 +87,8 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
         raise refused("a connection with the inside of a component", instance.text, end.line)
     last, subscripts = end.args[-1]
     outer = part.members.get(last)
+    if outer is not None and not exists(part, outer):
+        return [""] * len(heads)
     if outer is not None and (subscripts or len(heads) == 1):
         inner = [f"{last}{index}" for index in _indices(subscripts, sizes(part, outer), instance, end.line)]
     return [f"{head}.{name}" for head in heads for name in inner]
@@ -116,3 +125,22 @@ def _indices(subscripts: tuple[Expr, ...], shape: tuple[int, ...], instance: Ins
                 raise ModelicaTextError(what, where=instance.text.place(line))
         chosen.append([int(place) for place in places])
     return ["".join(f"[{k}]" for k in places) for places in product(*chosen)]
+
+
+def paths(node: Expr) -> Iterator[str]:
+    """Yield the paths of variables in a resolved expression."""
+    if node.kind in ("name", "condition"):
+        yield node.args[0][0]
+        return
+    inner = node.args[1] if node.kind == "call" else node.args
+    for one in inner:
+        if isinstance(one, Expr):
+            yield from paths(one)
+
+
+def rank(rows: list[tuple[list[str], Source]], columns: list[str]) -> int:
+    """Return how many columns rows with these names can determine, one each."""
+    place = {name: k for k, name in enumerate(columns)}
+    entries = [(k, place[name]) for k, (names, _) in enumerate(rows) for name in names if name in place]
+    lists = map(list, zip(*entries, strict=True)) if entries else ([], [])
+    return ca.sprank(ca.DM(ca.Sparsity.triplet(len(rows), len(columns), *lists)))

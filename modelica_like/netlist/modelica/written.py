@@ -44,6 +44,9 @@ from modelica_like.language.formula import Formula
 from modelica_like.language.inside import InsideAssembly
 from modelica_like.netlist.modelica.tree import Expr as Node
 
+MEMORY = "_condition"
+"""Behind the name of a signal that changes at events: the value itself, which has one before events."""
+
 
 @dataclass
 class Happening:
@@ -73,8 +76,6 @@ def _told_at(source: Source) -> Iterator[None]:
 TERMINATE, ASSERT = "terminate()", "assert()"
 """Among the new values of a `when`: it ends the run, with this text; and, followed by a number, where a condition is
 false then."""
-MEMORY = "_condition"
-"""Behind the name of a Boolean signal: the condition itself, which has a value before events."""
 
 
 @dataclass(eq=False)
@@ -159,7 +160,7 @@ class Written(Assembly):
         if path.startswith(ASSERT):
             holds, words = value.args
             return Ending(words.args[0], fails=True), where(self.symbolic(holds, events=None), 0.0, 1.0, events=None)
-        return self._symbol(path), self.symbolic(value, events=None)
+        return self._remembered(path), self.symbolic(value, events=None)
 
     def source_power(self) -> Expr | float:
         """Return minus the power that enters at own connectors, unless parts take it on."""
@@ -184,21 +185,29 @@ class Written(Assembly):
         if kind == "name":
             return self._symbol(args[0][0])
         if kind == "condition":
-            symbol = self._symbol(args[0][0])
-            if f"{symbol.name}{MEMORY}" in symbol.owner.fields:
-                symbol = symbol_of(symbol.owner, f"{symbol.name}{MEMORY}")
+            symbol = self._remembered(args[0][0])
             discrete = isinstance(symbol.owner.fields[symbol.name], Discrete)
             return symbol if discrete else ca.SX(symbol) > 0.5
+        if kind == "curve":
+            return args[0](*(self.symbolic(argument, events) for argument in args[1:]))
         if kind == "if":
             result = self.symbolic(args[-1], events)
             for condition, value in reversed(list(zip(args[:-1:2], args[1::2], strict=True))):
                 result = where(self.symbolic(condition, events), self.symbolic(value, events), result, events=events)
             return result
         if kind == "call":
+            if args[0] in ("pre", "edge", "change", "previous") and args[1][0].kind == "name":
+                return self._called(args[0], [self._remembered(args[1][0].args[0][0])], events)
             events = False if args[0] == "noEvent" else events
             return self._called(args[0], [self.symbolic(argument, events) for argument in args[1]], events)
         result = _OPERATIONS[kind](*(self.symbolic(argument, events) for argument in args))
         return silent(result) if events is False and kind in _RELATIONS else result
+
+    def _remembered(self, path: str) -> Any:
+        """Return the symbol of a variable; of a signal that changes at events that of its value itself."""
+        symbol = self._symbol(path)
+        kept = f"{symbol.name}{MEMORY}"
+        return symbol_of(symbol.owner, kept) if symbol.owner and kept in symbol.owner.fields else symbol
 
     def _called(self, name: str, values: list[Any], events: bool | None) -> Any:
         if name == "pre" and not (isinstance(values[0], Symbol) and is_a(values[0], Discrete)):
@@ -293,7 +302,7 @@ def _formula(node: Node, prefix: str) -> Formula | None:
     kind, args = node.kind, node.args
     if kind == "number":
         return Formula("number", (args[0],))
-    if kind == "name" and args[0][0] != "time":
+    if kind == "name" and args[0][0] != "time" and not args[0][0].startswith("^"):
         return Formula("name", (prefix + args[0][0],))
     if kind == "call" and args[0] in ("noEvent", "homotopy"):
         return _formula(args[1][0], prefix)

@@ -1,0 +1,242 @@
+"""Algorithms: their statements are run on expressions, so that a result is one expression."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from modelica_like.errors import ModelicaTextError
+from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.instance import refused
+from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Statement
+
+if TYPE_CHECKING:
+    from modelica_like.netlist.modelica.classes import Classes
+    from modelica_like.netlist.modelica.resolve import Resolver
+
+Branches = list[tuple[Expr | None, list[Statement]]]
+
+
+class Algorithm:
+    """Statements and what they know.
+
+    Args:
+        classes: finds classes.
+        text: class whose names the statements use.
+
+    Attributes:
+        declared: declarations by name.
+        local: values so far.
+        loops: how deep in loops the statements are.
+    """
+
+    def __init__(self, classes: Classes, text: ClassText) -> None:
+        self.classes, self.text = classes, text
+        self.declared: dict[str, Declaration] = {}
+        self.local: dict[str, Expr] = {}
+        self.loops = 0
+
+    def here(self, text: ClassText | None = None) -> Resolver:
+        """Return what resolves expressions with the values so far."""
+        raise NotImplementedError
+
+    def assigned(self, name: str) -> None:
+        """Note that a variable gets a value."""
+
+    def run(self, statements: list[Statement]) -> str:
+        """Run statements; what follows an `if` that may return goes on in its branches.
+
+        Returns:
+            `return` or `break` where one of these has ended them.
+        """
+        for k, statement in enumerate(statements):
+            self.classes.spend(5, self.text, statement.line)
+            if statement.kind == ":=":
+                self.assign(statement.parts[0], self.here()(statement.parts[1]))
+            elif statement.kind == "if":
+                if any(_leaves(body) for _, body in statement.parts):
+                    return self.branch(_followed(list(statement.parts), statements[k + 1 :]), statement.line)
+                self.branch(list(statement.parts), statement.line)
+            elif statement.kind == "for" and _returns(statement.parts[1]):
+                return self.run([*self.unrolled(*statement.parts), *statements[k + 1 :]])
+            elif statement.kind == "iterate":
+                self.local[statement.parts[0]] = statement.parts[1]
+            elif statement.kind in ("for", "while"):
+                self.loops += 1
+                loop = self.loop(*statement.parts) if statement.kind == "for" else self.repeat(statement)
+                self.loops -= 1
+                if loop == "return":
+                    return loop
+            elif statement.kind in ("return", "break"):
+                return statement.kind
+            else:
+                self.other(statement)
+        return ""
+
+    def repeat(self, statement: Statement) -> str:
+        """Run a `while`."""
+        while self.known_to_hold(statement):
+            self.classes.spend(5, self.text, statement.line)
+            if end := self.run(statement.parts[1]):
+                return end
+        return ""
+
+    def other(self, statement: Statement) -> None:
+        """Run an assertion; what is only printed is left out."""
+        name = statement.parts[0].args[0] if statement.kind == "call" else ""
+        if name == "assert":
+            self.insist(statement)
+        elif name and not name.endswith("Streams.print"):
+            self.here()(statement.parts[0])  # a function of assertions
+        elif not name:
+            raise refused(f"'{statement.kind}' in an algorithm", self.text, statement.line)
+
+    def known_to_hold(self, loop: Statement) -> bool:
+        """Whether a loop goes on; that must be known when the text is read."""
+        holds = self.here()(loop.parts[0])
+        if holds.kind != "boolean":
+            raise refused("a 'while' whose end only a run knows", self.text, loop.line)
+        return holds.args[0]
+
+    def insist(self, statement: Statement) -> None:
+        """Refuse what an assertion excludes; what only a run knows is not checked."""
+        given = statement.parts[0].args[1]
+        holds = self.here()(given[0]) if given else None
+        if holds is not None and holds.kind == "boolean" and not holds.args[0]:
+            said = given[1].args[0] if len(given) > 1 and given[1].kind == "string" else "no reason is given"
+            raise fold.Unfit(f"{self.text.name} refuses its arguments: {said}")
+
+    def assign(self, target: Expr, value: Expr) -> None:
+        """Give a variable, an element of an array or several results of a function their values."""
+        if target.kind == "tuple":
+            values = value.args if value.kind == "tuple" else (value,)
+            for part, result in zip(target.args, values, strict=False):
+                if part.kind != "all":
+                    self.assign(part, result)
+            return
+        value = value.args[0] if value.kind == "tuple" else value
+        if target.kind != "name" or len(target.args) != 1 or target.args[0][0] not in self.declared:
+            raise refused("this target of an assignment", self.text, target.line)
+        name, subscripts = target.args[0]
+        self.assigned(name)
+        if "input" in self.declared[name].prefixes:
+            raise ModelicaTextError(f"{name} is an input and cannot be assigned.", where=self.text.place(target.line))
+        places, whole = list[int](), self.local[name]
+        for dimension, subscript in enumerate(subscripts):
+            chosen = self._several(subscript, whole)
+            if chosen is not None:
+                self._assign_each(target, dimension, chosen, value)
+                return
+            open_size = [size.kind for size in self.declared[name].dimensions[dimension : dimension + 1]] == ["all"]
+            places.append(self.place(whole, subscript, open_size=open_size))
+            whole = whole.args[places[-1]] if places[-1] < len(whole.args) else fold.number(0)
+        self.local[name] = _replaced(self.local[name], places, value)
+
+    def _several(self, subscript: Expr, whole: Expr) -> tuple[Expr, ...] | None:
+        """Return the subscripts of a slice, None if it is a single element."""
+        if subscript.kind == "all":
+            return tuple(fold.number(k) for k in range(1, len(whole.args) + 1))
+        chosen = self.here().index(subscript, len(whole.args)) if subscript.kind in ("range", "array") else 0
+        return chosen.args if isinstance(chosen, Expr) else None
+
+    def _assign_each(self, target: Expr, dimension: int, chosen: tuple[Expr, ...], value: Expr) -> None:
+        (name, subscripts), items = target.args[0], value.args
+        if value.kind != "array" or len(items) != len(chosen):
+            raise fold.Unfit(f"{name} is given {len(items)} elements for {len(chosen)}")
+        for one, item in zip(chosen, items, strict=True):
+            at = (*subscripts[:dimension], one, *subscripts[dimension + 1 :])
+            self.assign(Expr("name", ((name, at),), target.line), item)
+
+    def place(self, whole: Expr, subscript: Expr, *, open_size: bool) -> int:
+        """Return the place of an element, from 0; an array of open size may grow."""
+        if whole.kind != "array":
+            raise ModelicaTextError("What is no array has no subscript.", where=self.text.place(subscript.line))
+        position, size = self.here().number(subscript), len(whole.args)
+        if position != int(position) or position < 1 or (position > size and not open_size):
+            raise ModelicaTextError(
+                f"The index {position:g} is not one of 1 to {size}.", where=self.text.place(subscript.line)
+            )
+        return int(position) - 1
+
+    def branch(self, branches: Branches, line: int) -> str:
+        """Run the branch that is taken; where that is not known, all of them."""
+        if not branches:
+            return ""
+        condition, statements = branches[0]
+        holds = Expr("boolean", (True,)) if condition is None else self.here().condition(condition, "if", line)
+        if holds.kind == "boolean":
+            return self.run(statements) if holds.args[0] else self.branch(branches[1:], line)
+        if self.loops and any(_leaves(body) for _, body in branches):
+            raise refused("a loop that ends where only a run knows", self.text, line)
+        before = dict(self.local)
+        self.run(statements)
+        taken, self.local = self.local, before
+        self.branch(branches[1:], line)
+        for name, other in self.local.items():
+            if name in taken and taken[name] != other:
+                self.local[name] = fold.choice([holds, taken[name]], other, line)
+        return ""
+
+    def unrolled(
+        self, iterators: tuple[tuple[str, Expr | None], ...], statements: list[Statement]
+    ) -> Iterator[Statement]:
+        """Yield the statements of a loop one after the other, because one of them may end the algorithm."""
+        (name, over), rest = iterators[0], iterators[1:]
+        if over is None or rest:
+            raise refused("a loop over several indices that ends the algorithm", self.text, self.text.line)
+        for value in self.here().array(over):
+            yield Statement("iterate", (name, value), value.line)
+            yield from statements
+
+    def loop(self, iterators: tuple[tuple[str, Expr | None], ...], statements: list[Statement]) -> str:
+        """Run a `for`."""
+        (name, over), rest = iterators[0], iterators[1:]
+        if over is None:
+            raise refused("an iterator without a range", self.text, self.text.line)
+        hidden, end = self.local.get(name), ""
+        for value in self.here().array(over):
+            self.local[name] = value
+            end = self.loop(rest, statements) if rest else self.run(statements)
+            if end:
+                break
+        self.local.pop(name, None)
+        if hidden is not None:  # a variable of the same name
+            self.local[name] = hidden
+        return end
+
+
+def _leaves(statements: list[Statement]) -> bool:
+    """Tell whether statements end the algorithm, or may."""
+    return any(
+        statement.kind in ("return", "break")
+        or (statement.kind == "if" and any(_leaves(body) for _, body in statement.parts))
+        for statement in statements
+    )
+
+
+def _followed(branches: Branches, rest: list[Statement]) -> Branches:
+    """Return branches that go on with the rest, but those that end the algorithm."""
+    if branches[-1][0] is not None:
+        branches = [*branches, (None, [])]
+    return [(condition, body if _ends(body) else [*body, *rest]) for condition, body in branches]
+
+
+def _returns(statements: list[Statement]) -> bool:
+    return any(
+        statement.kind == "return" or (statement.kind == "if" and any(_returns(body) for _, body in statement.parts))
+        for statement in statements
+    )
+
+
+def _ends(body: list[Statement]) -> bool:
+    return bool(body) and body[-1].kind in ("return", "break")
+
+
+def _replaced(whole: Expr, places: list[int], value: Expr) -> Expr:
+    if not places:
+        return value
+    items = list(whole.args)
+    while len(items) <= places[0]:  # an output of open size grows
+        items.append(fold.number(0))
+    items[places[0]] = _replaced(items[places[0]], places[1:], value)
+    return Expr("array", tuple(items), whole.line)

@@ -1,0 +1,146 @@
+"""Algorithm sections of models: each variable that they give a value gets one equation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from modelica_like.errors import Source
+from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.algorithms import Algorithm
+from modelica_like.netlist.modelica.instance import refused
+from modelica_like.netlist.modelica.members import named_array, sizes, value_of
+from modelica_like.netlist.modelica.resolve import Resolver
+from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
+from modelica_like.netlist.modelica.types import Basic, basic_type
+
+if TYPE_CHECKING:
+    from modelica_like.netlist.modelica.statements import Statements
+
+_CALLS = ("terminate", "reinit", "assert")
+
+
+class Section(Algorithm):
+    """One algorithm section.
+
+    Args:
+        statements: of the instance; they take the equations and the events.
+        text: class it stands in.
+        place: of the section.
+        initial: whether it is an initial one.
+    """
+
+    def __init__(self, statements: Statements, text: ClassText, place: Source, *, initial: bool = False) -> None:
+        super().__init__(statements.instance.classes, text)
+        self.statements, self.instance, self.place_of_section = statements, statements.instance, place
+        self.initial = initial
+        self.declared = {name: member.declaration for name, member in self.instance.members.items()}
+        self.changed: list[str] = []
+
+    def here(self, text: ClassText | None = None) -> Resolver:
+        """Return what resolves expressions with the values so far."""
+        return Resolver(self.instance, text or self.text, self.local)
+
+    def equations(self, body: list[Statement]) -> None:
+        """Give the variables of a section their equations.
+
+        Raises:
+            ModelicaTextError: something in it is not supported.
+        """
+        in_whens = {name for statement in _whens(body) for name in _targets(statement.parts)}
+        for name in _targets([(None, body)]):
+            if name not in self.declared:
+                raise refused(f"an assignment to {name}", self.text, body[0].line)
+            self.local[name] = self._before(name, discrete=name in in_whens or self.initial)
+        self.run(body)
+        for name in dict.fromkeys(self.changed):
+            variable = Resolver(self.instance, self.text)(Expr("name", ((name, ()),)))
+            self.statements.equate(variable, self.local[name], self.text, self.place_of_section.line)
+
+    def assigned(self, name: str) -> None:
+        """Note that a variable gets a value."""
+        self.changed.append(name)
+
+    def other(self, statement: Statement) -> None:
+        """Read an event."""
+        if statement.kind == "when":
+            self._when(statement)
+        elif statement.kind == "call" and statement.parts[0].args[0] == "assert":
+            self.statements.statement(statement, self.text, self.local)
+        else:
+            super().other(statement)
+
+    def _when(self, statement: Statement) -> None:
+        branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]] = []
+        for name in _targets(statement.parts):
+            if name not in self.local:  # another 'when' has given it a value
+                self.local[name] = self._before(name, discrete=True)
+        for condition, body in statement.parts:
+            holds = self.here().condition(condition, "when", statement.line)
+            before, names = dict(self.local), self.changed
+            self.changed = []
+            calls = [s for s in body if s.kind == "call" and s.parts[0].args[0] in _CALLS]
+            self.run([s for s in body if s not in calls])
+            values: dict[str, Expr] = {}
+            for name in dict.fromkeys(self.changed):
+                self.statements.fitted(name, self.local[name], values, self.text, statement.line)
+            values |= self.statements.changes(calls, self.text, self.local)
+            inside, self.changed, self.local = self.changed, names, before
+            if set(inside) & set(names):
+                what = f"{inside[0]}, which a 'when' and other statements give a value,"
+                raise refused(what, self.text, statement.line)
+            branches.append((holds.args if holds.kind == "array" else (holds,), values))
+        self.statements.happen(branches, self.text.place(statement.line))
+        for name in {name for _, values in branches for name in values}:
+            self.local.pop(name.partition("[")[0], None)  # from here on, it is what it is
+
+    def _before(self, name: str, *, discrete: bool) -> Expr:
+        """Return what a variable is when the section begins: its value before an event, or its start value."""
+        member = self.instance.members[name]
+        basic = basic_type(self.instance, member)
+        if basic is None:
+            raise refused(f"an assignment to {name}, which is no number,", self.text, member.declaration.line)
+        shape = sizes(self.instance, member)
+        if basic.kind != "Real" or discrete or "discrete" in basic.prefixes:
+            return _before_event(named_array(name, shape, basic.kind)) if not self.initial else _start(basic, shape)
+        if "start" in member.given.inner and member.given.value is None and not shape:
+            return value_of(self.instance, name, self.text, member.declaration.line)
+        return _start(basic, shape)
+
+
+def _start(basic: Basic, shape: tuple[int, ...]) -> Expr:
+    value = Expr("boolean", (False,)) if basic.kind == "Boolean" else fold.number(0)
+    for size in reversed(shape):
+        value = Expr("array", (value,) * size)
+    return value
+
+
+def _before_event(variable: Expr) -> Expr:
+    if variable.kind == "array":
+        return Expr("array", tuple(map(_before_event, variable.args)))
+    return fold.call("pre", (variable,), 0)
+
+
+def _whens(body: list[Statement]) -> Iterator[Statement]:
+    """Yield the whens of a section."""
+    for statement in body:
+        if statement.kind == "when":
+            yield statement
+        elif statement.kind == "if":
+            for _, inner in statement.parts:
+                yield from _whens(inner)
+        elif statement.kind in ("for", "while"):
+            yield from _whens(statement.parts[1])
+
+
+def _targets(branches: Iterable[tuple[Expr | None, list[Statement]]]) -> Iterator[str]:
+    """Yield the names that get values."""
+    for _, body in branches:
+        for statement in body:
+            if statement.kind == ":=":
+                left = statement.parts[0]
+                yield from (part.args[0][0] for part in (left.args if left.kind == "tuple" else (left,)) if part.args)
+            elif statement.kind in ("if", "when"):
+                yield from _targets(statement.parts)
+            elif statement.kind in ("for", "while"):
+                yield from _targets([(None, statement.parts[1])])

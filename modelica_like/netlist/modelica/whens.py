@@ -1,0 +1,151 @@
+"""Events of a text: whens and assertions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from modelica_like.errors import ModelicaTextError, Source
+from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.instance import Instance, refused
+from modelica_like.netlist.modelica.resolve import Resolver
+from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
+from modelica_like.netlist.modelica.types import Basic, basic_type, misfit
+from modelica_like.netlist.modelica.written import ASSERT, TERMINATE, Happening
+
+
+@dataclass
+class Whens:
+    """What happens in one instance.
+
+    Args:
+        instance: with its members.
+
+    Attributes:
+        happenings: whens and assertions.
+        assigned: names that only events change.
+        reset: states that events change.
+    """
+
+    instance: Instance
+    happenings: list[Happening] = field(default_factory=list, kw_only=True)
+    assigned: set[str] = field(default_factory=set, kw_only=True)
+    reset: set[str] = field(default_factory=set, kw_only=True)
+
+    def read_when(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
+        """Read a `when`."""
+        resolver, source = Resolver(self.instance, text, local), text.place(statement.line)
+        branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]] = []
+        for condition, body in statement.parts:
+            if condition is None:
+                raise refused("'else' of a 'when'", text, statement.line)
+            holds = resolver.condition(condition, "when", statement.line)
+            conditions = holds.args if holds.kind == "array" else (holds,)
+            if any(each.kind == "boolean" for each in conditions):
+                raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
+            branches.append((conditions, self.changes(body, text, local)))
+        self.happen(branches, source)
+
+    def happen(self, branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]], source: Source) -> None:
+        """Take a `when`: conditions and new values of its branches."""
+        every = {name for _, values in branches for name in values if not is_ending(name)}
+        assigned = every - self.reset
+        for name in assigned & self.assigned:
+            raise ModelicaTextError(f"Two whens determine {name}.", where=source)
+        self.assigned |= assigned
+        self.happenings.append(Happening(tuple(branches), source))
+
+    def fitted(self, name: str, value: Expr, values: dict[str, Expr], text: ClassText, line: int) -> None:
+        """Add the new value of a variable, of an array those of its elements, to others."""
+        target = Resolver(self.instance, text)(Expr("name", ((name, ()),), line))
+        for part, new in zip(fold.elements(target), fold.elements(value), strict=True):
+            fitting = self.fitting(part, new, text, line)
+            values[part.args[0][0]] = as_condition(new) if part.kind == "condition" else fitting
+
+    def changes(self, body: list[Statement], text: ClassText, local: dict[str, Expr]) -> dict[str, Expr]:
+        """Return the new values of a branch of a when."""
+        resolver = Resolver(self.instance, text, local)
+        values: dict[str, Expr] = {}
+        for statement in body:
+            call = statement.parts[0] if statement.kind == "call" else None
+            if statement.kind == "=" and statement.parts[0].kind == "tuple":
+                results = resolver(statement.parts[1])
+                for part, result in zip(statement.parts[0].args, results.args, strict=False):
+                    if part.kind != "all":
+                        self.fitted(part.path, result, values, text, statement.line)
+            elif statement.kind == "=":
+                target, value = resolver(statement.parts[0]), resolver(statement.parts[1])
+                if target.kind == "array" == value.kind and len(target.args) == len(value.args):
+                    self.fitted(statement.parts[0].path, value, values, text, statement.line)
+                    continue
+                if target.kind not in ("name", "condition"):
+                    raise refused("a 'when' with an equation that is not solved for a variable", text, statement.line)
+                fitting = self.fitting(target, value, text, statement.line)
+                values[target.args[0][0]] = as_condition(value) if target.kind == "condition" else fitting
+            elif call is not None and call.args[0] == "reinit" and len(call.args[1]) == 2:
+                targets, given = (fold.elements(resolver(side)) for side in call.args[1])
+                if len(targets) != len(given) or any(target.kind != "name" for target in targets):
+                    what = "reinit(…) needs states, and as many values."
+                    raise ModelicaTextError(what, where=text.place(statement.line))
+                values |= {target.args[0][0]: value for target, value in zip(targets, given, strict=True)}
+                self.reset |= {target.args[0][0] for target in targets}
+            elif call is not None and call.args[0] == "terminate":
+                values[TERMINATE] = Expr("string", (_words(call.args[1][0]),), statement.line)
+            elif call is not None and call.args[0] == "assert":
+                demand = self.demanded(call, resolver, text)
+                values |= {} if demand is None else {f"{ASSERT}{len(values)}": Expr("demand", demand, statement.line)}
+            else:
+                raise refused(f"'{statement.kind}' in a 'when'", text, statement.line)
+        return values
+
+    def demanded(self, call: Expr, resolver: Resolver, text: ClassText) -> tuple[Expr, Expr] | None:
+        """Return the condition of an assertion and its words; None of a warning and of what always holds."""
+        _, given, named = call.args
+        level = given[2] if len(given) > 2 else dict(named).get("level")
+        if level is not None and not (level.kind == "name" and level.args[-1][0] == "error"):
+            return None
+        condition = resolver.condition(given[0], "assert", call.line)
+        words = _words(given[1]) if len(given) > 1 else "an assertion is broken"
+        if condition.kind != "boolean":
+            return condition, Expr("string", (words,), call.line)
+        if not condition.args[0]:
+            raise ModelicaTextError(f"An assertion is broken: {words}.", where=text.place(call.line))
+        return None
+
+    def check_type(self, left: Expr, right: Expr, text: ClassText, line: int) -> Basic | None:
+        """Return the type of an own variable; refuse a value of another one."""
+        name = left.args[0][0] if left.kind in ("name", "condition") and len(left.args) == 1 else ""
+        member = self.instance.members.get(name.partition("[")[0])
+        basic = basic_type(self.instance, member) if member is not None else None
+        wrong = misfit(right, basic) if basic is not None else ""
+        if wrong:
+            raise ModelicaTextError(f"{name} {wrong}.", where=text.place(line))
+        return basic
+
+    def fitting(self, left: Expr, right: Expr, text: ClassText, line: int) -> Expr:
+        """Return a value that has the type of an own variable; those of an enumeration are numbers."""
+        target = left.args[1][0] if left.kind == "call" and left.args[0] == "pre" else left
+        basic = self.check_type(target, right, text, line)
+        return fold.numbered(right) if basic is not None and basic.kind == "enumeration" else right
+
+
+def is_ending(name: str) -> bool:
+    """Tell whether one of the new values of a `when` is the end of the run."""
+    return name.startswith((TERMINATE, ASSERT))
+
+
+def as_condition(node: Expr) -> Expr:
+    """Return a choice between conditions as one condition."""
+    if node.kind != "if":
+        return node
+    condition, value, *rest = node.args
+    other = as_condition(rest[0] if len(rest) == 1 else Expr("if", tuple(rest), node.line))
+    taken = fold.operation("and", (condition, as_condition(value)), node.line)
+    left = fold.operation("and", (fold.operation("not", (condition,), node.line), other), node.line)
+    return fold.operation("or", (taken, left), node.line)
+
+
+def _words(node: Expr) -> str:
+    """Return the text of a message; numbers in it are left out."""
+    if node.kind == "string":
+        return node.args[0].replace("{", "(").replace("}", ")")
+    return "".join(_words(argument) for argument in node.args if isinstance(argument, Expr)) or "…"
