@@ -1,0 +1,61 @@
+"""Examples of the standard library, run from its own text."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from typing import Any
+
+from library_references import HERE, LIBRARY, compare, read_reference, references
+
+from modelica_like import simulate
+from modelica_like.errors import ModelicaLikeError
+from modelica_like.netlist.modelica.read import read_modelica
+
+PACKAGES = (
+    "Modelica.Mechanics.Rotational", "Modelica.Mechanics.Translational", "ModelicaTest.Rotational",
+    "ModelicaTest.Translational", "Modelica.Thermal.HeatTransfer", "Modelica.Electrical.Analog",
+    "Modelica.Electrical.Machines.Examples.DCMachines", "Modelica.Electrical.Batteries", "Modelica.Blocks",
+    "Modelica.StateGraph", "ModelicaTest.Blocks", "ModelicaTest.Electrical.Analog", "ModelicaTest.Tables",
+)  # fmt: skip
+MISSING: dict[str, str] = tomllib.loads((HERE / "missing.toml").read_text(encoding="utf-8"))
+POINTS = 10_001
+"""Of a run: a tenth of the window of the tube is between two."""
+
+
+def package_of(name: str) -> str:
+    """Return the package of an example, empty if it is none of those that are read."""
+    return next((package for package in PACKAGES if name.startswith(f"{package}.")), "")
+
+
+def examples() -> list[str]:
+    """Return the examples of these packages that have a reference."""
+    return sorted(name for name in references() if package_of(name))
+
+
+@dataclass
+class Outcome:
+    """What became of an example.
+
+    Attributes:
+        kind: `right`, `refused` (it says why) or `wrong`.
+        words: the reason, or the columns that are wrong.
+    """
+
+    kind: str
+    words: str = ""
+
+
+def run_example(name: str) -> Outcome:
+    """Read an example without the table of classes, run it, and compare it with its reference."""
+    times, columns = read_reference(references()[name])
+    try:
+        model, _ = read_modelica(LIBRARY / name.partition(".")[0] / "package.mo", name, table=False)
+        run: Any = simulate(model, float(times[-1]), points=POINTS, rtol=1e-7)
+    except ModelicaLikeError as error:
+        return Outcome("refused", str(error).splitlines()[0])
+    comparison = compare(run, times, columns)
+    if comparison.right:
+        return Outcome("right")
+    outside = {column: distance for column, distance in comparison.worst.items() if distance}
+    return Outcome("wrong", f"{outside or ''} {comparison.missing or ''}".strip())

@@ -1,0 +1,100 @@
+"""Reference trajectories of the standard library, and how far a run is from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+HERE = Path(__file__).parent
+SHARED = next((up / "shared" for up in HERE.parents if (up / "shared").is_dir()), HERE.parents[2] / "shared")
+LIBRARY = SHARED / "modelica_text"
+WIDTH = 2e-3
+"""Of the tube: a part of a column's range in a window that is as large a part of the run, as the library's own test
+has it."""
+
+
+def references() -> dict[str, Path]:
+    """Return the files of trajectories by the name of the class."""
+    return {path.stem: path for folder in ("msl", "msl_more") for path in (SHARED / "reference" / folder).glob("*.csv")}
+
+
+def read_reference(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return times and columns."""
+    with path.open(encoding="utf-8") as file:
+        names = [name.strip().strip('"') for name in _split(file.readline().strip())]
+    data = np.atleast_2d(np.loadtxt(path, delimiter=",", skiprows=1))
+    return data[:, 0], {name: data[:, k] for k, name in enumerate(names) if k}
+
+
+def _split(line: str) -> list[str]:
+    """Return the names of a line; a name such as `x[1,2]` has a comma of its own."""
+    names, depth = [""], 0
+    for letter in line:
+        depth += (letter == "[") - (letter == "]")
+        if letter == "," and not depth:
+            names.append("")
+        else:
+            names[-1] += letter
+    return names
+
+
+@dataclass
+class Comparison:
+    """How far a run is from its reference.
+
+    Attributes:
+        worst: distance from the tube, in parts of a column's range, by column; 0 inside.
+        missing: columns that the run does not have.
+    """
+
+    worst: dict[str, float] = field(default_factory=dict)
+    missing: list[str] = field(default_factory=list)
+
+    @property
+    def right(self) -> bool:
+        """Whether all columns are there, and in the tube."""
+        return bool(self.worst) and not self.missing and max(self.worst.values()) == 0.0
+
+
+def compare(run: Any, times: np.ndarray, columns: dict[str, np.ndarray]) -> Comparison:
+    """Compare a run with the columns of a reference."""
+    result = Comparison()
+    window = WIDTH * (times[-1] - times[0])
+    for name, wanted in columns.items():
+        values = values_of(run, name)
+        if values is None:
+            result.missing.append(name)
+            continue
+        span = max(float(np.ptp(wanted)), 1e-6 * float(np.abs(wanted).max()), 1e-9)
+        low, high = _envelope(run.time, values, times, window)
+        ours = np.maximum(low - wanted, wanted - high)
+        low, high = _envelope(times, wanted, times, window)
+        at = np.interp(times, run.time, values)
+        theirs = np.maximum(low - at, at - high)
+        distance = float(np.max(np.minimum(ours, theirs), initial=0.0)) / span
+        result.worst[name] = 0.0 if distance <= WIDTH else distance
+    return result
+
+
+def values_of(run: Any, name: str) -> np.ndarray | None:
+    """Return a column of a run by the library's name of it, None if there is none."""
+    for path in (name, name.replace(", ", ","), f"{name}_condition"):
+        try:
+            return np.asarray(run[path], float)
+        except KeyError:
+            continue
+    return None
+
+
+def _envelope(times: np.ndarray, values: np.ndarray, at: np.ndarray, window: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the largest value of a run in a window around each time."""
+    first, last = np.searchsorted(times, at - window, "left"), np.searchsorted(times, at + window, "right")
+    edges = np.stack([np.interp(at + shift, times, values) for shift in (-window, 0.0, window)])
+    low, high = edges.min(axis=0), edges.max(axis=0)
+    for k, (a, b) in enumerate(zip(first, last, strict=True)):
+        if b > a:
+            low[k], high[k] = min(low[k], values[a:b].min()), max(high[k], values[a:b].max())
+    return low, high
