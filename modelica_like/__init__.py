@@ -44,12 +44,12 @@ if TYPE_CHECKING:
     from modelica_like.native.handle import Native as Native
     from modelica_like.netlist import load as load
     from modelica_like.options import Options as Options
+    from modelica_like.page import explore as explore
     from modelica_like.runs.solution import Solution as Solution
     from modelica_like.runs.trajectories import Trajectories as Trajectories
     from modelica_like.show.browser.page import export_html as export_html
     from modelica_like.show.draw import save_schematic as save_schematic
     from modelica_like.show.draw import schematic as schematic
-    from modelica_like.show.explorer import explore as explore
     from modelica_like.show.report.compare import compare as compare
     from modelica_like.show.report.overlay import overlay as overlay
     from modelica_like.show.report.page import save_report as save_report
@@ -77,7 +77,7 @@ _HOME = {
     "compare": "modelica_like.show.report.compare",
     "cosim": "modelica_like.fmi.cosimulation.run",
     "duty": "modelica_like.analyse.after.spectra",
-    "explore": "modelica_like.show.explorer",
+    "explore": "modelica_like.page",
     "export_fmu": "modelica_like.fmi.export",
     "export_html": "modelica_like.show.browser.page",
     "importance": "modelica_like.analyse.sweeps.importance",
@@ -121,8 +121,9 @@ moved(
         f"{__name__}.{former}": f"{__name__}.{now}"
         for former, now in {
             "cosimulation": "fmi.cosimulation",
-            "explorer": "show.explorer",
+            "explorer": "page",
             "report": "show.report",
+            "show.explorer": "page",
             "sizing": "analyse.sizing",
             "solve.plot": "show.plot",
             "solve.solution": "runs.solution",

@@ -26,6 +26,10 @@ def _nobody(folder: Path) -> bool:
     return False
 
 
+def _everybody(folder: Path) -> bool:
+    return True
+
+
 _decision: ContextVar[Decide] = ContextVar("decision", default=_nobody)
 _confinement: ContextVar[Path | None] = ContextVar("confinement", default=None)
 
@@ -37,7 +41,7 @@ def trusting(decide: Decide | None = None) -> Generator[None]:
     Args:
         decide: is asked about each folder that is not trusted; by default all folders are.
     """
-    token = _decision.set(decide or (lambda folder: True))
+    token = _decision.set(decide or _everybody)
     try:
         yield
     finally:
@@ -69,6 +73,11 @@ def require_confined(path: Path) -> None:
         inside = False
     if not inside:
         raise NetlistError(f"'{path}' is outside of the folder '{folder}'.", advice="Name a file in this folder.")
+
+
+def everything_trusted() -> bool:
+    """Tell whether the modules beside all netlists run here, as the user has said for this once."""
+    return _decision.get() is _everybody
 
 
 def may_run(folder: Path) -> bool:

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from modelica_like import load, save_report, sensitivities, simulate
-from modelica_like.show.explorer import Explorer
+from modelica_like.page import PageServer, Session
 from modelica_like.show.plot import save_plot
 
 HERE = Path(__file__).parent
@@ -129,10 +129,10 @@ def draw_page(page: Path) -> None:
             small(Path(folder) / name, page.parent / "pictures" / name)
 
 
-def screen(address: str, height: int, place: Path) -> None:
+def screen(address: str, height: int, place: Path, width: int = 1000) -> None:
     """Keep what Chromium shows at an address."""
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or "google-chrome"
-    size = f"--window-size=1000,{height}", "--force-device-scale-factor=1.5", "--hide-scrollbars"
+    size = f"--window-size={width},{height}", "--force-device-scale-factor=1.5", "--hide-scrollbars"
     command = [browser, "--headless", "--no-sandbox", "--disable-gpu", *size, "--virtual-time-budget=4000"]
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "screen.png"
@@ -141,15 +141,19 @@ def screen(address: str, height: int, place: Path) -> None:
 
 
 def screens() -> None:
-    """The report of document 003, and its page with sliders."""
+    """The report of document 003, its page with sliders, and the page in which the winch is built."""
     drive, place = load(EXAMPLES / "machine_tool_startup.toml"), HERE.parent / "pictures"
     with tempfile.TemporaryDirectory() as folder:
         save_report(drive, simulate(drive), page := Path(folder) / "report.html")
         screen(page.as_uri(), 2420, place / "report.png")
-    with Explorer(drive, "0.6 s", show=["J?.w", "clutch.tau"]) as explorer:
-        threading.Thread(target=explorer.serve_forever, daemon=True).start()
-        screen(explorer.address, 900, place / "explore.png")
-        explorer.shutdown()
+    with PageServer(Session(drive, "0.6 s", show=["J?.w", "clutch.tau"]), folded=True) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        screen(server.address, 900, place / "explore.png")
+        server.shutdown()
+    with PageServer(Session(EXAMPLES / "winch.toml")) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        screen(server.address, 860, place / "edit.png", 1360)
+        server.shutdown()
 
 
 def main(*wanted: str) -> None:

@@ -11,8 +11,9 @@ from importlib import import_module
 # Tasks with their commands and the modules of these, in the order in which the help lists them.
 TASKS = {
     "Write a drive": {
-        "new": "starters", "check": "models", "draw": "pictures", "library": "types", "describe": "types",
-        "schema": "types", "lsp": "starters", "mcp": "starters", "docs": "types", "trust": "starters",
+        "new": "starters", "edit": "pictures", "check": "models", "draw": "pictures", "library": "types",
+        "describe": "types", "schema": "types", "lsp": "starters", "mcp": "starters", "docs": "types",
+        "trust": "starters",
     },
     "Run it": {
         "simulate": "models", "report": "pictures", "explore": "pictures", "compare": "validation",

@@ -1,13 +1,16 @@
-"""Commands that show netlists and runs: draw, report, explore."""
+"""Commands that show netlists and runs: draw, report, explore, edit."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from modelica_like.cli.reader import Argument, Option
 from modelica_like.cli.shared import Assignments, Curves, Debug, Netlist, Until, load_netlist, say, told
 from modelica_like.errors import NetlistError
+
+if TYPE_CHECKING:
+    from modelica_like.page import Session
 
 
 def draw(
@@ -72,11 +75,39 @@ def explore(
     browser: Annotated[bool, Option(help="Open the browser.")] = True,
     debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Open a page with sliders and curves that runs the drive on this machine."""
+    """Open a page with sliders and curves that runs the drive on this machine: that of `edit`, with the text folded."""
     with told(debug):
         drive = load_netlist(netlist, assignments)
-        from modelica_like.show.explorer import Explorer
+        from modelica_like.page import Session
 
-        with Explorer(drive, until, show=show or (), folder=output) as explorer:
-            say(f"{explorer.address}\nCtrl-C ends it.")
-            explorer.show(browser=browser)
+        _serve(Session(drive, until, show=show or (), folder=output), browser=browser, folded=True)
+
+
+def edit(
+    netlist: Annotated[Path | None, Argument(metavar="NETLIST", help="Netlist; by default an empty sheet.")] = None, *,
+    until: Until = None, show: Curves = None,
+    output: Annotated[
+        Path | None, Option("--output", "-o", metavar="FOLDER", help="For exports; by default that of the netlist.")
+    ] = None,
+    autosave: Annotated[bool, Option("--autosave", help="Write the file after each valid change.")] = False,
+    browser: Annotated[bool, Option(help="Open the browser.")] = True,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Open a page in which a drive is built, changed and run: picture, values, text and curves of one file."""
+    with told(debug):
+        from modelica_like.page import Session, new_file
+        from modelica_like.trust import everything_trusted
+
+        path = netlist or new_file(Path())
+        session = Session(
+            path, until, show=show or (), folder=output or path.parent, trusted=everything_trusted(), autosave=autosave
+        )
+        _serve(session, browser=browser)
+
+
+def _serve(session: Session, *, browser: bool, folded: bool = False) -> None:
+    from modelica_like.page import PageServer
+
+    with PageServer(session, folded=folded) as server:
+        say(f"{server.address}\nCtrl-C ends it.")
+        server.show(browser=browser)

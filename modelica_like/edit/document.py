@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -117,7 +117,9 @@ class Document:
 
     @checked
     def __init__(self, path: str | Path, *, trust: bool = False) -> None:
-        self._begin(Path(path), read_text(Path(path), as_written=True), trust)
+        text = read_text(Path(path), as_written=True)
+        _ = Sheet(text, str(path)).data
+        self._begin(Path(path), text, trust)
 
     @classmethod
     def new(cls, path: str | Path, *, trust: bool = False) -> Self:
@@ -132,12 +134,22 @@ class Document:
         """
         if Path(path).exists():
             raise DuplicateName(f"'{path}' exists already.", advice=f'Open it: Document("{path}").')
+        return cls.draft(path, trust=trust)
+
+    @classmethod
+    def draft(cls, path: str | Path, text: str = "", *, trust: bool = False) -> Self:
+        """Begin with a text that is being written: it need not be TOML, and no file is read.
+
+        Args:
+            path: of the file, which `save` writes.
+            text: of the netlist.
+            trust: as in `load`.
+        """
         document = cls.__new__(cls)
-        document._begin(Path(path), "", trust)
+        document._begin(Path(path), text, trust)
         return document
 
     def _begin(self, path: Path, text: str, trust: bool) -> None:
-        _ = Sheet(text, str(path)).data
         self.path, self._trust = path, trust
         self._states, self._at = [Edited(text)], 0
 
@@ -158,6 +170,19 @@ class Document:
         state = self.state
         with self._trusting():
             return self._keep(apply(state.text, request, file=self.path, files=state.files))
+
+    def together(self, requests: Sequence[Mapping[str, Any]]) -> Document:
+        """Do several operations by their names as one, which is undone as one; see `modelica_like.edit.apply`."""
+        state, notes = self.state, list[str]()
+        with self._trusting():
+            for request in requests:
+                state = apply(state.text, request, file=self.path, files=state.files)
+                notes += state.notes
+        return self._keep(Edited(state.text, tuple(notes), state.files))
+
+    def write(self, text: str) -> Document:
+        """Replace the whole text by one that was typed; it need not be TOML."""
+        return self._keep(Edited(text, (), self.state.files))
 
     def _done(self, operation: Callable[..., None], *args: Any, **kwargs: Any) -> Document:
         state = self.state
@@ -186,6 +211,11 @@ class Document:
     def notes(self) -> tuple[str, ...]:
         """What the last operation has to say."""
         return self.state.notes
+
+    @property
+    def steps(self) -> tuple[int, int]:
+        """How many operations can be taken back, and how many done again."""
+        return self._at, len(self._states) - 1 - self._at
 
     def undo(self) -> Document:
         """Take the last operation back.

@@ -19,7 +19,7 @@ from modelica_like.errors import (
     raise_together_or_one,
 )
 from modelica_like.flatten.wiring import Wiring
-from modelica_like.language import Assembly, Component, Connector, Output, connect
+from modelica_like.language import Assembly, Component, Connector, Input, Output, connect
 from modelica_like.language.assembly import end_at
 from modelica_like.language.fields import require_identifier
 from modelica_like.language.formula import CONSTANTS
@@ -137,7 +137,7 @@ def check_connections(sheet: Sheet, lines: Sequence[Sequence[str]]) -> None:
     """Refuse connections of what does not fit."""
     drive, wiring = assembly(sheet, dict.fromkeys(end for line in lines for end in line)), Wiring()
     for line in lines:
-        first, *others = (_end(drive, path) for path in line)
+        first, *others = (part_end(drive, path) for path in line)
         wiring.add(drive, connect(first, *others))
     wiring.check_signal_units()
     if wiring.errors:
@@ -150,9 +150,20 @@ def is_output(sheet: Sheet, end: str) -> bool:
     return not isinstance(at, Connector) and isinstance(at.owner.fields[at.name], Output)
 
 
-def _end(drive: Assembly, path: str) -> Any:
+def part_end(drive: Assembly, path: str) -> Any:
+    """Return the end at a path.
+
+    Raises:
+        WrongConnection: it is a part.
+        UnknownName: there is none.
+    """
     if path in drive.parts:
         ends = [name for name, connector in drive.find(path).connectors.items() if not connector.optional]
         example = f': "{path}.{ends[0]}".' if ends else "."
         raise WrongConnection(f"'{path}' is a part, and ends of parts are connected.", advice=f"Name one{example}")
     return end_at(drive, path)
+
+
+def ends_of(part: Component) -> list[str]:
+    """Return the names of the connectors and signals of a part."""
+    return [*part.connectors, *(name for name, field in part.fields.items() if isinstance(field, Input | Output))]

@@ -13,7 +13,9 @@ from modelica_like.edit.parts import (
     assembly,
     check_connections,
     check_series,
+    ends_of,
     is_output,
+    part_end,
     require_new,
     require_part,
     side,
@@ -22,8 +24,9 @@ from modelica_like.edit.sheet import Sheet
 from modelica_like.edit.tree import joined
 from modelica_like.edit.values import add
 from modelica_like.errors import DuplicateName, NetlistError, WrongConnection
-from modelica_like.flatten.wiring import side_of
+from modelica_like.flatten.wiring import Wiring, side_of
 from modelica_like.language import Connector, Input, Output
+from modelica_like.language import connect as join
 from modelica_like.language.assembly import end_at
 from modelica_like.netlist.further import head
 
@@ -178,6 +181,34 @@ def connect(sheet: Sheet, first: str, second: str, *, name: str | None = None) -
         sheet.write(("connect", chosen), others)
     ref.drop_ends(sheet, lambda end: end in others, "free")
     sheet.commit()
+
+
+def misfits(sheet: Sheet, end: str) -> dict[str, str]:
+    """Return whether each other end of the drive can be joined to one: "", or a sentence that says why not.
+
+    Args:
+        sheet: the netlist, whose parts must all be right.
+        end: path of an end.
+
+    Raises:
+        UnknownName: there is no such end.
+        ModelicaLikeError: a part is wrong.
+    """
+    drive = assembly(sheet, sheet.table("parts"))
+    lines = [line.names for line in ref.lines(sheet, "connect")]
+    mine = [line for line in lines if end in line]
+    part_end(drive, end)
+    answer: dict[str, str] = {}
+    for path in (f"{name}.{inner}" for name, part in drive.parts.items() for inner in ends_of(part)):
+        if path == end or any(path in line for line in mine):
+            continue
+        wiring = Wiring()
+        for line in [*mine, *(line for line in lines if path in line), [end, path]]:
+            first, *others = (part_end(drive, name) for name in line)
+            wiring.add(drive, join(first, *others))
+        wiring.check_signal_units()
+        answer[path] = wiring.errors[0].what if wiring.errors else ""
+    return answer
 
 
 @checked

@@ -87,19 +87,20 @@ def loads(text: str, file: str = "netlist.toml", *, trust: bool = False) -> Asse
 
 
 @without_garbage_search()
-def load_thoroughly(path: Path, text: str | None = None) -> Assembly:
+def load_thoroughly(path: Path, text: str | None = None, texts: Mapping[Path, str] | None = None) -> Assembly:
     """Read a netlist; its errors are told with those that are only seen in a whole drive.
 
     Args:
         path: see `load`.
         text: what the file will be, if it is being written.
+        texts: of netlists used as parts that are being written, too, by absolute path.
 
     Raises:
         ModelicaLikeError: see `load`.
     """
     if is_modelica(path):
         return _modelica(path)
-    loader = _Loader(thorough=True)
+    loader = _Loader(texts, thorough=True)
     return loader.load(path, ()) if text is None else loader.build(survey(text, str(path)), (path.resolve(),))
 
 

@@ -79,7 +79,8 @@ def test_a_module_is_found_by_the_name_it_had_before_there_were_folders(name: st
     ("former", "now"),
     [
         ("cosimulation.ssp", "fmi.cosimulation.ssp"),
-        ("explorer", "show.explorer"),
+        ("explorer", "page"),
+        ("show.explorer", "page"),
         ("report.run", "show.report.run"),
         ("report.tables", "show.report.tables"),
         ("sizing", "analyse.sizing"),

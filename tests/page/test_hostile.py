@@ -8,7 +8,7 @@ import pytest
 
 from modelica_like import ModelicaLikeError, export_html, load, save_report, simulate
 from modelica_like.netlist import loads
-from modelica_like.show.explorer import Explorer
+from modelica_like.page import PageServer, Session
 
 PAYLOADS = (
     "<script>window.hacked=1</script>", "<img src=x onerror=window.hacked=1>", "\"><svg onload=window.hacked=1>",
@@ -90,7 +90,7 @@ def test_payloads_are_text_in_reports_and_pages(browser: Any, drive: Path, tmp_p
     save_report(assembly, simulate(assembly), tmp_path / "report.html")
     browser.open(tmp_path / "report.html")
     _check(browser)
-    with Explorer(assembly, folder=tmp_path) as explorer:
+    with PageServer(Session(drive, folder=tmp_path)) as explorer:
         thread = threading.Thread(target=explorer.serve_forever, kwargs={"poll_interval": 0.02})
         thread.start()
         try:

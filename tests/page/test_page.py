@@ -60,9 +60,9 @@ def said(browser: Any) -> str:
 
 def curves(browser: Any) -> dict[str, np.ndarray]:
     """What the page shows, in its units and with the signs of variables; and times."""
-    script = """({time: [...picture.times], events: [...picture.result.events],
+    script = """({time: [...picture.times], events: [...picture.run.events],
       ...Object.fromEntries([...shown, ...MODES].map((one) =>
-        [one.name, [...values(picture.result, one)].map((value) => one.driving * value)]))})"""
+        [one.name, [...values(picture.run, one)].map((value) => one.driving * value)]))})"""
     return {name: np.array(values) for name, values in browser.run(script).items()}
 
 
@@ -240,7 +240,7 @@ def test_curves_come_and_go_and_tell_their_values(browser: Any, pages: dict[str,
     assert "position in m" in browser.run("document.getElementById('curves').textContent")
     box = browser.run("(({left, width}) => [left, width])(at('curves').getBoundingClientRect())")
     x = box[0] + 58 + 0.5 * (box[1] - 58 - 14)
-    browser.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=200)
+    browser.page.mouse.move(x, 200)
     read = browser.run(f"{wait}.then(() => at('readout').textContent)")
     assert re.fullmatch(r"t = (0\.2|0\.19\d+|0\.20\d+) s · clutch\.mode \w+.*", read)
     values = browser.run("[...document.querySelectorAll('figcaption button')].map((one) => one.textContent)")
@@ -260,8 +260,8 @@ def test_it_fits_any_width_and_both_themes(browser: Any, pages: dict[str, Path],
     assert browser.run("document.documentElement.scrollWidth") <= width
     colours = set[str]()
     for theme in ("light", "dark"):
-        browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": theme}])
+        browser.page.emulate_media(color_scheme=theme)
         colours.add(browser.run("getComputedStyle(document.body).backgroundColor"))
-    browser.call("Emulation.setEmulatedMedia", features=[])
+    browser.page.emulate_media(color_scheme="light")
     assert colours == {"rgb(255, 255, 255)", "rgb(21, 24, 29)"}
     assert browser.complaints == []

@@ -1,6 +1,5 @@
 """The report of a run: what is written, and what a browser makes of it."""
 
-import json
 import re
 from pathlib import Path
 from typing import Any
@@ -291,10 +290,10 @@ def test_all_panels_zoom_together(browser: Any, page: Path) -> None:
 def test_it_has_dark_colours_and_prints(browser: Any, page: Path) -> None:
     browser.open(page)
     light = browser.run(INK)
-    browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
+    browser.page.emulate_media(color_scheme="dark")
     assert browser.run(INK) != light
-    browser.call("Emulation.setEmulatedMedia", features=[])
-    assert len(json.dumps(browser.call("Page.printToPDF"))) > 20_000
+    browser.page.emulate_media(color_scheme="light")
+    assert len(browser.page.pdf()) > 15_000
 
 
 @pytest.mark.browser

@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 from calls import called
 
+from modelica_like import load
 from modelica_like.netlist import library_types
-from modelica_like.show.explorer import Explorer
+from modelica_like.page import PageServer, Session
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [
@@ -27,9 +28,9 @@ LONG = ("cosimulate", "fmu_in_importers")
 
 def command(line: str) -> None:
     words = shlex.split(line, comments=True)[1:]
-    if words[0] == "explore":  # would wait for a browser
-        with Explorer(words[1]) as explorer:
-            assert explorer.address.startswith("http://127.0.0.1")
+    if words[0] in ("explore", "edit"):  # would wait for a browser
+        with PageServer(Session(load(words[1]))) as server:
+            assert server.address.startswith("http://127.0.0.1")
         return
     result = called(words)
     assert result.exit_code == 0, f"{line}: {result.stderr}"

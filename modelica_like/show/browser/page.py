@@ -42,6 +42,8 @@ _SPREAD = 5.0
 """Sliders without bounds span from the value divided by this to the value times this."""
 HELPERS = Path(__file__).parent / "helpers.js"
 """Common code of the scripts of pages."""
+CURVES = Path(__file__).parent / "curves.js"
+"""Curves over time, of all pages in which a drive runs."""
 _POINTER_SIZE = 4
 _HIGH = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -110,34 +112,27 @@ def export_html(
         "model": _text(data), "runtime": _text(runtime_library(BROWSER.name, report).read_bytes()),
         "layout": _layout(), "message_length": MESSAGE_LENGTH,
     }  # fmt: skip
-    write_bytes(target, page(model.name, description, content, Path(__file__).parent / "wasm.js").encode())
+    write_bytes(target, page(model.name, description, content).encode())
     shown = sum(variable["shown"] for variable in content["variables"])
     size, elapsed = target.stat().st_size, time.perf_counter() - begin
     return Page(target, len(content["sliders"]) - 1, shown, size, elapsed)
 
 
-def page(
-    name: str, description: str, content: Mapping[str, Any], runner: Path, *, schematic: str = "", more: str = "",
-    connect: str = "'none'",
-) -> str:  # fmt: skip
+def page(name: str, description: str, content: Mapping[str, Any]) -> str:
     """Return a page with sliders and curves.
 
     Args:
         name: of the drive.
         description: of the drive.
-        content: what `page_content` has returned, and what the runner reads.
-        runner: the script that runs the drive: it defines `openDrive`.
-        schematic: SVG above the curves.
-        more: HTML below the curves.
-        connect: where the page may ask, as its policy says it.
+        content: what `page_content` has returned, and what wasm.js reads.
     """
     folder = Path(__file__).parent
     # No text may contain the end of the script.
     data = json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
-    script = joined_scripts(HELPERS, runner, folder / "page.js")
+    script = joined_scripts(HELPERS, CURVES, folder / "wasm.js", folder / "page.js")
     parts = {
-        "name": escape(name), "description": escape(description), "page": data, "more": more, "connect": connect,
-        "schematic": schematic, "script": script, "hash": script_hash(script),
+        "name": escape(name), "description": escape(description), "page": data, "script": script,
+        "hash": script_hash(script),
     }  # fmt: skip
     text = (folder / "page.html").read_text(encoding="utf-8")
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], text)
@@ -168,7 +163,7 @@ def page_content(model: CompiledDae, signals: Sequence[Signal], until: float, op
     variables = interface(model)
     end = {
         "name": "end time", "group": "", "reference": None, "description": "", "unit": "s", "factor": 1.0,
-        "offset": 0.0, "value": until, "low": until / _SPREAD, "high": until * _SPREAD, "log": True,
+        "offset": 0.0, "value": until, "written": "s", "low": until / _SPREAD, "high": until * _SPREAD, "log": True,
     }  # fmt: skip
     units, display = _Units(), Display(model)
     return {
@@ -291,7 +286,7 @@ def _sliders(model: CompiledDae, variables: dict[str, FmuVariable], display: Dis
         yield {
             "name": quantity.path, "group": quantity.path.rpartition(".")[0], "reference": about.reference,
             "description": quantity.description, "unit": _spelled(unit), "factor": unit.factor, "offset": unit.offset,
-            "value": value or 0.0, "low": low, "high": high, "log": log,
+            "value": value or 0.0, "low": low, "high": high, "log": log, "written": str(unit),
         }  # fmt: skip
 
 

@@ -37,6 +37,7 @@ class Port:
         stroke: how its connections are drawn.
         signal: 1 for an output, -1 for an input, 0 for a connector.
         mark: icon drawn here, such as a ground.
+        ground: the end that has this icon.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Port:
     stroke: Stroke
     signal: int = 0
     mark: Icon | None = None
+    ground: Port | None = None
 
     @property
     def way(self) -> Side:
@@ -111,13 +113,14 @@ class Diagram:
     nets: list[Net]
 
 
-def diagram(component: Component, depth: int, notes: Notes | None = None) -> Diagram:
+def diagram(component: Component, depth: int, notes: Notes | None = None, *, open_ends: bool = False) -> Diagram:
     """Collect the content of a component's schematic.
 
     Args:
         component: a drive, or a part of one.
         depth: number of levels of open assemblies.
         notes: returns texts below the name of a part.
+        open_ends: whether ends that are not connected are ports, too, and grounds without a line are drawn.
     """
     nodes = {
         name: Node(
@@ -128,9 +131,14 @@ def diagram(component: Component, depth: int, notes: Notes | None = None) -> Dia
     }  # fmt: skip
     outer = dict[str, Node]()
     nets = [Net([_port(end, component, nodes, outer) for end in ends]) for ends in _joined(component)]
+    used = {port.node for net in nets for port in net.ports}
     for net in nets:
         _mark(net)
-    kept = [node for node in nodes.values() if not (node.icon and node.icon.at_ports)]
+    kept = [node for node in nodes.values() if not _at_ports(node) or (open_ends and node not in used)]
+    for node in kept if open_ends else ():
+        for name, stroke, drives in ends_of(node):
+            if name not in node.ports:
+                node.ports[name] = Port(name, node, *_place(node.icon, name, drives), stroke, drives)
     picture = Diagram([*kept, *outer.values()], [net for net in nets if len(net.ports) > 1])
     for node in kept:
         if node.icon is None:
@@ -142,6 +150,28 @@ def diagram(component: Component, depth: int, notes: Notes | None = None) -> Dia
         (port,) = node.ports.values()
         node.border = _OPPOSITE[port.side]
     return picture
+
+
+def ends_of(node: Node, *, optional: bool = False) -> Iterator[tuple[str, Stroke, int]]:
+    """Yield the ends that a part always has, or the others: names, strokes, and 1 for outputs, -1 for inputs.
+
+    Args:
+        node: of the part.
+        optional: the others: optional connectors, and inputs that have a value.
+    """
+    part = node.component
+    for name, connector in part.connectors.items() if part else ():
+        if connector.optional == optional:
+            yield name, connector.stroke or PLAIN, 0
+    for name, entry in part.fields.items() if part else ():
+        if not isinstance(entry, Input | Output):
+            continue
+        if optional == (isinstance(entry, Input) and part is not None and part.given(name)):
+            yield name, SIGNAL, 1 if isinstance(entry, Output) else -1
+
+
+def _at_ports(node: Node) -> bool:
+    return node.icon is not None and node.icon.at_ports
 
 
 def alone(kind: type[Component]) -> Node:
@@ -212,10 +242,10 @@ def _place(icon: Icon | None, name: str, drives: int) -> tuple[Side, float]:
 
 def _mark(net: Net) -> None:
     """Draw grounds where they are used."""
-    marks = [port.node.icon for port in net.ports if port.node.icon and port.node.icon.at_ports]
-    if marks:
+    grounds = [port for port in net.ports if _at_ports(port.node)]
+    if grounds:
         for port in net.ports:
-            port.mark = marks[0]
+            port.mark, port.ground = grounds[0].node.icon, grounds[0]
         net.ports.clear()
 
 

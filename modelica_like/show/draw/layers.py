@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -13,6 +14,11 @@ from modelica_like.show.draw.diagram import Diagram, Net, Node, Port
 
 _ROUNDS = 12
 """Number of sweeps that order all columns, from west to east and back in turn."""
+_MOVED = 1.0
+"""Crossings that two nodes which exchange their places must save: a picture that changes while one works with it is
+read again, and a crossing is not worth that alone."""
+Heights = Mapping[str, float]
+"""Where nodes were in an earlier picture, by name, from north to south."""
 
 
 @dataclass(eq=False)
@@ -60,8 +66,13 @@ class Layers:
     channels: list[Channel]
 
 
-def layered(diagram: Diagram) -> Layers:
-    """Assign every node to a column, let long nets pass between nodes, and order columns so that few lines cross."""
+def layered(diagram: Diagram, before: Heights | None = None) -> Layers:
+    """Assign every node to a column, let long nets pass between nodes, and order columns so that few lines cross.
+
+    Args:
+        diagram: nodes and nets.
+        before: nodes that are known from an earlier picture keep their order, unless the lines gain much.
+    """
     column_of = _columns(diagram)
     layers = Layers(
         [[] for _ in range(max(column_of.values(), default=-1) + 1)],
@@ -82,7 +93,7 @@ def layered(diagram: Diagram) -> Layers:
             met[k + 1][0].append(End(passing))
         for k, ends in met.items():
             layers.channels[k].nets[net] = ends
-    _order(layers)
+    _order(layers, before or {})
     return layers
 
 
@@ -149,22 +160,38 @@ def _reaches(after: dict[Node, set[Node]], start: Node, goal: Node) -> bool:
     return False
 
 
-def _order(layers: Layers) -> None:
+def _order(layers: Layers, before: Heights) -> None:
     """Order each column by the mean place of its neighbours, back and forth; keep the best order."""
     orders: list[tuple[float, list[list[Slot]]]] = []
     given = [list(column) for column in layers.columns]
-    for begin in (given, [sorted(column, key=_signals_first) for column in given]):
+    signals = [sorted(column, key=_signals_first) for column in given]
+    for begin in ([[_as_before(column, before) for column in given]] if before else []) + [given, signals]:
         layers.columns[:] = [list(column) for column in begin]
         for k in range(_ROUNDS):
             east = k % 2 == 0
             numbers = range(len(layers.columns))
             for n in numbers if east else reversed(numbers):
                 _sort(layers, n, east)
-            _swap(layers)
+                layers.columns[n] = _as_before(layers.columns[n], before)
+            _swap(layers, before)
             places = _places(layers)
-            crossings = sum(_crossings_in(channel, places) for channel in layers.channels)
-            orders.append((crossings, [list(column) for column in layers.columns]))
+            cost = sum(_crossings_in(channel, places) for channel in layers.channels)
+            cost += _MOVED * sum(_moved(column, before) for column in layers.columns)
+            orders.append((cost, [list(column) for column in layers.columns]))
     layers.columns[:] = min(orders, key=lambda candidate: candidate[0])[1]
+
+
+def _as_before(column: list[Slot], before: Heights) -> list[Slot]:
+    """Return a column whose known nodes have their earlier order, in the places that they have."""
+    known = [slot for slot in column if slot.node and slot.node.name in before]
+    ordered = iter(sorted(known, key=lambda slot: before[slot.node.name] if slot.node else 0.0))
+    return [next(ordered) if slot in known else slot for slot in column]
+
+
+def _moved(column: list[Slot], before: Heights) -> int:
+    """Return the number of pairs of known nodes that have changed their order."""
+    heights = [before[slot.node.name] for slot in column if slot.node and slot.node.name in before]
+    return sum(b < a for k, a in enumerate(heights) for b in heights[k + 1 :])
 
 
 def _signals_first(slot: Slot) -> bool:
@@ -226,19 +253,19 @@ def _crossings_in(channel: Channel, places: dict[Slot, float]) -> float:
     return count + sum(0.05 * abs(a - b) for a, b, _ in lines)
 
 
-def _swap(layers: Layers) -> None:
-    """Exchange neighbours as long as crossings decrease."""
+def _swap(layers: Layers, before: Heights) -> None:
+    """Exchange neighbours as long as crossings decrease, by more than it costs to move."""
     for n, column in enumerate(layers.columns):
         near = (layers.channels[n], layers.channels[n + 1])
         places = _places(layers, n)
-        now = sum(_crossings_in(channel, places) for channel in near)
+        now = sum(_crossings_in(channel, places) for channel in near) + _MOVED * _moved(column, before)
         better = True
         while better:
             better = False
             for a, b in pairwise(range(len(column))):
                 column[a], column[b] = column[b], column[a]
                 places[column[a]], places[column[b]] = float(a), float(b)
-                changed = sum(_crossings_in(channel, places) for channel in near)
+                changed = sum(_crossings_in(channel, places) for channel in near) + _MOVED * _moved(column, before)
                 if changed < now - 1e-9:
                     now, better = changed, True
                 else:

@@ -11,7 +11,7 @@ import casadi as ca
 from modelica_like.language.icon import Stroke
 from modelica_like.show.draw.diagram import Diagram, Net, Node, Port
 from modelica_like.show.draw.labels import VALUE, Box, Text, labels, text_width
-from modelica_like.show.draw.layers import Channel, End, Layers, Slot, layered, solve_lp
+from modelica_like.show.draw.layers import Channel, End, Heights, Layers, Slot, layered, solve_lp
 
 Point = tuple[float, float]
 
@@ -119,9 +119,14 @@ def texts(part: Placed) -> Iterator[Text]:
         low -= size + 4.0
 
 
-def sheet(diagram: Diagram) -> Sheet:
-    """Place the parts and nets of a diagram."""
-    layers = layered(diagram)
+def sheet(diagram: Diagram, before: Heights | None = None) -> Sheet:
+    """Place the parts and nets of a diagram.
+
+    Args:
+        diagram: what to place.
+        before: heights of nodes in an earlier picture, whose order is kept.
+    """
+    layers = layered(diagram, before)
     placed = {node: _measure(node) for node in diagram.nodes}
     heights = _heights(layers, placed)
     _straighten(layers, heights, placed)

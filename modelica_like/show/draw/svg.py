@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from xml.sax import saxutils
 
 from modelica_like.language.icon import Icon, Stroke
+from modelica_like.show.draw.diagram import Port
+from modelica_like.show.draw.handles import end_handles, line_handle, part_attributes
 from modelica_like.show.draw.labels import NAME, VALUE, Text, meet
 from modelica_like.show.draw.running import HELD, OPEN, SLIDES, Running
 from modelica_like.show.draw.shapes import Shape
@@ -29,8 +31,9 @@ def _escaped(text: str) -> str:
 
 
 def svg(
-    drawn: Sheet, title: str, *, background: bool = True, run: Running | None = None, shapes: Sequence[Shape] = ()
-) -> str:
+    drawn: Sheet, title: str, *, background: bool = True, run: Running | None = None, shapes: Sequence[Shape] = (),
+    handles: bool = False,
+) -> str:  # fmt: skip
     """Return a sheet as SVG text; the same sheet gives the same bytes.
 
     Args:
@@ -39,6 +42,7 @@ def svg(
         background: whether to fill the paper.
         run: what a run adds.
         shapes: of modes, drawn below.
+        handles: name parts, ends and lines in data attributes, for a page in which they are edited.
     """
     run = run or Running()
     width, below = drawn.width + 2 * _MARGIN, drawn.height + 2 * _MARGIN
@@ -59,10 +63,11 @@ def svg(
     parts += [_frame(at, item) for at, item in everything if isinstance(item, Placed) and item.sheet]
     for at, item in everything:
         if isinstance(item, Line):
-            parts += _line(at, item, run)
+            parts += [*_line(at, item, run), *([line_handle(at, item)] if handles else [])]
+    joined = {port for _, item in everything if isinstance(item, Line) for port in item.ports}
     for at, item in everything:
         if isinstance(item, Placed) and not item.node.border:
-            parts += _part(at, item, run)
+            parts += _part(at, item, run, joined if handles else None)
     for k, shape in enumerate(shapes):
         parts += _shape(shape, below + _STRIP * k, width)
     parts += _clock(width, height, run) if run.moving else []
@@ -118,11 +123,16 @@ def _line(at: Point, line: Line, run: Running) -> Iterator[str]:
         )
 
 
-def _part(at: Point, part: Placed, run: Running) -> Iterator[str]:
+def _part(at: Point, part: Placed, run: Running, joined: Collection[Port] | None) -> Iterator[str]:
     node, (x, y), (half_x, half_y) = part.node, (at[0] + part.at[0], at[1] + part.at[1]), part.half
-    yield f'<g transform="translate({_n(x)} {_n(y)})">'
-    kind = type(node.component).__name__
-    yield f"<title>{_escaped(f'{node.name}: {kind}')}</title>"
+    about = f"{node.name}: {type(node.component).__name__}"
+    taken = part_attributes(node, about) if joined is not None else ""
+    yield f'<g{taken} transform="translate({_n(x)} {_n(y)})"><title>{_escaped(about)}</title>'
+    if joined is not None:
+        yield (
+            f'<rect class="hold" x="{_n(part.room[0])}" y="{_n(part.room[1])}" rx="8" fill="transparent" '
+            f'width="{_n(part.room[2] - part.room[0])}" height="{_n(part.room[3] - part.room[1])}"/>'
+        )
     if node.icon and (looks := run.modes.get(node)):
         yield from _looks(node.icon, looks, run, half_y, turned=node.turned)
     elif node.icon:
@@ -137,6 +147,7 @@ def _part(at: Point, part: Placed, run: Running) -> Iterator[str]:
             yield from _mark(part, port.side, port.along, port.mark, port.stroke)
     for text in texts(part):
         yield _text(text)
+    yield from end_handles(part, joined) if joined is not None else ()
     yield "</g>"
 
 

@@ -1,4 +1,4 @@
-"""Requests of the page: runs with other values, their sensitivities, and files."""
+"""Runs of the netlist that a page shows: with other values, their sensitivities, and pictures of an instant."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import copy
 import math
 import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,21 +13,22 @@ import numpy as np
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ModelicaLikeError
-from modelica_like.fmi.export import export_fmu
 from modelica_like.language import Assembly
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.library import OK
 from modelica_like.native.model import Instance
-from modelica_like.netlist import save
-from modelica_like.options import Options
-from modelica_like.show.report.page import save_report
-from modelica_like.simulation import build, simulate
+from modelica_like.runs.signals import Signal, read_signals
+from modelica_like.runs.solution import Solution
+from modelica_like.show.browser.page import page_content
+from modelica_like.show.plot import for_page
+from modelica_like.show.report.start import start_values
+from modelica_like.simulation import build, plan, simulate
 
 _MOST_BARS = 12
 _LOOK = 0.05
 """Seconds between two looks whether a run that waits for another is still wanted."""
-FILES = {"netlist": ".toml", "FMU": ".fmu", "report": ".html"}
-"""What can be saved, with the endings."""
+_NO_END = 1.0
+"""End of a run in s, where the netlist has none."""
 
 
 class Runs:
@@ -37,11 +37,19 @@ class Runs:
     Args:
         drive: the drive.
         model: the same, compiled.
-        options: tolerances and number of results.
+        until: end time, a number in s or a quantity; by default that of the netlist, or else one second.
+
+    Raises:
+        ModelicaLikeError: the end time is wrong, or there are not all start values.
+
+    Attributes:
+        until: end time in s.
     """
 
-    def __init__(self, drive: Assembly, model: CompiledDae, options: Options) -> None:
-        self._drive, self._model, self._options = drive, model, options
+    def __init__(self, drive: Assembly, model: CompiledDae, until: float | str | None = None) -> None:
+        self._drive, self._model = drive, model
+        self.until, self._options = plan(model, until or model.settings.get("until") or _NO_END)
+        self._solution: tuple[Any, Solution] | None = None
         self._instance = Instance(model)
         self.references = {name: variable.reference for name, variable in self._instance.native.variables.items()}
         self._names = {reference: name for name, reference in self.references.items()}
@@ -158,29 +166,46 @@ class Runs:
         ends = f"{output} ends at {end.value:.5g} {end.unit_text}".rstrip()
         return {"caption": caption if rows else f"{ends}, and no parameter changes that.", "rows": rows}
 
-    def save(self, what: str, values: Sequence[tuple[int, float]], until: float, folder: Path) -> Path:
-        """Write the changed drive into a folder, without overwriting files.
-
-        Args:
-            what: one of `FILES`.
-            values: of parameters.
-            until: end time of the report in s.
-            folder: for the file.
+    def solution(self, values: Sequence[tuple[int, float]] = ()) -> Solution:
+        """Return a run with all variables, until the end; the last one is kept.
 
         Raises:
-            ModelicaLikeError: the values are wrong, or it cannot be run or exported.
-            OSError: it cannot be written.
+            ModelicaLikeError: it cannot be run.
         """
-        drive, ending = self.changed(values), FILES[what]
-        names = (f"{self._model.name}_explored{number or ''}{ending}" for number in range(10_000))
-        path = next(folder / name for name in names if not (folder / name).exists())
-        if what == "netlist":
-            save(drive, path)
-        elif what == "FMU":
-            export_fmu(drive, path)
-        else:
-            save_report(drive, simulate(drive, until), path)
-        return path
+        key = tuple(values)
+        with self._analysing:
+            if self._solution is None or self._solution[0] != key:
+                given = {self._names[reference]: value for reference, value in values}
+                run = simulate(self._model, self.until, parameters=given, options=self._options, solver="native")
+                self._solution = key, run
+            return self._solution[1]
+
+    def content(self, shown: Sequence[str]) -> dict[str, Any]:
+        """Return what the script of a page reads; see `page_content`.
+
+        Args:
+            shown: names or formulas of curves; those that the drive does not have are left out, and without any there
+                are the usual ones.
+
+        Raises:
+            ModelicaLikeError: it cannot be run, which shows what is usual.
+        """
+        signals = [signal for name in shown for signal in self._signals(name)]
+        if not signals:
+            signals = for_page(self.solution())[0]
+        return page_content(self._model, signals, self.until, self._options)
+
+    def _signals(self, name: str) -> list[Signal]:
+        modes = {discrete.path for discrete in self._model.flat_discretes if discrete.names}
+        try:
+            return [signal for signal in read_signals(self._model, [name]) if signal.name not in modes]
+        except ModelicaLikeError:
+            return []  # its part has gone
+
+    def starts(self) -> list[dict[str, Any]]:
+        """Return start values in SI units, with their origins."""
+        rows = start_values(self._drive, self._model, self._model.settings.get("start", "given"))
+        return [{"path": r.path, "value": float(r.value), "unit": r.unit, "origin": r.origin} for r in rows]
 
 
 def number(value: Any) -> float:

@@ -1,10 +1,11 @@
-"""A page on the loopback interface that runs a drive here, in this process."""
+"""A page on the loopback interface: a drive is built, changed and run there, in this process."""
 
 from __future__ import annotations
 
 import contextlib
 import io
 import json
+import re
 import secrets
 import socket
 import sys
@@ -13,6 +14,7 @@ import threading
 import time
 import webbrowser
 from collections.abc import Mapping, Sequence
+from html import escape
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -25,21 +27,23 @@ from modelica_like.arguments import checked
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.language import Assembly
 from modelica_like.netlist import load
-from modelica_like.show.browser.page import page, page_content
-from modelica_like.show.draw import schematic
-from modelica_like.show.explorer.runs import FILES, Runs, number
-from modelica_like.show.plot import for_page
-from modelica_like.simulation import build, seconds, simulate
+from modelica_like.page.files import FILES
+from modelica_like.page.runs import number
+from modelica_like.page.session import Session
+from modelica_like.show.browser.page import CURVES, HELPERS, joined_scripts, script_hash
 from modelica_like.writing import write_text
 
-_LARGEST = 1_000_000
-"""Bytes of a request."""
+_LARGEST = 2_000_000
+"""Bytes of a request: the text of a netlist is in some."""
 _PATIENCE = 5.0
 """Seconds for a request to arrive, for its answer to leave, for a free place; on one machine they take milliseconds."""
 _PLACES = 16
 """Connections at once; a browser opens six for a page."""
-_WRONG = (ArithmeticError, KeyError, RecursionError, TypeError, ValueError)
+_WRONG = (ArithmeticError, AttributeError, KeyError, RecursionError, TypeError, ValueError)
 """What a request that is no JSON, or has other content than expected, ends in."""
+_HERE = Path(__file__).parent
+_SCRIPTS = ("core", "picture", "hand", "palette", "inspector", "table", "text", "results", "runs", "files", "start")
+"""The scripts of the page, in their order."""
 
 
 @checked
@@ -47,7 +51,7 @@ def explore(
     drive: Assembly | str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
     folder: str | Path = ".",
 ) -> None:  # fmt: skip
-    """Show a drive in the browser, with sliders for its parameters, until Ctrl-C.
+    """Show a drive in the browser, with its parameters and curves, until Ctrl-C.
 
     Args:
         drive: an assembly or a netlist file.
@@ -57,21 +61,19 @@ def explore(
         folder: for netlists, FMUs and reports saved by the page.
 
     Raises:
-        UnknownName: nothing matches a pattern.
-        ModelicaLikeError: the drive has an error, or cannot be simulated.
+        ModelicaLikeError: the drive has an error.
     """
-    with Explorer(drive, until, show=show, folder=folder) as explorer:
-        explorer.show()
+    assembly = drive if isinstance(drive, Assembly) else load(drive)
+    with PageServer(Session(assembly, until, show=show, folder=Path(folder)), folded=True) as server:
+        server.show()
 
 
-class Explorer(ThreadingHTTPServer):
-    """Serves the page of one drive to this machine only.
+class PageServer(ThreadingHTTPServer):
+    """Serves the page of a session to this machine only.
 
     Args:
-        drive, until, show, folder: as of `explore`.
-
-    Raises:
-        ModelicaLikeError: as `explore`.
+        session: what is shown.
+        folded: whether the text of the netlist is folded away at first.
 
     Attributes:
         address: of the page, with a secret that every request needs.
@@ -80,20 +82,9 @@ class Explorer(ThreadingHTTPServer):
     daemon_threads = True
     request_queue_size = 64
 
-    def __init__(
-        self, drive: Assembly | str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
-        folder: str | Path = ".",
-    ) -> None:  # fmt: skip
-        assembly = drive if isinstance(drive, Assembly) else load(drive)
-        model = build(assembly)
-        end = until if until is not None else model.settings.get("until")
-        run = simulate(model, end)
-        self.runs, self.folder, self.token = Runs(assembly, model, run.options), Path(folder), secrets.token_urlsafe(16)
-        content = page_content(model, for_page(run, show)[0], seconds(end), run.options) | {"token": self.token}
-        self.page = page(
-            model.name, str(assembly.description), content, Path(__file__).parent / "explore.js", connect="'self'",
-            schematic=f'<div id="schematic">{schematic(assembly, background=False)}</div>', more=_BELOW,
-        ).encode()  # fmt: skip
+    def __init__(self, session: Session, *, folded: bool = False) -> None:
+        self.session, self.token = session, secrets.token_urlsafe(16)
+        self.page = _page(session.desk.path.name, {"token": self.token, "folded": folded, "files": [*FILES]}).encode()
         self._places = threading.BoundedSemaphore(_PLACES)
         super().__init__(("127.0.0.1", 0), _Handler)
         self.address = f"http://{self.host}/?token={self.token}"
@@ -107,7 +98,7 @@ class Explorer(ThreadingHTTPServer):
         with tempfile.TemporaryDirectory(prefix="modelica_like_") as private, contextlib.suppress(KeyboardInterrupt):
             if browser:
                 # All users of the machine can read the command line of the browser, but not this file.
-                way = Path(private) / "explore.html"
+                way = Path(private) / "page.html"
                 write_text(way, f'<meta http-equiv="refresh" content="0;url={self.address}">')
                 webbrowser.open(way.as_uri())
             self.serve_forever()
@@ -137,11 +128,15 @@ class Explorer(ThreadingHTTPServer):
         return f"127.0.0.1:{self.server_address[1]}"
 
 
-_BUTTONS = " ".join(f'<button value="{what}">{what}</button>' for what in FILES)
-_BELOW = f"""
-<div id="files">Save as {_BUTTONS} <span id="saved"></span></div>
-<details id="bars"><summary>What decides the final value of <select aria-label="final value of"></select></summary>
-<table></table></details>"""
+def _page(name: str, content: Mapping[str, Any]) -> str:
+    """Return the page: its own script is the only one that runs there."""
+    script = joined_scripts(HELPERS, CURVES, *(_HERE / f"{name}.js" for name in _SCRIPTS))
+    parts = {
+        "name": escape(name), "style": (_HERE / "page.css").read_text(encoding="utf-8"), "script": script,
+        "hash": script_hash(script), "content": json.dumps(content).replace("<", "\\u003c"),
+    }  # fmt: skip
+    text = (_HERE / "page.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], text)
 
 
 class _Arriving(socket.SocketIO):
@@ -159,10 +154,14 @@ class _Arriving(socket.SocketIO):
 class _Handler(BaseHTTPRequestHandler):
     """Answers one request, and closes the connection, so that none waits for a next one in a place."""
 
-    server: Explorer  # pyright: ignore[reportIncompatibleVariableOverride]
+    server: PageServer  # pyright: ignore[reportIncompatibleVariableOverride]
     timeout = _PATIENCE
     disable_nagle_algorithm = True
-    _kinds: ClassVar = {"/run": "_run", "/ranking": "_ranking", "/save": "_save"}
+    _asked: ClassVar = frozenset((
+        "state", "apply", "text", "undo", "redo", "model", "ranking", "starts", "instant", "palette", "kind", "fits",
+        "copy", "complete", "explain", "save", "export", "watch", "take", "trust", "open", "back",
+    ))  # fmt: skip
+    """Methods of `Session` that a page may call."""
 
     def setup(self) -> None:
         super().setup()
@@ -182,24 +181,33 @@ class _Handler(BaseHTTPRequestHandler):
         size = self.headers.get("Content-Length", "")[:9]  # more digits are too many, and no number for Python
         if not self._known(self.headers.get("X-Token", "")):
             return
-        if self.path not in self._kinds or not size.isdecimal() or int(size) > _LARGEST:
+        what = self.path[1:]
+        if what not in (*self._asked, "run") or not size.isdecimal() or int(size) > _LARGEST:
             self._answer(HTTPStatus.NOT_FOUND, b"There is nothing here.")
             return
         body = self.rfile.read(int(size))
         self.connection.settimeout(_PATIENCE)
         try:
-            getattr(self, self._kinds[self.path])(json.loads(body))
+            request = json.loads(body)
+            if what == "run":
+                self._run(request)
+            else:
+                answer = getattr(self.server.session, what)(request)
+                self._answer(HTTPStatus.OK, json.dumps(answer, default=str).encode(), "application/json")
         except ModelicaLikeError as error:
             # Told in the page, with an answer that browsers do not report as a failure.
             message = " ".join(filter(None, (error.what, error.why, error.advice)))
             self._answer(HTTPStatus.OK, message.encode(), refused=True)
         except _WRONG as error:
             self._answer(HTTPStatus.BAD_REQUEST, f"The request is wrong: {error!r}.".encode())
+        except OSError as error:
+            self._answer(HTTPStatus.OK, f"{error.filename}: {error.strerror}.".encode(), refused=True)
 
     def _known(self, token: str) -> bool:
-        """Another site can neither name this host nor know the token."""
+        """Another site can neither name this host nor know the token, and says where it comes from."""
         right = secrets.compare_digest(token.encode(), self.server.token.encode())
-        if right and self.headers.get("Host") == self.server.host:
+        origin = self.headers.get("Origin") in (None, f"http://{self.server.host}")
+        if right and origin and self.headers.get("Host") == self.server.host:
             return True
         self._answer(HTTPStatus.FORBIDDEN, b"Open the address that the command has printed.")
         return False
@@ -217,7 +225,7 @@ class _Handler(BaseHTTPRequestHandler):
             self.connection.settimeout(_PATIENCE)
 
     def _run(self, request: Mapping[str, Any]) -> None:
-        runs = self.server.runs
+        runs = self.server.session.runs(request)
         result = runs.run(runs.values(request), runs.outputs(request), number(request["until"]), self._waits)
         if result is None:
             return
@@ -226,20 +234,6 @@ class _Handler(BaseHTTPRequestHandler):
         head += b" " * (-len(head) % 8)
         parts = [np.array([len(head)], "<i8"), *(np.asarray(array, "<f8") for array in arrays)]
         self._answer(HTTPStatus.OK, b"".join((parts[0].tobytes(), head, *(part.tobytes() for part in parts[1:]))))
-
-    def _ranking(self, request: Mapping[str, Any]) -> None:
-        rows = self.server.runs.ranking(
-            self.server.runs.values(request), number(request["until"]), str(request["output"])
-        )
-        self._answer(HTTPStatus.OK, json.dumps(rows).encode(), "application/json")
-
-    def _save(self, request: Mapping[str, Any]) -> None:
-        runs, what, until = self.server.runs, str(request["what"]), number(request["until"])
-        try:
-            said, refused = str(runs.save(what, runs.values(request), until, self.server.folder)), False
-        except OSError as error:
-            said, refused = str(error), True
-        self._answer(HTTPStatus.OK, said.encode(), refused=refused)
 
     def _answer(
         self, code: HTTPStatus, body: bytes, kind: str = "application/octet-stream", *, refused: bool = False
