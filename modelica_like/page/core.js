@@ -7,11 +7,14 @@ const page = { // what is shown
 const listeners = []; // called with each new state
 const kinds = new Map(); // what a part of a type can be given, once it was asked for
 
+let asking = 0; // requests that have no answer yet, but for the look at the file
+
 async function post(what, content = {}, signal = undefined) {
-  const headers = { "X-Token": PAGE.token }, body = JSON.stringify(content);
+  const headers = { "X-Token": PAGE.token }, body = JSON.stringify(content), counted = what === "watch" ? 0 : 1;
+  document.body.classList.toggle("busy", (asking += counted) > 0);
   const answer = await fetch(`/${what}`, { method: "POST", headers, body, signal }).catch((error) => {
     throw signal?.aborted ? error : new Error("Nobody answers. Start `modelica-like edit` again; the text is still here.");
-  });
+  }).finally(() => document.body.classList.toggle("busy", (asking -= counted) > 0));
   if (!answer.ok || answer.headers.has("X-Refused")) throw new Error(await answer.text());
   return answer;
 }
@@ -57,9 +60,10 @@ const tableOf = (name) => {
 };
 
 /* What a part of a type can be given; null while that is not known. */
-async function kindOf(kind) {
-  if (!kinds.has(kind)) kinds.set(kind, await ask("kind", { kind }).catch(() => null));
-  return kinds.get(kind);
+async function kindOf(kind, inner = []) {
+  const key = [kind, ...inner].join("\n");
+  if (!kinds.has(key)) kinds.set(key, await ask("kind", { kind, inner }).catch(() => null));
+  return kinds.get(key);
 }
 
 /* A name for a new part: that of its type, with a number if it must be. */

@@ -194,12 +194,19 @@ class Desk:
         """Return parts as netlist text; see `copied`."""
         return copied(Sheet(self.document.text, str(self.path)), names)
 
-    def describe(self, kind: str) -> dict[str, Any] | None:
-        """Return what a part of a type can be given; None if there is no such type."""
-        if kind in library_types():
+    def describe(self, kind: str, inner: Sequence[str] = ()) -> dict[str, Any] | None:
+        """Return what a part of a type can be given; None if there is no such type.
+
+        Args:
+            kind: the type.
+            inner: names that lead to a part inside, which is described instead.
+        """
+        if kind in library_types() and not inner:
             return described_type(kind)
         with self.trusting():
             owner = Names(Text(self.path, self.document.text)).type(kind)
+        for name in inner:
+            owner = owner.inner(name) if owner else None
         return described(owner) if owner else None
 
     def complete(self, text: str, offset: int) -> list[dict[str, Any]]:

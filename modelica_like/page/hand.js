@@ -108,7 +108,7 @@ function up(event) {
   const start = pressed, what = meant(event);
   pressed = null;
   hint("");
-  if (carried?.dragged || (carried && start)) return put(what, event);
+  if (carried?.dragged || (carried && start)) return lay(what, event);
   if (!start) return;
   if (joining?.drag) return start.moved && what.end ? joined(what.end) : drop();
   if (joining) return what.end ? joined(what.end) : drop();
@@ -119,7 +119,7 @@ function up(event) {
   if (what.sheet) select([]);
 }
 
-function put(what, event) {
+function lay(what, event) {
   const { kind, replace } = carried;
   if (!what.node) return drop();
   if (replace) { drop(); return apply({ op: "replace", name: replace, kind }); }
@@ -209,7 +209,7 @@ function keyed(event) {
 function enter(target, event) {
   const { end, part, ends } = target.dataset ?? {};
   event.preventDefault();
-  if (carried) return put(end ? { end, node: target } : ends ? { line: ends.split(" "), node: target } : { sheet: true, node: target });
+  if (carried) return lay(end ? { end, node: target } : ends ? { line: ends.split(" "), node: target } : { sheet: true, node: target });
   if (end) return joining ? joined(end) : join(end);
   if (ends) return select([], ends.split(" "));
   if (part) return page.selected.has(part) && openable(part) ? openPart(part) : pick(part, event.shiftKey);

@@ -13,6 +13,7 @@ async function inspect() {
     : names.length ? await aboutPart([...page.selected][0], mine) : aboutDrive();
   if (mine !== inspecting || !made) return;
   const active = document.activeElement, place = at("inspector").contains(active) ? active.dataset.path : null;
+  if (place && active.was !== undefined && active.value !== active.was) return; // being typed: what is written draws it again
   at("inspector").replaceChildren(...made);
   if (place) [...at("inspector").querySelectorAll("[data-path]")].find((one) => one.dataset.path === place)?.focus();
 }
@@ -32,12 +33,14 @@ function row({ label, title = "", path, value, fallback = "", unit = "", units =
     field.oninput = () => suggest(field, units.length ? units : unit ? [unit] : []);
   }
   field.dataset.path = path;
+  field.was = value;
   field.ariaLabel = path;
   const line = element("div", { className: `field${missing ? " missing" : ""}` }, element("label", { title }, label), field,
     element("span", { className: "unit" }, unit), ...more);
   const said = element("p", { className: "refused" });
   field.onchange = async () => {
-    if (field.value.trim() === value) return;
+    if (field.value.trim() === field.was) return;
+    field.was = field.value;
     const error = await put(field.value.trim());
     said.textContent = error ?? "";
     line.classList.toggle("missing", !!error || missing);
@@ -95,7 +98,7 @@ function aboutDrive() {
     button.onclick = () => select([name]);
     return button;
   });
-  return [element("h2", {}, written(page.data.name) || page.file || ""), sheet("description", "description", "one phrase"),
+  return [element("h2", {}, written(page.data.name) || page.file || ""), sheet("name", "name", "by default that of the file"), sheet("description", "description", "one phrase"),
     element("h3", {}, "Parameters"), ...rows, add, element("h3", {}, "Run"),
     row({ label: "until", path: "simulate.until", value: written(run.until), unit: "s", fallback: "1" }, (text) => put("until", text, { section: "simulate" })),
     row({ label: "start", path: "simulate.start", value: written(run.start), choices: ["given", "rest", "steady"], fallback: "given" },
@@ -115,7 +118,7 @@ async function aboutPart(name, mine) {
   const table = tableOf(name), kind = String(table.is ?? ""), known = await kindOf(kind);
   if (mine !== inspecting) return null;
   return [...titleOf(name, kind, known), ...(known ? valuesOf(name, table, known) : [element("p", { className: "dim" }, "The type is not known, so its values cannot be shown.")]),
-    ...curvesOf(name), ...startsOf(name, table, known)];
+    ...insideOf(name, table, known), ...curvesOf(name), ...startsOf(name, table, known)];
 }
 
 function titleOf(name, kind, known) {
@@ -153,9 +156,40 @@ function valuesOf(name, table, known) {
   };
   const shown = known.values.filter((one) => !["start", "mode"].includes(one.sort));
   const first = shown.filter((one) => one.name in table || missing.has(one.name) || (one.default === null && one.sort === "parameter"));
-  const others = shown.filter((one) => !first.includes(one)), inner = Object.keys(table).filter((key) => key !== "is" && key !== "count" && !known.values.some((one) => one.name === key));
-  return [...first.map(make), ...inner.map((key) => row({ label: key, path: path(key), value: written(table[key]) }, (text) => put(path(key), text.startsWith("{") || text.startsWith("[") ? JSON.parse(text) : text))),
+  const others = shown.filter((one) => !first.includes(one)), inner = innerOf(table, missing, known);
+  return [...first.map(make), ...inner.map(([key, value]) => row({ label: key, title: missing.get(key), path: path(key), value: written(value), missing: missing.has(key), more: slider(path(key)) }, (text) => put(path(key), text))),
     ...(others.length ? [element("details", { open: !first.length }, element("summary", {}, `${others.length} with defaults`), ...others.map(make))] : [])];
+}
+
+const opened = new Set(); // parts inside whose values are shown
+
+/* The parts inside a part, with their values, which are asked for when they are opened. */
+function insideOf(name, table, known) {
+  const missing = missingOf(name);
+  const rows = (known?.parts ?? []).map((inner) => {
+    const path = `${name}.${inner}`, box = element("details", {}, element("summary", {}, inner));
+    box.dataset.inside = path;
+    const fill = async () => {
+      const owner = await kindOf(String(table.is), [inner]), given = (table[inner] && typeof table[inner] === "object") ? table[inner] : {};
+      const fields = (owner?.values ?? []).filter((one) => ["parameter", "structure"].includes(one.sort) && !innerOf(table, missing, known).some(([key]) => key === `${inner}.${one.name}`));
+      box.replaceChildren(box.firstChild, ...fields.map((one) => row({ label: one.name, title: one.about, path: `${path}.${one.name}`, value: written(given[one.name]), fallback: written(one.default ?? ""),
+        unit: one.unit, units: one.units, choices: one.choices }, (text) => put(`${path}.${one.name}`, text))));
+    };
+    box.ontoggle = () => { if (box.open) { opened.add(path); if (box.children.length < 2) fill(); } else opened.delete(path); };
+    box.open = opened.has(path);
+    return box;
+  });
+  return rows.length ? [element("h3", {}, "Parts inside"), ...rows] : [];
+}
+
+/* Values of parts inside a part, by their paths: those that are given, and those that are missing. */
+function innerOf(table, missing, known) {
+  const rows = new Map(), own = new Set(["is", "count", ...known.values.map((one) => one.name)]);
+  const add = (key, value) => value && typeof value === "object" && !Array.isArray(value)
+    ? Object.entries(value).forEach(([name, inner]) => add(`${key}.${name}`, inner)) : rows.set(key, value);
+  for (const [key, value] of Object.entries(table)) if (!own.has(key)) add(key, value);
+  for (const key of missing.keys()) if (!own.has(key) && !rows.has(key)) rows.set(key, "");
+  return [...rows];
 }
 
 /* Signals of a part: a click draws them; modes as the run left them. */

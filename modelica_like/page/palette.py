@@ -91,7 +91,7 @@ def described(owner: Owner) -> dict[str, Any]:
     Returns:
         `about`, its text; `values`, rows with `name`, `about`, `unit` and `units` like it, `default`, `least`, `most`,
         `choices`, `sort` (parameter, input, start, mode, structure, table) and, of tables, `columns`; `ends` with
-        their descriptions.
+        their descriptions; `parts`, names of the parts inside.
     """
     known, schemas = declarations(owner.kind), owner.values
     values: list[dict[str, Any]] = []
@@ -110,16 +110,18 @@ def described(owner: Owner) -> dict[str, Any]:
             else "structure" if field is None else _SORTS.get(type(field).__name__, "parameter"),
             "columns": _columns(schema) if name in known.tables else [],
         })  # fmt: skip
-    return {"about": owner.about, "values": values, "ends": owner.ends()}
+    inner = [name for name in owner.parts if known.parts or not name.endswith("]")]
+    return {"about": owner.about, "values": values, "ends": owner.ends(), "parts": inner}
 
 
 _SORTS = {"Variable": "start", "Output": "start", "Discrete": "start", "Input": "input"}
 
 
-def _columns(schema: Mapping[str, Any]) -> list[str]:
-    """Return the descriptions of the columns of a table; a flat one has none."""
+def _columns(schema: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return `about` of the columns of a table, and whether their cells are texts (`text`); a flat one has none."""
     cells = schema.get("items", {}).get("items")
-    return [str(cell.get("description", "")) for cell in cells] if isinstance(cells, list) else []
+    known = cells if isinstance(cells, list) else []
+    return [{"about": str(cell.get("description", "")), "text": cell.get("type") == "string"} for cell in known]
 
 
 @lru_cache(maxsize=512)

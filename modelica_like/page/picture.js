@@ -1,5 +1,6 @@
 /* The schematic: what is selected in it, what a problem marks, and how one looks for ends and lines near the pointer. */
-const NEAR = 11; // pixels around an end that belong to it
+const NEAR = { open: 11, joined: 7, optional: 6 }, OVER = 6; // pixels around an end that belong to it; over a part, fewer
+const SMALLEST = 0.72; // scale below which the picture is moved instead
 
 const drawing = () => at("sheet").querySelector("svg");
 const partAt = (name) => [...at("sheet").querySelectorAll(".part")].find((one) => one.dataset.part === name);
@@ -14,6 +15,7 @@ function draw(picture) {
     return;
   }
   const made = new DOMParser().parseFromString(picture, "image/svg+xml").documentElement;
+  made.style.minWidth = `${SMALLEST * made.viewBox.baseVal.width}px`;
   sheet.replaceChildren(document.adoptNode(made));
   if (place && sheet.contains(active) === false && focused) (partAt(place) ?? endAt(place))?.focus({ preventScroll: true });
   mark();
@@ -43,22 +45,22 @@ function select(names, line = null) {
 
 /* What a pointer means: an end nearby, or else a part, or a line, or the sheet. */
 function meant(event) {
-  let best = null, nearest = NEAR;
+  const target = document.elementFromPoint(event.clientX, event.clientY), over = target?.closest(".part") && !target.closest(".end");
+  let best = null, nearest = over ? OVER : Infinity;
   for (const end of at("sheet").querySelectorAll(".end")) {
     const box = end.getBoundingClientRect();
     const away = Math.hypot(event.clientX - box.x - box.width / 2, event.clientY - box.y - box.height / 2);
-    if (away < nearest && (!end.classList.contains("optional") || shownEnd(end))) [best, nearest] = [end, away];
+    if (away < Math.min(nearest, NEAR[end.classList[1]]) && shownEnd(end)) [best, nearest] = [end, away];
   }
   if (best) return { end: best.dataset.ground && event.altKey ? best.dataset.ground : best.dataset.end, node: best };
-  const target = document.elementFromPoint(event.clientX, event.clientY);
   const wire = target?.closest(".wire"), part = target?.closest(".part");
   if (part) return { part: part.dataset.part, node: part };
   if (wire) return { line: wire.dataset.ends.split(" "), node: wire };
   return target?.closest("#sheet") ? { sheet: true, node: at("sheet") } : {};
 }
 
-/* Optional ends are there for the part under the pointer, selected parts, and while something is being joined. */
-const shownEnd = (end) => end.closest(".part").matches(":hover, .selected, :focus-within") || !!end.closest(".joining");
+/* Optional ends are there for selected parts, and while something is carried or joined. */
+const shownEnd = (end) => !end.classList.contains("optional") || end.closest(".part").classList.contains("selected") || !!end.closest(".joining, .carrying");
 
 /* Of a line with many ends, the two between which a part is inserted: the one next to the pointer, and another. */
 function between(line, event) {

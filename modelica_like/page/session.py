@@ -164,8 +164,8 @@ class Session:
         return palette(self.desk.folder, str(request["words"]), self.desk.path)
 
     def kind(self, request: Request) -> dict[str, Any] | None:
-        """Return what a part of a type can be given."""
-        return self.desk.describe(str(request["kind"]))
+        """Return what a part of a type, or a part inside it, can be given."""
+        return self.desk.describe(str(request["kind"]), [str(name) for name in request.get("inner", ())])
 
     def fits(self, request: Request) -> dict[str, str]:
         """Return which ends can be joined to one."""

@@ -30,10 +30,10 @@ function curveOf(rows) {
 }
 
 function editTable(path, one, rows, put) {
-  const flat = one.columns.length === 0, titles = flat ? [one.about] : one.columns, longest = Math.max(titles.length, ...rows.map((row) => Array.isArray(row) ? row.length : 1));
+  const flat = one.columns.length === 0, titles = flat ? [one.about] : one.columns.map((column) => column.about), longest = Math.max(titles.length, ...rows.map((row) => Array.isArray(row) ? row.length : 1));
   const grid = element("tbody"), said = element("p", { className: "refused" }), preview = element("div");
   const cells = () => [...grid.rows].map((line) => [...line.querySelectorAll("input")].map((cell) => cell.value.trim())).filter((line) => line.some(Boolean));
-  const filled = () => cells().map((line) => { while (line.length > titles.length && line.at(-1) === "") line.pop(); const read = line.map(meantBy); return flat && longest === 1 ? read[0] : read; });
+  const filled = () => cells().map((line) => { while (line.length > titles.length && line.at(-1) === "") line.pop(); const read = line.map((cell, k) => one.columns[k]?.text ? cell : meantBy(cell)); return flat && longest === 1 ? read[0] : read; });
   const line = (row, width) => {
     const remove = element("button", { type: "button", className: "quiet", ariaLabel: "Remove the row" }, "×");
     const made = element("tr", {}, ...Array.from({ length: width }, (_, k) => element("td", {}, element("input", { value: written((Array.isArray(row) ? row : [row])[k]), ariaLabel: `row ${grid.rows.length + 1}, column ${k + 1}` }))), element("td", {}, remove));
