@@ -152,6 +152,7 @@ class Document:
     def _begin(self, path: Path, text: str, trust: bool) -> None:
         self.path, self._trust = path, trust
         self._states, self._at = [Edited(text)], 0
+        self._written: dict[Path, str] = {}
 
     add = _method(values.add)
     insert = _method(wires.insert)
@@ -169,11 +170,11 @@ class Document:
         """Do an operation by its name; see `modelica_like.edit.apply`."""
         state = self.state
         with self._trusting():
-            return self._keep(apply(state.text, request, file=self.path, files=state.files))
+            return self._keep(apply(state.text, request, file=self.path, files=self.pending))
 
     def together(self, requests: Sequence[Mapping[str, Any]]) -> Document:
         """Do several operations by their names as one, which is undone as one; see `modelica_like.edit.apply`."""
-        state, notes = self.state, list[str]()
+        state, notes = Edited(self.text, (), self.pending), list[str]()
         with self._trusting():
             for request in requests:
                 state = apply(state.text, request, file=self.path, files=state.files)
@@ -182,12 +183,12 @@ class Document:
 
     def write(self, text: str) -> Document:
         """Replace the whole text by one that was typed; it need not be TOML."""
-        return self._keep(Edited(text, (), self.state.files))
+        return self._keep(Edited(text, (), self.pending))
 
     def _done(self, operation: Callable[..., None], *args: Any, **kwargs: Any) -> Document:
         state = self.state
         with self._trusting():
-            return self._keep(_do(state.text, self.path, state.files, operation, *args, **kwargs))
+            return self._keep(_do(state.text, self.path, self.pending, operation, *args, **kwargs))
 
     def _keep(self, state: Edited) -> Document:
         self._at += 1
@@ -201,6 +202,12 @@ class Document:
     def state(self) -> Edited:
         """The text as it is now, what the last operation has to say, and netlists that are to be written."""
         return self._states[self._at]
+
+    @property
+    def pending(self) -> Mapping[Path, str]:
+        """Texts of netlists that `group` has made and `save` has not written yet, by absolute path."""
+        files = self.state.files.items()
+        return {file: text for file, text in files if self._written.get(file) != text}
 
     @property
     def text(self) -> str:
@@ -243,7 +250,7 @@ class Document:
         """Return the errors of the present text, of its parts and its connections; none if it is a drive."""
         try:
             with self._trusting():
-                flatten(assemble(parse(self.text, str(self.path)), self.path, self.state.files))
+                flatten(assemble(parse(self.text, str(self.path)), self.path, self.pending))
         except ModelicaLikeError as error:
             return list(getattr(error, "errors", [error]))
         return []
@@ -263,10 +270,11 @@ class Document:
         if target.resolve().parent != self.path.resolve().parent:
             advice = "Use `save(load(…), path)` of modelica_like.netlist, which names its files anew."
             raise NetlistError(f"'{target}' is in another folder than '{self.path}'.", advice=advice)
-        for file, text in self.state.files.items():
+        for file, text in self.pending.items():
             if file.exists() and read_text(file, as_written=True) != text:
                 raise DuplicateName(f"'{file}' exists already.", advice="Undo the grouping and name another file.")
             write_text(file, text)
+            self._written[file] = text
         write_text(target, self.text)
         self.path = target
         return self

@@ -109,7 +109,7 @@ class Desk:
     @property
     def is_saved(self) -> bool:
         """Whether the file has the present text."""
-        return self.document.text == (self.on_disk or "") and not self.document.state.files
+        return self.document.text == (self.on_disk or "") and not self.document.pending
 
     def trusting(self) -> AbstractContextManager[None]:
         """Run the modules of the folder, if it is trusted."""
@@ -144,7 +144,7 @@ class Desk:
         self.change(lambda document: document.together(requests))
 
     def _texts(self) -> dict[Path, str]:
-        return {**self.others(), **self.document.state.files}
+        return {**self.document.pending, **self.others()}
 
     def refresh(self) -> None:
         """Read the present text; what is not valid leaves the last valid picture."""
@@ -182,7 +182,7 @@ class Desk:
                 "undo": behind, "redo": ahead,
                 "valid": self.valid, "picture": self._picture, "problems": self.problems, "data": self.data,
                 "notes": list(self.document.notes), "fixed": self._fixed, "trusted": self.trusted,
-                "new": [file.name for file in self.document.state.files],
+                "new": [file.name for file in self.document.pending],
             }  # fmt: skip
 
     def fits(self, end: str) -> dict[str, str]:

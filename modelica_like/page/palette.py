@@ -5,12 +5,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 from functools import lru_cache
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
 from modelica_like.language.inside import declarations
 from modelica_like.lsp.names import Owner, owner_of, units_like
-from modelica_like.netlist.registry import library_types
+from modelica_like.netlist.registry import GROUP, library_types
 from modelica_like.show.draw.symbol import symbol
 from modelica_like.show.report.types import summary
 
@@ -66,13 +67,14 @@ def palette(folder: Path, words: str, without: Path) -> dict[str, Any]:
 def _own(folder: Path, without: Path) -> list[tuple[str, str]]:
     """Return netlists and component classes beside the netlist; no code runs for that."""
     rows: list[tuple[str, str]] = []
+    packages = ["modelica_like", *(entry.value.partition(".")[0] for entry in entry_points(group=GROUP))]
     for file in sorted([*folder.glob("*.toml"), *folder.glob("*.py")]):
         if file.resolve() == without.resolve() or not file.is_file() or file.stat().st_size > _LARGEST:
             continue
         text = file.read_text(encoding="utf-8", errors="replace")
         if file.suffix == ".toml" and "[parts" in text and "[expose]" in text:
             rows.append((f"./{file.name}", "netlist of this folder"))
-        elif file.suffix == ".py" and "modelica_like" in text:
+        elif file.suffix == ".py" and any(package in text for package in packages):
             rows += ((f"{file.stem}:{name}", "class of this folder") for name in _classes(text))
     return rows
 

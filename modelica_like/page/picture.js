@@ -50,7 +50,7 @@ function meant(event) {
   for (const end of at("sheet").querySelectorAll(".end")) {
     const box = end.getBoundingClientRect();
     const away = Math.hypot(event.clientX - box.x - box.width / 2, event.clientY - box.y - box.height / 2);
-    if (away < Math.min(nearest, NEAR[end.classList[1]]) && shownEnd(end)) [best, nearest] = [end, away];
+    if (away < Math.min(nearest, NEAR[end.classList[1]]) && shownEnd(end, over)) [best, nearest] = [end, away];
   }
   if (best) return { end: best.dataset.ground && event.altKey ? best.dataset.ground : best.dataset.end, node: best };
   const wire = target?.closest(".wire"), part = target?.closest(".part");
@@ -59,8 +59,10 @@ function meant(event) {
   return target?.closest("#sheet") ? { sheet: true, node: at("sheet") } : {};
 }
 
-/* Optional ends are there for selected parts, and while something is carried or joined. */
-const shownEnd = (end) => !end.classList.contains("optional") || end.closest(".part").classList.contains("selected") || !!end.closest(".joining, .carrying");
+/* Optional ends are there for selected parts, and while something is carried or joined; over its part a joined one, too:
+ * a thin part would otherwise be all ends. */
+const shownEnd = (end, over) => !(end.classList.contains("optional") || over && end.classList.contains("joined"))
+  || end.closest(".part").classList.contains("selected") || !!end.closest(".joining, .carrying");
 
 /* Of a line with many ends, the two between which a part is inserted: the one next to the pointer, and another. */
 function between(line, event) {

@@ -10,6 +10,7 @@ from typing import Any, cast
 from modelica_like.edit import references as ref
 from modelica_like.edit.document import apply
 from modelica_like.edit.parts import head, side
+from modelica_like.edit.parts import part as part_of
 from modelica_like.edit.sheet import Sheet
 from modelica_like.edit.values import part_texts
 from modelica_like.edit.wires import misfits
@@ -43,8 +44,11 @@ def placed(sheet: Sheet, part: Request, at: Mapping[str, Any]) -> list[Request]:
         if _is_side(sheet, end, outlet) and _works(sheet, request):
             return [request]
     added = apply(sheet.text, {"op": "add", **part}, file=sheet.file, files=sheet.files)
-    fits = misfits(Sheet(added.text, sheet.file, sheet.files), end)
-    mine = {path: why for path, why in fits.items() if head(path) == part["name"]}
+    drawn = Sheet(added.text, sheet.file, sheet.files)
+    new = part_of(drawn, part["name"])
+    usual = {f"{part['name']}.{name}" for name, connector in new.connectors.items() if not connector.optional}
+    fits = sorted(misfits(drawn, end).items(), key=lambda pair: pair[0] not in usual)
+    mine = {path: why for path, why in fits if head(path) == part["name"]}
     if (own := next((path for path, why in mine.items() if not why), None)) is None:
         why = next(iter(mine.values()), f"{part['name']} has no ends.")
         raise WrongConnection(why, advice="Put it on another end, or on the sheet.")
@@ -52,8 +56,10 @@ def placed(sheet: Sheet, part: Request, at: Mapping[str, Any]) -> list[Request]:
 
 
 def _is_side(sheet: Sheet, end: str, outlet: bool) -> bool:
-    """Tell whether an end that is in no line is the one by which its part is joined in a series."""
-    if any(end in line.names for line in ref.lines(sheet, "connect")):
+    """Tell whether an end is joined to nothing, and the one by which its part is joined in a series."""
+    lines = [(line.names, line.path[0]) for line in ref.lines(sheet, "connect", "series")]
+    goes_on = any(head(end) in (names[:-1] if outlet else names[1:]) for names, table in lines if table == "series")
+    if goes_on or any(end in names for names, table in lines if table == "connect"):
         return False
     try:
         return side(sheet, head(end), outlet).path == end

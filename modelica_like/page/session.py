@@ -52,8 +52,10 @@ class Session:
     ) -> None:  # fmt: skip
         self.folder, self.until, self.show, self.autosave = folder, until, tuple(show), autosave
         self._trusted = trusted
+        self.desks, self.trail = dict[Path, Desk](), list[Path]()
         first = self._opened(drive) if isinstance(drive, Path) else Desk.of_drive(drive, folder)
-        self.desks, self.trail = {first.path.resolve(): first}, [first.path.resolve()]
+        self.desks[first.path.resolve()] = first
+        self.trail.append(first.path.resolve())
         self._building = threading.Lock()
         self._built: tuple[Desk, int, Runs] | None = None
 
@@ -64,11 +66,10 @@ class Session:
 
     def _opened(self, path: Path) -> Desk:
         text = read(path)
-        others = self._texts if hasattr(self, "desks") else dict[Path, str]
-        return Desk(Document.draft(path, text or ""), text, trusted=self._trusted, others=others)
+        return Desk(Document.draft(path, text or ""), text, trusted=self._trusted, others=self._texts)
 
     def _texts(self) -> dict[Path, str]:
-        return {path: desk.document.text for path, desk in self.desks.items() if path != self.trail[-1]}
+        return {path: desk.document.text for path, desk in self.desks.items() if path not in self.trail[-1:]}
 
     def runs(self, request: Request) -> Runs:
         """Return the model that a request means.
@@ -216,12 +217,10 @@ class Session:
         """Show another netlist of the folder, such as one that is used as a part."""
         path = files.beside(self.desk.path, str(request["file"]).removeprefix("./"))
         key = path.resolve()
+        if key in self.desk.document.pending:
+            raise NetlistError(f"'{path.name}' is not written yet.", advice="Save the netlist first, and then open it.")
         if key not in self.desks:
-            texts = self.desk.document.state.files
-            desk = self._opened(path) if key not in texts else Desk(
-                Document.draft(path, texts[key]), None, trusted=self._trusted, others=self._texts
-            )  # fmt: skip
-            self.desks[key] = desk
+            self.desks[key] = self._opened(path)
         self.trail.append(key)
         self.desk.refresh()
         return self.state({})

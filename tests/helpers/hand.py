@@ -23,7 +23,7 @@ class Hand:
             self.until("asking === 0")
 
     def until(self, expression: str) -> None:
-        """Wait until an expression is true; the policy of the page forbids Playwright's own way, which evaluates text."""
+        """Wait until an expression is true; the policy of the page forbids that Playwright evaluates text there."""
         self.browser.run(
             f"""new Promise((go, fail) => {{ const begin = Date.now(), look = () => {expression} ? go(1)
             : Date.now() - begin > 20000 ? fail(Error("never")) : setTimeout(look, 10); look(); }})"""
