@@ -19,7 +19,7 @@ function entryOf({ kind, group, about, symbol }) {
   const picture = element("span", { className: "symbol" });
   if (symbol) picture.append(document.adoptNode(new DOMParser().parseFromString(symbol, "image/svg+xml").documentElement));
   const button = element("button", { className: "entry", title: `${kind} (${group})\n${about}` }, picture,
-    element("span", {}, element("b", {}, kind.replace("./", "")), element("small", {}, about)));
+    element("span", {}, element("b", {}, kind.replace("./", "").replace(/([a-z])([A-Z])/g, "$1\u200b$2")), element("small", {}, about)));
   button.dataset.kind = kind;
   const take = () => carry({ kind, replace: at("shelf").dataset.replace });
   let from = null;

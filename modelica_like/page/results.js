@@ -65,6 +65,7 @@ async function run(changed = false) {
   if (made.times.length < 2) return noRun(made.message);
   if (changed && results.run) results.earlier = [results.run, ...results.earlier].slice(0, MOST_EARLIER);
   results.run = made;
+  document.body.classList.remove("no-run");
   drawCurves();
   const events = made.events.length / 7;
   at("status").textContent = `${made.steps} steps, ${events} mode change${events === 1 ? "" : "s"}; the run took ${(computed - begin).toFixed(0)} ms.`;

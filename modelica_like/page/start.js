@@ -6,6 +6,7 @@ listenToText();
 listenToRuns();
 listenToFiles();
 addEventListener("unhandledrejection", (event) => tell(event.reason));
+document.body.classList.add("no-run");
 if (PAGE.folded) fold("text", false);
 if (PAGE.folded || innerWidth < 820) fold("shelf", false);
 change("state", {}).then(() => { search(); setTimeout(watch, PERIOD); }, tell);
