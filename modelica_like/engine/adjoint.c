@@ -51,8 +51,9 @@ static int prepare_step(Instance *c, double begin, double h) {
     size_t n = (size_t)m->n_unknowns, nonzeros = (size_t)m->step.n_nonzeros;
     memset(g->matrices, 0, N_NODES * nonzeros * sizeof(double));
     for (int node = N_NODES - 1; node >= 0; node--) {
-        double t = begin + RODAS_TIME[node] * h, *point = g->points + (size_t)node * n;
+        double t = node_time(begin, h, node), *point = g->points + (size_t)node * n;
         piece_at(m, c->piece, t, point);
+        solve_implicit(c, t, point, 1); /* polynomials of unknowns are as good as the states need them */
         evaluate_special(c, &m->tapes.jacobian, t, point, c->jacobian);
         for (int k = 0; k < m->n_jacobian; k++)
             g->matrices[(size_t)node * nonzeros + m->jacobian_to_step[k]] = c->jacobian[k];
@@ -114,8 +115,8 @@ static void rates_back(Instance *c, double begin, double h, const double *rates)
             if (!g->still[first]) lanes[count++] = first;
         memset(g->lanes, 0, inputs * (size_t)count * sizeof(double));
         for (int node = 0; node < N_NODES && count > 0; node++) {
-            const Tape *ran = evaluate_on_tape(
-                c, &m->tapes.rates, begin + RODAS_TIME[node] * h, g->points + (size_t)node * n, c->rhs);
+            const Tape *ran =
+                evaluate_on_tape(c, &m->tapes.rates, node_time(begin, h, node), g->points + (size_t)node * n, c->rhs);
             for (int v = 0; v < count; v++) at_node[v] = rates + ((size_t)lanes[v] * N_NODES + (size_t)node) * n;
             tape_adjoint_of(count, ran, c->slots, g->lanes, at_node);
         }

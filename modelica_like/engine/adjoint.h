@@ -82,6 +82,11 @@ static const double BY_NODES[N_NODES] = {-8.369800827143091, 46.395023689295286,
 
 static inline int node_of(int stage) { return stage < N_NODES ? stage : N_NODES - 1; }
 
+/* When a node of a step is: not quite at the ends, where slopes may be those beyond an edge. */
+static inline double node_time(double begin, double h, int node) {
+    double inside = min_of(1e-3 * h, 1e-14 * max_of(1, fabs(begin)));
+    return max_of(begin + inside, min_of(begin + RODAS_TIME[node] * h, begin + h - inside));
+}
 static inline double span_of(const Instance *c) {
     return c->state.stop_time_defined ? c->state.stop_time - c->state.start_time : 1;
 }

@@ -245,7 +245,7 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
         double between = 0.5 * (before + edge);
         if (of_guards && between > resolved && has_risen(c, between)) return between - begin;
         if (of_guards && edge > resolved && has_risen(c, edge)) return edge - begin;
-        unseen |= of_slopes && is_unseen(c, before, edge);
+        unseen |= of_slopes && (c->lands || is_unseen(c, before, edge));
         if (landing == h && edge - begin > max_of(least, ALREADY * h)) landing = edge - begin;
     }
     if (unseen && landing >= h && takes_panels(c)) return 0.5 * h; /* the piece ends at its only edge */

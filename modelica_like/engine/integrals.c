@@ -48,7 +48,7 @@ double slopes_of_integrands(Instance *c, double begin, double h) {
         for (int node = 0; node < N_NODES && integrand_of(g, row) >= 0; node++) {
             size_t place = (size_t)row * N_NODES + (size_t)node;
             const double *point = g->points + (size_t)node * n;
-            error += h * weights[node] * seed_integrand(c, begin + RODAS_TIME[node] * h, point, integrand_of(g, row));
+            error += h * weights[node] * seed_integrand(c, node_time(begin, h, node), point, integrand_of(g, row));
             memcpy(g->integrand_slopes + place * n, c->dots + m->slot_x, n * sizeof(double));
             memset(c->dots + m->slot_x, 0, (size_t)m->n_x * sizeof(double));
             memset(g->integrand_bars + place * all, 0, all * sizeof(double));

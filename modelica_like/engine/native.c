@@ -243,7 +243,9 @@ EXPORTED int native_copy(Native *n, void **copy) { return code(state_copy_out(n-
 EXPORTED int native_restore(Native *n, const void *copy) { return code(state_copy_in(n->c, copy)); }
 EXPORTED void native_drop(Native *n, void **copy) { state_release(n->c, copy); }
 
-/* Derivatives of what is read along the run since the begin, which modelica_like_gradient_start has been told of. */
+/* Steps end at edges from now on, for derivatives; of what is read along the run since the begin, which
+ * modelica_like_gradient_start has been told of. */
+EXPORTED void native_land(Native *n) { n->c->lands = 1; }
 EXPORTED int native_gradient_along(Native *n, const Along *along, double *gradient) {
     return code(gradient_along(n->c, along, gradient));
 }

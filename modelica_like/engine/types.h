@@ -219,4 +219,5 @@ typedef struct Instance {
     int edges_valid;     /* the first third of `edges` belongs to the present point */
     double edges_kept;   /* the last third to the beginning of a step of this length, which ended there; or 0 */
     Gradient *gradient;  /* or NULL */
+    int lands;           /* steps end where slopes may change: derivatives along them are as good as they are then */
 } Instance;

@@ -118,6 +118,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "restore": (_CODE, 2 * [_POINTER]),
     "drop": (None, [_POINTER, c.POINTER(_POINTER)]),
     "counts": (None, 2 * [_POINTER]),
+    "land": (None, [_POINTER]),
     "gradient_along": (_CODE, [_POINTER, c.POINTER(Along), _POINTER]),
     "run": (_CODE, [_POINTER, _NUMBER, _COUNT, c.POINTER(Run)]),
     "batch": (_COUNT, [_POINTER, c.POINTER(BatchArguments)]),

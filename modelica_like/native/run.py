@@ -29,6 +29,8 @@ _PARTS = 100
 """Parts of a run that may take `max_steps` each, if it has so many results."""
 _ROUNDING = 1e-9
 """Relative one of the times of results."""
+_SAME_START = 1e-8
+"""Difference of two starts, relative to their states, up to which they are one: start values are solved to 1e-10."""
 
 
 class _ByIdas:
@@ -88,7 +90,11 @@ class EngineLoop:
         end: end time in s.
         progress: called with the time reached.
         idas: whether IDAS integrates; without states there is nothing to integrate.
-        by: parameters and inputs by which the run is to be differentiated: its start is found again, and it is kept.
+        by: parameters and inputs by which the run is to be differentiated: its start is found again, it is kept, and
+            its steps end where slopes change.
+
+    Attributes:
+        starts_there: whether the start that is found again is the given one.
     """
 
     def __init__(
@@ -106,8 +112,11 @@ class EngineLoop:
         if options.max_step < end - start.t:
             self._instance.limit(options.max_step)
         self._by = self._instance.native.references(by)
+        self.starts_there = True
         if by:
+            self._instance.library.land(self._instance.address)
             self._instance.begin_differentiable(self._by)
+            self.starts_there = _is_near(model, self._instance.present(), start)
         else:
             self._instance.begin_at(start)
         by_idas = idas and bool(model.states)
@@ -221,6 +230,11 @@ class EngineLoop:
         for row in events.tolist():
             transition, mode, before, after, number = (int(number) for number in row[1:6])
             self.record.note(self.model, row[0], mode, (before, after), transition, number)
+
+
+def _is_near(model: CompiledDae, found: Point, start: Point) -> bool:
+    sizes = np.abs(start.x) + model.equations.nominals
+    return bool(np.array_equal(found.d, start.d) and np.all(np.abs(found.x - start.x) <= _SAME_START * sizes))
 
 
 def _impact_size(model: CompiledDae) -> int:

@@ -49,17 +49,17 @@ def test_value_and_jacobian_share_one_simulation() -> None:
     assert function.runs == before + 1
 
 
-def test_values_alone_need_no_replay_and_are_those_of_it() -> None:
+def test_values_alone_need_no_derivatives_and_are_those_beside_them() -> None:
     names = ["clutch.lock_time", "shaft1.tau", "at(shaft1.tau, 0.3 s)", "stored_energy"]
     function = simulation_function(EXAMPLES / "machine_tool_startup.toml", ["k1", "J1.J"], names)
     differentiated = []
-    function._differentiate = lambda solution, of=function._differentiate: differentiated.append(1) or of(solution)
+    function._by_run_time = lambda values, of=function._by_run_time: differentiated.append(1) or of(values)
     point = [6000.0, 1.7]
     alone = np.array(function(point)).ravel()
     assert (function.runs, differentiated) == (1, [])
-    replayed = [one.value for one in function.at(point).outputs]
+    beside = [one.value for one in function.at(point).outputs]
     assert (function.runs, differentiated) == (1, [1])
-    assert alone == pytest.approx(replayed, rel=1e-7)
+    assert alone == pytest.approx(beside, rel=1e-7)
 
 
 def test_adjoint_and_forward_products() -> None:

@@ -1,8 +1,7 @@
 """Derivatives of a run by the adjoint of the compiled run-time, where that has all of them for certain.
 
-It does the run again, keeps it, and goes back along it. What it cannot tell for certain, `adjoint` leaves to the
-replay, which has the sentences of refusals, too: a reading at an event or at a kink of a formula, what other modes
-follow, events that meet at an instant.
+The run is kept, and the adjoint goes back along it. What is not certain is left to the replay, which has the sentences
+of refusals, too: a reading at an event or at a kink of a formula, other modes that follow, events that meet.
 """
 
 from __future__ import annotations
@@ -22,10 +21,14 @@ from modelica_like.errors import ExportError, InitializationError, LanguageError
 from modelica_like.native.along import Row, Seed
 from modelica_like.native.expressions import key_of, with_expressions
 from modelica_like.native.run import EngineLoop
+from modelica_like.native.start import initialize
+from modelica_like.options import Options
 from modelica_like.runs.collect import Number
-from modelica_like.runs.readings import CONDITIONS, INTEGRATED, Output, by_output, leaves
+from modelica_like.runs.conserve import find_astray
+from modelica_like.runs.readings import CONDITIONS, INTEGRATED, Output, by_output, joined, leaves
 from modelica_like.runs.solution import Solution
-from modelica_like.solve.initialize import Point
+from modelica_like.runs.trajectories import Statistics
+from modelica_like.solve.initialize import Point, StartKind
 from modelica_like.solve.initialize.slopes import Sizes, Slopes
 from modelica_like.solve.recorder import Event
 
@@ -39,26 +42,38 @@ _TOP = 1e-11
 """Last one of them, relative to the time."""
 _AT_KINK = 1e-7
 """Argument of a kink of a formula, relative to its operands, that may be at it: values are known that well."""
-_SOLVED = 1e-6
-"""Difference of starts and ends of both runs, relative to the largest states, beyond which they are others."""
+_RESULTS = 100
+"""Of a run: enough to judge its energies by."""
 
 
-def adjoint(solution: Solution, outputs: Sequence[Output], names: Sequence[str]) -> Vector | None:
-    """Return derivatives of outputs by parameters and inputs, shape (outputs, names); None: the replay has to tell.
+@dataclass(frozen=True)
+class Differentiated:
+    """A run, its outputs, and their derivatives, shape (outputs, names)."""
+
+    solution: Solution
+    values: Vector
+    derivatives: Vector
+
+
+def differentiated_run(
+    model: CompiledDae, end: float, options: Options, start: StartKind, outputs: Sequence[Output], names: Sequence[str]
+) -> Differentiated | None:
+    """Simulate and differentiate; None where `simulate` or the replay has to tell.
 
     Args:
-        solution: the run.
+        model: the compiled model.
+        end: end time in s.
+        options: of the run.
+        start: kind of start.
         outputs: without series.
         names: paths of parameters and inputs.
     """
-    model = solution.model
-    refused = TERMINAL in model.discrete_position or solution.ended is not None or model.events.delay_parts
-    if refused or not model.states:
+    if TERMINAL in model.discrete_position or model.events.delay_parts or not model.states:
         return None
     parts = leaves(outputs)
     wanted = [part for leaf in parts if leaf.kind in INTEGRATED for part in leaf.parts(model)]
     try:
-        run = _again(solution, with_expressions(model, wanted, edges=True), names)
+        run = _kept(model, with_expressions(model, wanted, edges=True), end, options, start, names)
         if run is None:
             return None
         values = run.solution.read(*(leaf.name for leaf in parts))
@@ -68,30 +83,28 @@ def adjoint(solution: Solution, outputs: Sequence[Output], names: Sequence[str])
         slopes = run.slopes([row for row in rows if row is not None])
     except (ExportError, InitializationError, LanguageError, MissingExtra, NoGradient, SolveError):
         return None
-    return _joined(outputs, values, slopes) if np.all(np.isfinite(slopes)) else None
-
-
-def _again(solution: Solution, extended: CompiledDae, names: Sequence[str]) -> _Run | None:
-    """Do the run again and keep it; None if it is another one, or events of it meet."""
-    begin, end, options = solution.segments[0].start, float(solution.time[-1]), solution.options
-    loop = EngineLoop(extended, replace(options, points=1), begin, end, by=names)
-    loop.run()
-    record, model = loop.record, solution.model
-    again = replace(
-        solution, segments=tuple(record.segments), events=tuple(record.events), impacts=tuple(record.impacts),
-        readings={}, dense=record.keeper.dense(loop),
-    )  # fmt: skip
-    if again.dense is None or _changes(solution) != _changes(again) or _meet(again.events):
+    if not np.all(np.isfinite(slopes)):
         return None
-    size = np.abs(np.hstack([segment.x for segment in solution.segments])).max(axis=1) + model.equations.nominals
-    for k in (0, -1):
-        if not np.all(np.abs(again.segments[k].x[:, k] - solution.segments[k].x[:, k]) <= _SOLVED * size):
-            return None
-    return _Run(again, extended, loop)
+    return Differentiated(run.solution, np.ravel(joined(outputs, values)), _chained(outputs, values, slopes))
 
 
-def _changes(run: Solution) -> list[tuple[int, str, str, int, int]]:
-    return [(e.transition, e.mode, e.after, e.round, e.segment) for e in run.events]
+def _kept(
+    model: CompiledDae, extended: CompiledDae, end: float, options: Options, start: StartKind, names: Sequence[str]
+) -> _Run | None:
+    """Simulate and keep the run; None if it is not certain."""
+    loop = EngineLoop(extended, replace(options, points=_RESULTS), initialize(model, 0.0, start), end, by=names)
+    if not loop.starts_there:
+        return None
+    record = loop.run()
+    steps, evaluations, integrations = loop.counts
+    statistics = Statistics(steps, evaluations, integrations, len(record.events), 0.0)
+    solution = Solution(
+        model, options, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
+        tuple(record.notices), start, dense=record.keeper.dense(loop),
+    )  # fmt: skip
+    refused = solution.dense is None or solution.ended is not None or _meet(solution.events)
+    astray = options.on_energy_drift != "off" and not refused and find_astray(solution) is not None
+    return None if refused or astray else _Run(solution, extended, loop)
 
 
 def _meet(events: Sequence[Event]) -> bool:
@@ -106,7 +119,7 @@ def _at_kinks(outputs: Sequence[Output], values: Sequence[float]) -> bool:
     return any(abs(edge.reading.value) <= size for edge in edges)
 
 
-def _joined(outputs: Sequence[Output], values: Sequence[float], slopes: Vector) -> Vector:
+def _chained(outputs: Sequence[Output], values: Sequence[float], slopes: Vector) -> Vector:
     """Derivatives of outputs from those of their leaves."""
     pairs = zip(outputs, by_output(outputs, values), by_output(outputs, [*slopes]), strict=True)
     joined = [output.formula()(np.array(some))[1].full()[0] @ np.array(of) if output.operands else of[0]

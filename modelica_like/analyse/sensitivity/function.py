@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.sensitivity.by_run_time import adjoint
+from modelica_like.analyse.sensitivity.by_run_time import differentiated_run
 from modelica_like.analyse.sensitivity.callback import NamedCallback
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
 from modelica_like.analyse.sensitivity.formulas import free_formulas
@@ -65,15 +65,15 @@ class SimulationFunction(NamedCallback):
         self._run = {**run, "parameters": freed.values}
         self._precision = precision
         self._nan_where_refused = nan_where_refused
-        self._last: tuple[Solution, Sensitivities] | None = None
+        self._last: tuple[bytes, Sensitivities] | None = None
         self._simulated: tuple[bytes, Solution] | None = None
         self._sequence: list[tuple[str, str, str]] | None = None
         self._read = [read_output(self._model, name) for name in outputs]
         end, chosen = plan(self._model, run["until"], options=run["options"])
         rtol = min(chosen.rtol, precision * _FINER)
         self._tight = {"until": end, "rtol": rtol, "atol": min(chosen.atol, rtol / 100)}
+        self._options = replace(chosen, rtol=rtol, atol=self._tight["atol"])
         solution = quick_run(self._model, **{**self._run, **self._tight}, readings=outputs)
-        self._first: Sensitivities | None = None
         self._first = self._differentiate(solution)
         self._names = [parameter.name for parameter in self._first.parameters]
         self.start_values = np.array([parameter.value for parameter in self._first.parameters])
@@ -83,24 +83,35 @@ class SimulationFunction(NamedCallback):
         self.declare("simulation", {"p": dense(len(self.inputs))}, {"y": dense(len(self.outputs))})
 
     def _differentiate(self, solution: Solution) -> Sensitivities:
-        """Differentiate a run: by the run-time, unless it is the first one or has something that only the replay can.
+        start = self._run.get("start")
+        return sensitivities(solution, self.outputs, self.inputs, start=start, precision=self._precision)
 
-        What refuses derivatives for all values, as a motion that begins at rest, the first one tells.
+    def _by_run_time(self, values: Vector) -> Sensitivities | None:
+        """Simulate at parameter values with derivatives by the run-time; None where the replay has to tell.
+
+        What refuses derivatives for all values, as a motion that begins at rest, it has told at the start values.
         """
-        slopes = None if self._first is None else adjoint(solution, self._read, self._names)
-        if self._first is None or slopes is None:
-            start = self._run.get("start")
-            return sensitivities(solution, self.outputs, self.inputs, start=start, precision=self._precision)
-        model = solution.model
-        places = [model.fixed_position[name] for name in self._names]
-        fixed = np.concatenate([model.p, model.u])[places]
+        model = self._model.with_parameters(self._given(values))
+        kind = self._run["start"] or model.settings.get("start", "given")
+        result = differentiated_run(model, self._tight["until"], self._options, kind, self._read, self._names)
+        if result is None or self._sequence not in (None, mode_sequence(result.solution.events)):
+            return None
+        numbers = result.values
+        if self._simulated is not None and self._simulated[0] == values.tobytes():
+            numbers = self._simulated[1].read(*self.outputs)  # the same name has the same number everywhere
+        else:
+            self.runs += 1
+        fixed = np.concatenate([model.p, model.u])[[model.fixed_position[name] for name in self._names]]
         outputs, parameters = (
-            tuple(replace(quantity, value=float(value)) for quantity, value in zip(quantities, values, strict=True))
-            for quantities, values in (
-                (self._first.outputs, solution.read(*self.outputs)), (self._first.parameters, fixed)
-            )
-        )  # fmt: skip
-        return replace(self._first, outputs=outputs, parameters=parameters, derivatives=slopes, method="adjoint")
+            tuple(replace(quantity, value=float(value)) for quantity, value in zip(quantities, given, strict=True))
+            for quantities, given in ((self._first.outputs, numbers), (self._first.parameters, fixed))
+        )
+        return replace(
+            self._first, outputs=outputs, parameters=parameters, derivatives=result.derivatives, method="adjoint"
+        )
+
+    def _given(self, values: Vector) -> dict[str, Any]:
+        return {**self._run["parameters"], **dict(zip(self.inputs, map(float, values), strict=True))}
 
     def at(self, p: Vector | Sequence[float]) -> Sensitivities:
         """Simulate at parameter values and return outputs with derivatives; kept until the next values.
@@ -109,9 +120,10 @@ class SimulationFunction(NamedCallback):
             NoGradient: the mode sequence is not the one of the start values, or a derivative does not exist.
             ModelicaLikeError: the simulation fails.
         """
-        solution = self._simulate(np.asarray(p, float).ravel())
-        if self._last is None or self._last[0] is not solution:
-            self._last = solution, self._differentiate(solution)
+        values = np.asarray(p, float).ravel()
+        if self._last is None or self._last[0] != values.tobytes():
+            result = self._by_run_time(values)
+            self._last = values.tobytes(), result or self._differentiate(self._simulate(values))
         return self._last[1]
 
     def values_at(self, p: Vector | Sequence[float]) -> list[float]:
@@ -122,7 +134,10 @@ class SimulationFunction(NamedCallback):
             UnknownName: a mode change does not happen.
             ModelicaLikeError: the simulation fails.
         """
-        values = self._simulate(np.asarray(p, float).ravel()).read(*self.outputs)
+        key = np.asarray(p, float).ravel()
+        if self._last is not None and self._last[0] == key.tobytes():
+            return [output.value for output in self._last[1].outputs]
+        values = self._simulate(key).read(*self.outputs)
         for name, value in zip(self.outputs, values, strict=True):
             if np.isnan(value):
                 raise does_not_happen(name)
@@ -132,9 +147,8 @@ class SimulationFunction(NamedCallback):
         """Simulate at parameter values; kept until the next ones."""
         key = values.tobytes()
         if self._simulated is None or self._simulated[0] != key:
-            given = {**self._run["parameters"], **dict(zip(self.inputs, map(float, values), strict=True))}
             self.runs += 1
-            run = {**self._run, **self._tight, "parameters": given}
+            run = {**self._run, **self._tight, "parameters": self._given(values)}
             solution = quick_run(self._model, **run, readings=self.outputs)
             sequence = mode_sequence(solution.events)
             if self._sequence not in (None, sequence):
