@@ -184,7 +184,7 @@ def connect(sheet: Sheet, first: str, second: str, *, name: str | None = None) -
 
 
 def misfits(sheet: Sheet, end: str) -> dict[str, str]:
-    """Return whether each other end of the drive can be joined to one: "", or a sentence that says why not.
+    """Return whether each end that is not joined to one can be: "", or a sentence that says why not.
 
     Args:
         sheet: the netlist, whose parts must all be right.
@@ -198,9 +198,13 @@ def misfits(sheet: Sheet, end: str) -> dict[str, str]:
     lines = [line.names for line in ref.lines(sheet, "connect")]
     mine = [line for line in lines if end in line]
     part_end(drive, end)
+    pairs = (pair for line in ref.lines(sheet, "series") for pair in pairwise(line.names))
+    near = [pair for pair in pairs if head(end) in map(head, pair)]
+    joints = [{side(sheet, left, True).path, side(sheet, right, False).path} for left, right in near]
+    beside = {path for joint in joints if end in joint for path in joint}
     answer: dict[str, str] = {}
     for path in (f"{name}.{inner}" for name, part in drive.parts.items() for inner in ends_of(part)):
-        if path == end or any(path in line for line in mine):
+        if path == end or path in beside or any(path in line for line in mine):
             continue
         wiring = Wiring()
         for line in [*mine, *(line for line in lines if path in line), [end, path]]:

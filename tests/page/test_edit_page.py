@@ -266,3 +266,20 @@ def test_clicks_and_keys_without_a_meaning(hand: Hand, server: PageServer, seed:
     hand.page.keyboard.press("Escape")
     assert hand.text == server.session.desk.document.text
     assert not hand.said.startswith("Nobody answers")
+
+
+@pytest.mark.browser
+def test_a_server_that_has_ended_is_told(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "drive.toml").write_text(TEXT)
+    with served(tmp_path / "drive.toml") as server:
+        browser.open(server.address, 1400, 900, ready=READY)
+        hand = Hand(browser)
+        hand.wait()
+        server.shutdown()
+        server.server_close()
+        hand.page.click("#shelf-button")
+        hand.page.fill("#text", f"# kept\n{TEXT}")
+        hand.page.locator("#text").blur()
+        hand.until("document.getElementById('said').textContent.startsWith('Nobody answers.')")
+        assert hand.page.input_value("#text").startswith("# kept")
+    browser.complaints.clear()

@@ -100,6 +100,7 @@ def test_only_ends_that_fit_are_offered(session: Session) -> None:
     session.apply({"request": {"op": "add", "name": "r", "kind": "Ramp"}})
     fits = session.fits({"end": "a.flange_a"})
     assert [end for end, why in fits.items() if not why] == ["a.flange_b", "b.flange_a", "b.flange_b"]
+    assert "b.flange_a" not in session.fits({"end": "a.flange_b"}), "they follow each other"
     assert fits["r.y"] == "connect joins the signal r.y with the connector a.flange_a."
 
 
