@@ -4,7 +4,8 @@ const PERIOD = 1000; // ms between two looks at the file
 async function save(name) {
   send();
   if (!name && !page.exists) {
-    const answer = await question("Save the netlist", [{ name: "name", label: "File", value: page.file }], "Save", page.folder);
+    const answer = await question("Save the netlist", [{ name: "name", label: "File", value: page.file }], "Save",
+      page.folder);
     if (!answer?.name) return;
     name = answer.name.endsWith(".toml") ? answer.name : `${answer.name}.toml`;
   }
@@ -39,14 +40,17 @@ function conflict(theirs) {
   const take = element("button", {}, "Take the file"), mine = element("button", {}, "Keep mine");
   take.onclick = () => change("take", { theirs: true }).then(() => conflict(null), tell);
   mine.onclick = () => change("take", { theirs: false }).then(() => conflict(null), tell);
-  box.replaceChildren(element("p", {}, `Another program has changed ${page.file}, and this page has changes that are not saved. Which text stays? Undo brings the other one back.`),
-    element("div", { className: "two" }, element("figure", {}, element("figcaption", {}, "in the file", take), element("pre", {}, theirs)),
+  box.replaceChildren(element("p", {},
+    `Another program has changed ${page.file}, and this page has changes that are not saved. Which text stays? Undo brings the other one back.`),
+    element("div", { className: "two" }, element("figure", {}, element("figcaption", {}, "in the file", take),
+      element("pre", {}, theirs)),
       element("figure", {}, element("figcaption", {}, "in this page", mine), element("pre", {}, page.text))));
   box.hidden = false;
 }
 
 async function trust() {
-  const answer = await question("Run the modules of this folder?", [], "Run them", `${page.folder}: a Python module can do all that you can. Do it only if you know who wrote it.`);
+  const answer = await question("Run the modules of this folder?", [], "Run them",
+    `${page.folder}: a Python module can do all that you can. Do it only if you know who wrote it.`);
   if (answer) { kinds.clear(); await change("trust", {}).catch(tell); }
 }
 
@@ -65,7 +69,8 @@ function listenToFiles() {
   at("shelf-button").onclick = () => fold("shelf");
   at("text-button").onclick = () => fold("text");
   const choices = ["netlist under another name", ...PAGE.files.map((what) => what === "netlist" ? "netlist" : what)];
-  at("export").append(...choices.map((what) => element("option", { value: what }, what === "netlist" ? "copy of the netlist" : what)));
+  at("export").append(...choices.map((what) => element("option", { value: what },
+    what === "netlist" ? "copy of the netlist" : what)));
   at("export").onchange = () => { const what = at("export").value; at("export").value = ""; exported(what); };
   addEventListener("beforeunload", (event) => { if (!page.saved && page.undo) event.preventDefault(); });
 }
@@ -73,11 +78,13 @@ function listenToFiles() {
 listeners.push((state) => {
   const names = state.trail.map((name, k) => {
     const made = element(k + 1 < state.trail.length ? "button" : "h1", {}, name);
-    if (k + 1 < state.trail.length) made.onclick = async () => { for (let n = state.trail.length - 1; n > k; n--) await change("back", {}).catch(tell); };
+    if (k + 1 < state.trail.length) made.onclick = async () => { for (let n = state.trail.length - 1; n > k;
+    n--) await change("back", {}).catch(tell); };
     return made;
   });
   at("trail").replaceChildren(...names);
-  at("unsaved").textContent = state.fixed ? "made in Python" : state.saved && state.exists ? "" : state.exists ? "not saved" : "new";
+  at("unsaved").textContent = state.fixed ? "made in Python" : state.saved &&
+    state.exists ? "" : state.exists ? "not saved" : "new";
   at("undo").disabled = !state.undo;
   at("redo").disabled = !state.redo;
   document.title = `${state.saved ? "" : "• "}${state.file}`;

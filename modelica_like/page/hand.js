@@ -10,7 +10,8 @@ function carry(entry) {
   drop();
   carried = entry;
   document.body.classList.toggle("carrying", !!entry);
-  if (entry) say(`${entry.kind}: click a line to insert it, an end to join it, or the sheet. Esc puts it back.`, "note");
+  if (entry) say(`${entry.kind}: click a line to insert it, an end to join it, or the sheet. Esc puts it back.`,
+    "note");
 }
 
 function drop() {
@@ -167,7 +168,8 @@ async function paste(text) {
 async function groupChosen() {
   const names = chosen();
   if (names.length < 1) return;
-  const answer = await question("Group parts", [{ name: "name", label: "Name of the assembly and its file", value: "group" }],
+  const answer = await question("Group parts", [{ name: "name", label: "Name of the assembly and its file",
+    value: "group" }],
     "Group", `${names.join(", ")} become a netlist of their own, used as one part.`);
   if (answer?.name && await apply({ op: "group", names, name: answer.name })) select([answer.name]);
 }
@@ -186,8 +188,10 @@ const typing = (target) => target.closest?.("input, textarea, select, dialog, [c
 
 function keyed(event) {
   const key = event.key, control = event.ctrlKey || event.metaKey, target = event.target;
-  const files = { s: () => save(), e: () => fold("text"), z: () => step(event.shiftKey ? "redo" : "undo"), y: () => step("redo") };
-  if (control && files[key.toLowerCase()] && !(typing(target) && "zy".includes(key.toLowerCase()) && target.id !== "text")) {
+  const files = { s: () => save(), e: () => fold("text"), z: () => step(event.shiftKey ? "redo" : "undo"), y: () =>
+    step("redo") };
+  if (control && files[key.toLowerCase()] && !(typing(target) && "zy".includes(key.toLowerCase()) &&
+    target.id !== "text")) {
     event.preventDefault();
     return files[key.toLowerCase()]();
   }
@@ -197,7 +201,8 @@ function keyed(event) {
   if (control && tools[key.toLowerCase()]) { event.preventDefault(); return tools[key.toLowerCase()](); }
   if (control) return;
   const plain = { "/": () => (fold("shelf", true), at("search").focus()), "?": keys, Delete: removeChosen,
-    Backspace: removeChosen, F2: () => at("inspector").querySelector(".name")?.select(), " ": () => playing.on && play() };
+    Backspace: removeChosen, F2: () => at("inspector").querySelector(".name")?.select(), " ": () => playing.on &&
+      play() };
   if (plain[key]) { event.preventDefault(); return plain[key](); }
   if (key.startsWith("Arrow") && target.closest("#sheet")) {
     const next = neighbour([...page.selected].pop() ?? "", key);
@@ -209,7 +214,8 @@ function keyed(event) {
 function enter(target, event) {
   const { end, part, ends } = target.dataset ?? {};
   event.preventDefault();
-  if (carried) return lay(end ? { end, node: target } : ends ? { line: ends.split(" "), node: target } : { sheet: true, node: target });
+  if (carried) return lay(end ? { end, node: target } : ends ? { line: ends.split(" "), node: target } : { sheet: true,
+    node: target });
   if (end) return joining ? joined(end) : join(end);
   if (ends) return select([], ends.split(" "));
   if (part) return page.selected.has(part) && openable(part) ? openPart(part) : pick(part, event.shiftKey);
@@ -226,7 +232,8 @@ function escape() {
 const step = (what) => change(what, {}).catch(tell);
 
 const KEYS = [["/", "find a part; Enter takes it"], ["Tab, Enter", "go to parts, ends and lines; take, join, insert"],
-  ["arrows", "next part"], ["Del", "remove; neighbours in series are joined again"], ["F2", "rename"], ["Ctrl+D", "duplicate"],
+  ["arrows", "next part"], ["Del", "remove; neighbours in series are joined again"], ["F2", "rename"], ["Ctrl+D",
+    "duplicate"],
   ["Ctrl+C, Ctrl+X, Ctrl+V", "copy, cut, paste as netlist text"], ["Ctrl+G", "group into an assembly"],
   ["Enter, double click", "open an assembly"], ["Ctrl+Z, Ctrl+Y", "undo, redo"], ["Ctrl+S", "save"], ["Ctrl+E", "text"],
   ["Ctrl+Space", "complete in the text"], ["Esc", "leave"]];
@@ -242,7 +249,8 @@ function hint(text, event) {
   const place = at("hint");
   place.hidden = !text;
   place.textContent = text;
-  if (text) Object.assign(place.style, { left: `${Math.min(event.clientX + 14, innerWidth - 330)}px`, top: `${event.clientY + 16}px` });
+  if (text) Object.assign(place.style, { left: `${Math.min(event.clientX + 14, innerWidth - 330)}px`,
+    top: `${event.clientY + 16}px` });
 }
 
 function listenToHand() {

@@ -6,9 +6,11 @@ async function search(words = at("search").value.trim()) {
   if (!answer || mine !== sought) return;
   const entries = answer.entries.map(entryOf);
   const more = answer.more ? [element("p", { className: "dim" }, `${answer.more} more: type another word.`)] : [];
-  if (words && !entries.length) more.push(element("p", { className: "dim" }, "Nothing has these words in its name or its text."));
+  if (words && !entries.length) more.push(element("p", { className: "dim" },
+    "Nothing has these words in its name or its text."));
   const groups = words ? [] : Object.entries(answer.groups).map(([name, count]) => {
-    const button = element("button", { className: "group" }, element("span", {}, name), element("small", {}, String(count)));
+    const button = element("button", { className: "group" }, element("span", {}, name), element("small", {},
+      String(count)));
     button.onclick = () => { at("search").value = name.replaceAll("·", " "); search(name.replaceAll("·", " ")); };
     return button;
   });
@@ -17,13 +19,16 @@ async function search(words = at("search").value.trim()) {
 
 function entryOf({ kind, group, about, symbol }) {
   const picture = element("span", { className: "symbol" });
-  if (symbol) picture.append(document.adoptNode(new DOMParser().parseFromString(symbol, "image/svg+xml").documentElement));
+  if (symbol) picture.append(document.adoptNode(new DOMParser().parseFromString(symbol,
+    "image/svg+xml").documentElement));
   const button = element("button", { className: "entry", title: `${kind} (${group})\n${about}` }, picture,
-    element("span", {}, element("b", {}, kind.replace("./", "").replace(/([a-z])([A-Z])/g, "$1\u200b$2")), element("small", {}, about)));
+    element("span", {}, element("b", {}, kind.replace("./", "").replace(/([a-z])([A-Z])/g, "$1\u200b$2")),
+      element("small", {}, about)));
   button.dataset.kind = kind;
   const take = () => carry({ kind, replace: at("shelf").dataset.replace });
   let from = null;
-  button.onpointerdown = (event) => { from = event.pointerType === "mouse" && !event.button ? [event.clientX, event.clientY] : null; };
+  button.onpointerdown = (event) => { from = event.pointerType === "mouse" && !event.button ? [event.clientX,
+    event.clientY] : null; };
   button.onpointermove = (event) => {
     if (!from || Math.hypot(event.clientX - from[0], event.clientY - from[1]) < MOVED) return;
     from = null;
@@ -64,7 +69,8 @@ function listenToShelf() {
       event.preventDefault();
       if (event.key === "Enter" && first.matches(".entry")) { first.click(); at("sheet").focus(); } else first.focus();
     }
-    if (event.key === "Escape") { delete at("shelf").dataset.replace; at("search").value = ""; search(); at("search").blur(); }
+    if (event.key === "Escape") { delete at("shelf").dataset.replace; at("search").value = ""; search();
+    at("search").blur(); }
   };
   at("found").onkeydown = (event) => {
     const all = [...at("found").querySelectorAll("button")], k = all.indexOf(document.activeElement);

@@ -1,5 +1,6 @@
 /* The schematic: what is selected in it, what a problem marks, and how one looks for ends and lines near the pointer. */
-const NEAR = { open: 11, joined: 7, optional: 6 }, OVER = 6; // pixels around an end that belong to it; over a part, fewer
+const NEAR = { open: 11, joined: 7, optional: 6 }, OVER = 6;
+// pixels around an end that belong to it; over a part, fewer
 const SMALLEST = 0.72; // scale below which the picture is moved instead
 
 const drawing = () => at("sheet").querySelector("svg");
@@ -17,7 +18,8 @@ function draw(picture) {
   const made = new DOMParser().parseFromString(picture, "image/svg+xml").documentElement;
   made.style.minWidth = `${SMALLEST * made.viewBox.baseVal.width}px`;
   sheet.replaceChildren(document.adoptNode(made));
-  if (place && sheet.contains(active) === false && focused) (partAt(place) ?? endAt(place))?.focus({ preventScroll: true });
+  if (place && sheet.contains(active) === false &&
+    focused) (partAt(place) ?? endAt(place))?.focus({ preventScroll: true });
   mark();
 }
 
@@ -45,7 +47,8 @@ function select(names, line = null) {
 
 /* What a pointer means: an end nearby, or else a part, or a line, or the sheet. */
 function meant(event) {
-  const target = document.elementFromPoint(event.clientX, event.clientY), over = target?.closest(".part") && !target.closest(".end");
+  const target = document.elementFromPoint(event.clientX, event.clientY), over = target?.closest(".part") &&
+    !target.closest(".end");
   let best = null, nearest = over ? OVER : Infinity;
   for (const end of at("sheet").querySelectorAll(".end")) {
     const box = end.getBoundingClientRect();
@@ -76,12 +79,15 @@ function between(line, event) {
 
 /* The next part in a direction, for the arrow keys. */
 function neighbour(name, key) {
-  const middle = (one) => { const box = one.getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2]; };
+  const middle = (one) => { const box = one.getBoundingClientRect();
+  return [box.x + box.width / 2, box.y + box.height / 2]; };
   const all = [...at("sheet").querySelectorAll(".part")], from = partAt(name) ?? all[0];
   if (!from) return null;
-  const [x, y] = middle(from), [dx, dy] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[key];
+  const [x, y] = middle(from), [dx, dy] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0,
+    1] }[key];
   const rated = all.filter((one) => one !== from).map((one) => {
-    const [u, v] = middle(one), along = (u - x) * dx + (v - y) * dy, across = Math.abs((u - x) * dy) + Math.abs((v - y) * dx);
+    const [u, v] = middle(one), along = (u - x) * dx + (v - y) * dy,
+      across = Math.abs((u - x) * dy) + Math.abs((v - y) * dx);
     return [along > 1 ? along + 2 * across : 1e9, one];
   }).sort((a, b) => a[0] - b[0]);
   return rated.length && rated[0][0] < 1e9 ? rated[0][1] : null;

@@ -2,7 +2,8 @@
 const results = { content: null, shown: [], run: null, given: new Map(), revision: -1, picture: null, earlier: [] };
 const MOST_EARLIER = 3; // runs before the last changes that stay drawn as thin lines
 const valueAt = (one, p) => one.log ? one.low * (one.high / one.low) ** p : one.low + p * (one.high - one.low);
-const positionOf = (one, value) => one.log ? Math.log(value / one.low) / Math.log(one.high / one.low) : (value - one.low) / (one.high - one.low);
+const positionOf = (one, value) =>
+  one.log ? Math.log(value / one.low) / Math.log(one.high / one.low) : (value - one.low) / (one.high - one.low);
 let running = null, modelling = 0;
 
 /* ---- the model of the present text ---- */
@@ -11,7 +12,8 @@ async function model() {
   const mine = ++modelling, { revision } = page;
   running?.abort();
   if (!page.valid || !Object.keys(parts()).length) return noRun(page.valid ? "" : "The last run stays until the text is valid again.");
-  const answer = await ask("model", { revision, shown: results.shown }).catch((error) => ({ problems: [], content: null, failed: error.message }));
+  const answer = await ask("model", { revision, shown: results.shown }).catch((error) => ({ problems: [],
+    content: null, failed: error.message }));
   if (mine !== modelling || answer.stale) return;
   page.problems = answer.problems;
   listProblems();
@@ -33,10 +35,12 @@ function noRun(why) {
 }
 
 const endTime = () => results.content.sliders.find((one) => one.reference === null);
-const wanted = () => results.shown.map((name) => results.content.variables.find((one) => one.name === name)).filter(Boolean);
+const wanted = () => results.shown.map((name) => results.content.variables.find((one) =>
+  one.name === name)).filter(Boolean);
 const present = () => ({
   revision: results.revision, until: endTime().value,
-  values: [...results.given].map(([path, value]) => { const one = results.content.sliders.find((known) => known.name === path); return [one.reference, value * one.factor + one.offset]; }),
+  values: [...results.given].map(([path, value]) => { const one = results.content.sliders.find((known) =>
+    known.name === path); return [one.reference, value * one.factor + one.offset]; }),
 });
 
 /* ---- runs ---- */
@@ -88,7 +92,8 @@ function unpacked(data, references, content) {
 function drawCurves() {
   if (!results.run || !results.content) return;
   at("curves").classList.remove("stale");
-  const options = { shown: wanted(), end: Math.max(endTime().value, 0), remove: (one) => toggleCurve(one.name), choose: (time) => instant(time) };
+  const options = { shown: wanted(), end: Math.max(endTime().value, 0), remove: (one) => toggleCurve(one.name),
+    choose: (time) => instant(time) };
   const { main, others } = compared();
   results.picture = new Picture(at("curves"), main, others, options);
   document.dispatchEvent(new Event("drawn"));
@@ -150,7 +155,8 @@ async function play() {
 
 let ranked = 0, rankTimer = 0;
 function rank() {
-  const select = at("bars").querySelector("select"), names = wanted().filter((one) => !one.tree).map((one) => one.name), chosenName = select.value;
+  const select = at("bars").querySelector("select"), names = wanted().filter((one) => !one.tree).map((one) =>
+    one.name), chosenName = select.value;
   clearTimeout(rankTimer);
   if (names.join() !== [...select.options].map((one) => one.value).join()) {
     select.replaceChildren(...names.map((name) => element("option", { value: name }, name)));
@@ -174,14 +180,18 @@ async function rankNow() {
 
 /* ---- problems ---- */
 
-const FIXES = { replace: (one) => `Write ${one.new}`, set: (one) => `Give ${one.path}`, free: (one) => `Leave ${one.end} free` };
+const FIXES = { replace: (one) => `Write ${one.new}`, set: (one) => `Give ${one.path}`, free: (one) =>
+  `Leave ${one.end} free` };
 
 function listProblems() {
   at("problems").replaceChildren(...page.problems.slice(0, 40).map((one) => {
-    const text = element("button", { className: "problem" }, element("b", {}, one.what), element("span", {}, [one.why, one.advice].filter(Boolean).join(" ")));
+    const text = element("button", { className: "problem" }, element("b", {}, one.what), element("span", {}, [one.why,
+      one.advice].filter(Boolean).join(" ")));
     text.onclick = () => showProblem(one);
-    const actions = one.suggestion && isMine(one) ? [element("button", { className: "fix" }, FIXES[one.suggestion.operation](one.suggestion))] : [];
-    if (one.kind === "UntrustedModule") actions.push(element("button", { className: "fix" }, "Run the modules of this folder"));
+    const actions = one.suggestion && isMine(one) ? [element("button", { className: "fix" },
+      FIXES[one.suggestion.operation](one.suggestion))] : [];
+    if (one.kind === "UntrustedModule") actions.push(element("button", { className: "fix" },
+      "Run the modules of this folder"));
     if (actions.length) actions.at(-1).onclick = () => one.kind === "UntrustedModule" ? trust() : fix(one.suggestion);
     return element("li", { className: one.kind === "note" ? "note" : "" }, text, ...actions);
   }));
@@ -193,15 +203,19 @@ function showProblem(one) {
   if (one.line && isMine(one)) {
     const begin = offsetOf(at("text").value, one.line, one.column ?? 1);
     at("text").scrollTop = Math.max(0, (one.line - 4) * letter().height);
-    if (!at("textpane").hidden) { at("text").focus({ preventScroll: true }); at("text").setSelectionRange(begin, begin + (one.length ?? 0)); }
+    if (!at("textpane").hidden) { at("text").focus({ preventScroll: true });
+    at("text").setSelectionRange(begin, begin + (one.length ?? 0)); }
   }
 }
 
 async function fix(one) {
-  if (one.operation === "free") return apply({ op: "set", section: "", path: "free", value: [...(page.data.free ?? []), one.end] });
+  if (one.operation === "free") return apply({ op: "set", section: "", path: "free", value: [...(page.data.free ?? []),
+    one.end] });
   if (one.operation === "replace") {
-    const text = page.text.replaceAll("\r\n", "\n"), begin = offsetOf(text, one.line, one.column), end = begin + one.old.length;
-    if (text.slice(begin, end) === one.old) await change("text", { text: text.slice(0, begin) + one.new + text.slice(end) }).catch(tell);
+    const text = page.text.replaceAll("\r\n", "\n"), begin = offsetOf(text, one.line, one.column),
+      end = begin + one.old.length;
+    if (text.slice(begin, end) === one.old) await change("text", { text: text.slice(0,
+      begin) + one.new + text.slice(end) }).catch(tell);
     return;
   }
   select([head(one.path)]);

@@ -20,7 +20,8 @@ function coloured(text, marks) {
     for (let k = 0; k + 1 < inner.length; k++) {
       if (inner[k] === inner[k + 1]) continue;
       const over = marks.find(([a, b]) => a <= inner[k] && inner[k] < b);
-      const piece = element("span", { className: [look, over?.[2]].filter(Boolean).join(" ") }, text.slice(inner[k], inner[k + 1]));
+      const piece = element("span", { className: [look, over?.[2]].filter(Boolean).join(" ") }, text.slice(inner[k],
+        inner[k + 1]));
       out.push(piece);
     }
   }
@@ -37,9 +38,11 @@ function offsetOf(text, line, column) {
 const isMine = (problem) => !problem.file || problem.file.split(/[\\/]/).pop() === page.file;
 
 function paint() {
-  const text = at("text").value, marks = unsent ? [] : page.problems.filter((one) => one.line && isMine(one)).map((one) => {
+  const text = at("text").value, marks = unsent ? [] : page.problems.filter((one) => one.line &&
+    isMine(one)).map((one) => {
     const begin = offsetOf(text, one.line, one.column ?? 1), line = text.slice(begin).split("\n")[0];
-    return [begin, begin + Math.max(one.length ? [...line].slice(0, one.length).join("").length : line.length, 1), one.kind === "note" ? "noted" : "marked"];
+    return [begin, begin + Math.max(one.length ? [...line].slice(0, one.length).join("").length : line.length, 1),
+      one.kind === "note" ? "noted" : "marked"];
   });
   at("colours").replaceChildren(...coloured(text, marks), "\n");
   follow();
@@ -62,7 +65,8 @@ async function offer() {
   const text = at("text").value, place = at("text").selectionStart;
   const items = await ask("complete", { text, offset: [...text.slice(0, place)].length }).catch(() => []);
   if (at("text").value !== text || at("text").selectionStart !== place) return;
-  const typedSo = (item) => slicePoints(text, item.span[0], [...text.slice(0, place)].length).replace(/^["']/, "").toLowerCase();
+  const typedSo = (item) => slicePoints(text, item.span[0], [...text.slice(0, place)].length).replace(/^["']/,
+    "").toLowerCase();
   words(items.filter((item) => item.text.replace(/^["']/, "").toLowerCase().startsWith(typedSo(item))).slice(0, 60));
 }
 
@@ -73,13 +77,15 @@ function words(items) {
   [offered, choice, list.hidden] = [items, 0, items.length === 0];
   if (!items.length) return;
   list.replaceChildren(...items.map((item, k) => {
-    const made = element("li", { title: item.about }, element("b", {}, item.label), element("small", {}, item.about.replace(item.label, "").replace(/^[:\s]+/, "").split("\n")[0]));
+    const made = element("li", { title: item.about }, element("b", {}, item.label), element("small", {},
+      item.about.replace(item.label, "").replace(/^[:\s]+/, "").split("\n")[0]));
     made.role = "option";
     made.onpointerdown = (event) => { event.preventDefault(); choice = k; accept(); };
     return made;
   }));
   const box = caretBox();
-  Object.assign(list.style, { left: `${Math.min(box.x, innerWidth - 340)}px`, top: `${Math.min(box.y + 20, innerHeight - 220)}px` });
+  Object.assign(list.style, { left: `${Math.min(box.x, innerWidth - 340)}px`,
+    top: `${Math.min(box.y + 20, innerHeight - 220)}px` });
   mark_(0);
 }
 
@@ -100,14 +106,18 @@ function accept() {
 
 /* Where the caret is, by the size of a letter. */
 function letter() {
-  const style = getComputedStyle(at("text")), canvas = letter.canvas ??= document.createElement("canvas").getContext("2d");
+  const style = getComputedStyle(at("text")),
+    canvas = letter.canvas ??= document.createElement("canvas").getContext("2d");
   canvas.font = style.font;
-  return { width: canvas.measureText("0").width, height: parseFloat(style.lineHeight), pad: parseFloat(style.paddingLeft), top: parseFloat(style.paddingTop) };
+  return { width: canvas.measureText("0").width, height: parseFloat(style.lineHeight),
+    pad: parseFloat(style.paddingLeft), top: parseFloat(style.paddingTop) };
 }
 
 function caretBox() {
-  const before = at("text").value.slice(0, at("text").selectionStart), line = before.split("\n"), size = letter(), box = at("text").getBoundingClientRect();
-  return { x: box.x + size.pad + line.at(-1).length * size.width - at("text").scrollLeft, y: box.y + size.top + (line.length - 1) * size.height - at("text").scrollTop };
+  const before = at("text").value.slice(0, at("text").selectionStart), line = before.split("\n"), size = letter(),
+    box = at("text").getBoundingClientRect();
+  return { x: box.x + size.pad + line.at(-1).length * size.width - at("text").scrollLeft,
+    y: box.y + size.top + (line.length - 1) * size.height - at("text").scrollTop };
 }
 
 /* ---- explanation of the word under the pointer ---- */
@@ -121,9 +131,11 @@ function pointed(event) {
     const n = Math.floor((event.clientY - box.y - size.top + at("text").scrollTop) / size.height);
     const k = Math.floor((event.clientX - box.x - size.pad + at("text").scrollLeft) / size.width);
     if (!lines[n] || k < 0 || k >= lines[n].length) return;
-    const problem = page.problems.find((one) => one.line === n + 1 && isMine(one) && k >= (one.column ?? 1) - 1 && k < (one.column ?? 1) - 1 + (one.length ?? 999));
+    const problem = page.problems.find((one) => one.line === n + 1 && isMine(one) && k >= (one.column ?? 1) - 1 &&
+      k < (one.column ?? 1) - 1 + (one.length ?? 999));
     const about = problem ? [problem.what, problem.why, problem.advice].filter(Boolean).join("\n")
-      : await ask("explain", { text, offset: [...lines.slice(0, n).join("\n")].length + (n ? 1 : 0) + k }).catch(() => "");
+      : await ask("explain", { text, offset: [...lines.slice(0, n).join("\n")].length + (n ? 1 : 0) + k }).catch(() =>
+        "");
     if (about) hint(about.slice(0, 700), event);
   }, 350);
 }
@@ -131,7 +143,8 @@ function pointed(event) {
 /* Shows the lines of a part. */
 function scrollTo(name) {
   const lines = at("text").value.split("\n"), escapedName = name.replace(/[^\w]/g, "\\$&");
-  const n = lines.findIndex((line) => new RegExp(`^\\s*"?${escapedName}"?\\s*=\\s*[{\\[]|^\\[+parts\\."?${escapedName}"?\\]`).test(line));
+  const n = lines.findIndex((line) =>
+    new RegExp(`^\\s*"?${escapedName}"?\\s*=\\s*[{\\[]|^\\[+parts\\."?${escapedName}"?\\]`).test(line));
   if (n < 0 || document.activeElement === at("text")) return;
   const { height } = letter();
   at("text").scrollTop = Math.max(0, n * height - at("text").clientHeight / 3);

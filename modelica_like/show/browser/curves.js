@@ -59,7 +59,8 @@ class Picture {
     this.instants = [...instants];
     place.onpointermove = (event) => this.read(event.clientX);
     place.onpointerleave = () => this.read(null);
-    place.onclick = (event) => !event.target.closest("button") && this.inside(event.clientX) && choose?.(this.time(event.clientX));
+    place.onclick = (event) => !event.target.closest("button") && this.inside(event.clientX) &&
+      choose?.(this.time(event.clientX));
     this.draw();
   }
 
