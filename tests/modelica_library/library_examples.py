@@ -15,7 +15,10 @@ from modelica_like.netlist.modelica.read import read_modelica
 PACKAGES = (
     "Modelica.Mechanics.Rotational", "Modelica.Mechanics.Translational", "ModelicaTest.Rotational",
     "ModelicaTest.Translational", "Modelica.Thermal.HeatTransfer", "Modelica.Electrical.Analog",
-    "Modelica.Electrical.Machines.Examples.DCMachines", "Modelica.Electrical.Batteries", "Modelica.Blocks",
+    "Modelica.Electrical.Machines.Examples.DCMachines",
+    "Modelica.Electrical.Machines.Examples.Transformers",
+    "Modelica.Electrical.Polyphase",
+    "Modelica.Magnetic.FluxTubes", "Modelica.Electrical.Batteries", "Modelica.Blocks",
     "Modelica.StateGraph", "ModelicaTest.Blocks", "ModelicaTest.Electrical.Analog", "ModelicaTest.Tables",
 )  # fmt: skip
 MISSING: dict[str, str] = tomllib.loads((HERE / "missing.toml").read_text(encoding="utf-8"))

@@ -235,3 +235,76 @@ def test_tables_that_are_refused(table: str, smoothness: int, extrapolation: int
     with pytest.raises(ModelicaTextError) as caught:
         curve(tmp_path, table, smoothness, extrapolation, 1.0, file)
     assert caught.value.what == REFUSED[table, smoothness, extrapolation, file]
+
+
+PLUGS = """
+connector Pin
+  Real v;
+  flow Real i;
+end Pin;
+connector Plug
+  parameter Integer m = 2;
+  Pin pin[m];
+end Plug;
+model Conductors
+  parameter Real g = 1;
+  Plug p;
+  Plug n;
+equation
+  for k in 1:2 loop
+    p.pin[k].i = k*g*(p.pin[k].v - n.pin[k].v);
+    n.pin[k].i = -p.pin[k].i;
+  end for;
+end Conductors;
+model Two
+  Plug p;
+  Plug n;
+  Conductors a;
+  Conductors b(g = 3);
+equation
+  connect(p, a.p);
+  connect(a.n, b.p);
+  connect(b.n, n);
+end Two;
+model Pole
+  parameter Real v = 0;
+  Plug plug;
+equation
+  for k in 1:2 loop
+    plug.pin[k].v = v;
+  end for;
+end Pole;
+model A
+  Pole high(v = 4);
+  Pole low;
+  Two two;
+equation
+  connect(high.plug, two.p);
+  connect(two.n, low.plug);
+end A;
+"""
+
+
+def test_connectors_within_connectors_are_joined_one_by_one(tmp_path: Path) -> None:
+    final = run(tmp_path, PLUGS).final
+    for k in (1, 2):  # two conductances, k and 3 k, in series at 4 V
+        assert final[f"two.p.pin[{k}].i"] == pytest.approx(4 * k * 3 / 4)
+        assert final[f"two.a.n.pin[{k}].v"] == pytest.approx(4 - 3)
+        assert final[f"low.plug.pin[{k}].i"] == pytest.approx(4 * k * 3 / 4)
+
+
+def test_a_record_may_be_of_a_class_that_extends_the_declared_one(tmp_path: Path) -> None:
+    result = run(tmp_path, """
+record Base
+  parameter Real a = 1;
+  parameter Real b = 2;
+end Base;
+record Steel
+  extends Base(a = 10);
+end Steel;
+model A
+  parameter Base law = Steel(b = 3);
+  Real y = law.a + law.b*time;
+end A;
+""")  # fmt: skip
+    assert result["y"] == pytest.approx(10 + 3 * result.time)

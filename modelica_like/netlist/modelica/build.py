@@ -19,7 +19,6 @@ from modelica_like.language import (
     Connector,
     boolean,
     discrete,
-    flow,
     guess,
     integer,
     param,
@@ -31,6 +30,7 @@ from modelica_like.language.assembly import declare, end_at
 from modelica_like.language.fields import Discrete, Field, Input, Parameter
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.attributes import check_attributes, check_declared
+from modelica_like.netlist.modelica.connectors import bundle, connector_of, elements_of
 from modelica_like.netlist.modelica.fold import KNOWN, number, numbered
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
@@ -41,7 +41,7 @@ from modelica_like.netlist.modelica.statements import Statements
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_signal
 from modelica_like.netlist.modelica.values import Notes, known, nominal_of, number_of, shown_unit, unit_of, value_of
-from modelica_like.netlist.modelica.wiring import Wire, paths, rank
+from modelica_like.netlist.modelica.wiring import Wire, bundled, paths, rank
 from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConnector, as_formula, written_class
 
 
@@ -65,8 +65,9 @@ _STATE_SELECT = {"always": "always", "prefer": "prefer", "avoid": "avoid", "neve
 
 
 class _Builder:
-    def __init__(self, instance: Instance, notes: Notes) -> None:
+    def __init__(self, instance: Instance, notes: Notes, *, moved: bool = False) -> None:
         self.instance, self.notes = instance, notes
+        self.moved = moved  # a record that is given as a whole keeps the names of where it comes from
         self.statements = Statements(instance)
         self.errors: list[ModelicaLikeError] = []
         self.absent: set[str] = set()
@@ -184,8 +185,8 @@ class _Builder:
                 check_attributes(f"{name}.{field_name}", Basic("Real", entry, frozenset()), member.text)
             return connector
         if part.text.kind == "connector":
-            return _connector(part)
-        return _Builder(part, self.notes).run()
+            return bundle(name, part, self.instance, self.wires) if bundled(part) else connector_of(part)
+        return _Builder(part, self.notes, moved=part.owner is not self.instance).run()
 
     def _basic(self, name: str, member: Member, basic: Basic) -> None:
         declared = member.declaration
@@ -197,7 +198,7 @@ class _Builder:
                 self._parameter(name, member, basic)
             return
         shape = sizes(self.instance, member)
-        for path, index in _elements(name, shape):
+        for path, index in elements_of(name, shape):
             given = element(basic.given, index, shape[0]) if index else basic.given
             self._variable(path, name, member, replace(basic, given=given))
 
@@ -233,7 +234,8 @@ class _Builder:
         assert given.value is not None
         assert given.scope is not None
         node = Resolver(*given.scope)(given.value)
-        formula = as_formula(node, prefix) if given.scope[0] is reader else None
+        near = given.scope[0] is reader and not (self.moved and reader is not self.instance)
+        formula = as_formula(node, prefix) if near else None
         if formula is None:
             numbers = Resolver(*given.scope, numeric=True)(given.value)
             if numbers.kind != "number":
@@ -358,28 +360,3 @@ class _Builder:
                     f"{end} is true for instants only, which a connection does not carry here.",
                     advice="Write the 'when' in the class of the sample, or name the variable: when block.y then.",
                 )
-
-
-def _elements(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:
-    """Return the names of an array's elements with their index, or the name itself with zero."""
-    if not shape:
-        return [(name, 0)]
-    if len(shape) == 1:
-        return [(f"{name}[{k}]", k) for k in range(1, shape[0] + 1)]
-    return [(f"{name}[{k},{m}]", 0) for k in range(1, shape[0] + 1) for m in range(1, shape[1] + 1)]
-
-
-def _connector(instance: Instance) -> WrittenConnector:
-    connector = WrittenConnector(instance.text.description, free=True)
-    for name, member in instance.members.items():
-        basic = basic_type(instance, member)
-        if basic is None or basic.kind != "Real" or member.declaration.dimensions:
-            raise refused(f"{name} in a connector", member.text, member.declaration.line)
-        check_attributes(name, basic, member.text)
-        unit = unit_of(basic, Notes())
-        quantity = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
-        quantity.owner, quantity.name, quantity.nominal = instance.text.name, name, nominal_of(basic)
-        quantity.check()
-        inside(connector).own_fields = {**inside(connector).own_fields, name: quantity}
-    connector.kind = instance.text.path
-    return connector

@@ -289,6 +289,10 @@ def _instance(owner: Instance, member: Member, text: ClassText, name: str, given
     if text.kind == "record" and value is not None and given.scope is not None and given.scope[0] is not None:
         scope, inside = given.scope
         if value.kind == "call":
+            called = scope.find(value.args[0], inside)
+            if not isinstance(called, ClassText) or called.kind != "record":
+                raise refused(f"{value.args[0]}(…) as the value of a record", inside, value.line)
+            text = called  # it may extend the declared one, with values of its own
             names = list(Instance(owner.classes, text, Given(), owner, name).members) if value.args[1] else []
             if len(value.args[1]) > len(names):
                 raise refused(f"{value.args[0]}(…) with more than {len(names)} values", inside, value.line)

@@ -8,6 +8,7 @@ from typing import Any
 from modelica_like.errors import ModelicaTextError, did_you_mean
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold, members
+from modelica_like.netlist.modelica.calls import ARGUMENTS, ELEMENTARY, KEPT, REFUSED
 from modelica_like.netlist.modelica.classes import Classes
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
@@ -15,30 +16,7 @@ from modelica_like.netlist.modelica.lifting import way
 from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Import
 from modelica_like.netlist.modelica.types import Basic, basic_type
 
-ELEMENTARY = {
-    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "log10", "sqrt", "abs",
-    "sign", "floor", "ceil", "integer", "mod", "rem", "div", "min", "max",
-}  # fmt: skip
-"""Functions of numbers."""
-KEPT = {
-    "der", "pre", "noEvent", "smooth", "initial", "sample", "edge", "change", "reinit", "terminal", "delay",
-    "Clock", "previous", "hold",
-}  # fmt: skip
-_ARGUMENTS = {
-    **dict.fromkeys(("der", "pre", "noEvent", "edge", "change", "previous", "hold"), (1, 1)),
-    **dict.fromkeys(("initial", "terminal"), (0, 0)),
-    **dict.fromkeys(("sample", "Clock", "size"), (1, 2)), "smooth": (2, 2), "reinit": (2, 2), "delay": (2, 3),
-}  # fmt: skip
-"""Least and largest number of arguments."""
 _STATE_SELECT = ("never", "avoid", "default", "prefer", "always")
-_REFUSED = {
-    "spatialDistribution": "spatialDistribution", "cardinality": "cardinality(…)",
-    "inStream": "a stream connector", "actualStream": "a stream connector",
-    "subSample": "a clock that follows another",
-    "superSample": "a clock that follows another", "shiftSample": "a clock that follows another",
-    "backSample": "a clock that follows another",
-    "transition": "a state machine", "initialState": "a state machine",
-}  # fmt: skip
 
 
 class Resolver:
@@ -357,14 +335,14 @@ class Resolver:
         name, given, named = expression.args
         line = expression.line
         short = name.removeprefix("Modelica.Math.").removeprefix("Math.")
-        if short in _REFUSED:
-            raise refused(_REFUSED[short], self.text, line)
-        least, most = _ARGUMENTS.get(short, (0, len(given)))
+        if short in REFUSED:
+            raise refused(REFUSED[short], self.text, line)
+        least, most = ARGUMENTS.get(short, (0, len(given)))
         if not least <= len(given) <= most:
             count = f"{least} to {most}" if most > least else str(least)
             what = f"{short}(…) has {count} argument{'s' if most != 1 else ''}, not {len(given)}."
             raise ModelicaTextError(what, where=self.text.place(line))
-        if named and short in {*_ARGUMENTS, *KEPT, *functions.OF_ARRAYS, *ELEMENTARY}:
+        if named and short in {*ARGUMENTS, *KEPT, *functions.OF_ARRAYS, *ELEMENTARY}:
             raise ModelicaTextError(f"{short}(…) has no argument '{named[0][0]}'.", where=self.text.place(line))
         if short == "homotopy":
             others = dict(named)

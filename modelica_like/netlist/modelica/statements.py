@@ -181,7 +181,9 @@ class Statements(Whens):
             if isinstance(part, Known) or (isinstance(part, Instance) and part.text.kind != "connector"):
                 continue
             for last, entry in (element(member.given, k) if k else member.given).inner.items():
-                if entry.value is None or entry.scope is None:
+                below = part.members.get(last) if isinstance(part, Instance) else None
+                fixed = below is not None and bool({"parameter", "constant"} & below.declaration.prefixes)
+                if entry.value is None or entry.scope is None or fixed:
                     continue
                 path = Expr("name", ((f"{name}[{k}].{last}" if k else f"{name}.{last}", ()),), entry.line)
                 self.equate(path, self._seen(entry.value, *entry.scope), entry.scope[1], entry.line)

@@ -16,6 +16,9 @@ from modelica_like.netlist.modelica.members import exists, part_of, sizes, unkno
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import basic_type
 
+INSIDE = "inside_"
+"""Before the name of a connector within a connector: its side towards the inside of the component."""
+
 
 @dataclass
 class Wire:
@@ -68,6 +71,8 @@ def _pairs(left: Expr, right: Expr, instance: Instance, source: Source) -> list[
 def _ends(end: Expr, instance: Instance) -> list[str]:
     """Return the paths of an end; several for an array."""
     (name, subscripts), rest = end.args[0], end.args[1:]
+    if (bundle := _of_bundle(end, instance)) is not None:
+        return bundle
     member = instance.members.get(name)
     if member is None:
         raise unknown_name(f"{instance.text.name} has no '{name}'.", instance.text, end.line)
@@ -92,6 +97,39 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
     if outer is not None and (subscripts or len(heads) == 1):
         inner = [f"{last}{index}" for index in _indices(subscripts, sizes(part, outer), instance, end.line)]
     return [f"{head}.{name}" for head in heads for name in inner]
+
+
+def _of_bundle(end: Expr, instance: Instance) -> list[str] | None:
+    """Return the paths of the connectors within a connector that an end means, None if it means none."""
+    owner, path = instance, ""
+    for depth, (name, subscripts) in enumerate(end.args):
+        member = owner.members.get(name)
+        if member is None or depth > 1 or basic_type(owner, member) is not None or not exists(owner, member):
+            return None
+        indices = _indices(subscripts, sizes(owner, member), instance, end.line)
+        part = part_of(owner, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0)
+        if len(indices) > 1 or not isinstance(part, Instance):
+            return None
+        path += f"{name}{indices[0]}."
+        if part.text.kind == "connector":
+            leaves = bundled(part)
+            if len(end.args) > depth + 1:
+                wanted = _inside(end.args[depth + 1 :], instance, end.line)
+                leaves = [leaf for leaf in leaves if leaf in wanted or leaf.partition("[")[0] in wanted]
+            side = INSIDE if depth == 0 else ""
+            return [f"{path}{side}{leaf}" for leaf in leaves] or None
+        owner = part
+    return None
+
+
+def bundled(connector: Instance) -> list[str]:
+    """Return the names of the connectors within a connector."""
+    inner = {
+        name: sizes(connector, member)
+        for name, member in connector.members.items()
+        if basic_type(connector, member) is None and exists(connector, member)
+    }
+    return [f"{name}{index}" for name, shape in inner.items() for index in _indices((), shape, connector, 0)]
 
 
 def _inside(parts: tuple[tuple[str, tuple[Expr, ...]], ...], instance: Instance, line: int) -> list[str]:

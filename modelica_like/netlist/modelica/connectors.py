@@ -1,0 +1,76 @@
+"""Connectors of a text, and connectors within connectors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from modelica_like.errors import Source
+from modelica_like.language import flow, var
+from modelica_like.language.inside import inside
+from modelica_like.netlist.modelica.attributes import check_attributes
+from modelica_like.netlist.modelica.instance import Instance, refused
+from modelica_like.netlist.modelica.members import part_of, sizes
+from modelica_like.netlist.modelica.tree import Expr
+from modelica_like.netlist.modelica.types import basic_type
+from modelica_like.netlist.modelica.values import Notes, nominal_of, unit_of
+from modelica_like.netlist.modelica.wiring import INSIDE, Wire, bundled
+from modelica_like.netlist.modelica.written import Written, WrittenConnector, written_class
+
+
+def elements_of(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:
+    """Return the names of an array's elements with their index, or the name itself with zero."""
+    if not shape:
+        return [(name, 0)]
+    if len(shape) == 1:
+        return [(f"{name}[{k}]", k) for k in range(1, shape[0] + 1)]
+    return [(f"{name}[{k},{m}]", 0) for k in range(1, shape[0] + 1) for m in range(1, shape[1] + 1)]
+
+
+def connector_of(instance: Instance) -> WrittenConnector:
+    """Return the connector of an instance: its variables become its own fields."""
+    connector = WrittenConnector(instance.text.description, free=True)
+    for name, member in instance.members.items():
+        basic = basic_type(instance, member)
+        if basic is not None and {"parameter", "constant"} & member.declaration.prefixes:
+            continue
+        if basic is None or basic.kind != "Real":
+            raise refused(f"{name} in a connector", member.text, member.declaration.line)
+        check_attributes(name, basic, member.text)
+        unit = unit_of(basic, Notes())
+        for path, _ in elements_of(name, sizes(instance, member)):
+            quantity = flow(unit) if "flow" in member.declaration.prefixes else var(unit)
+            quantity.owner, quantity.name, quantity.nominal = instance.text.name, path, nominal_of(basic)
+            quantity.check()
+            inside(connector).own_fields = {**inside(connector).own_fields, path: quantity}
+    connector.kind = instance.text.path
+    return connector
+
+
+def bundle(path: str, instance: Instance, owner: Instance, wires: list[Wire]) -> Written:
+    """Return connectors within a connector as a part.
+
+    One that is connected inside joins two sides, so that each has its own flow; else equations here determine it.
+    """
+    kind: Any = written_class(instance.text.name)
+    component: Written = kind(instance.text.name, description=instance.text.description)
+    equations: list[tuple[Expr, Expr, Source]] = []
+    place = instance.text.place(instance.text.line)
+    joined = {end for wire in wires for end in wire.ends}
+    for leaf in bundled(instance):
+        name, _, index = leaf.partition("[")
+        part = part_of(instance, instance.members[name], int(index.rstrip("]")) if index else 0)
+        if not isinstance(part, Instance) or part.text.kind != "connector" or bundled(part):
+            raise refused(f"{leaf} in a connector", instance.text, instance.members[name].declaration.line)
+        outer, inner = connector_of(part), connector_of(part)
+        setattr(component, leaf, outer)
+        if f"{path}.{INSIDE}{leaf}" not in joined:
+            flows = sum(quantity.is_flow for quantity in outer.quantities.values())
+            inside(component).lent += flows
+            owner.balance -= flows
+            continue
+        setattr(component, f"{INSIDE}{leaf}", inner)
+        for key, quantity in outer.quantities.items():
+            here, there = (Expr("name", ((f"{side}{leaf}.{key}", ()),)) for side in ("", INSIDE))
+            equations.append((here, Expr("neg", (there,)) if quantity.is_flow else there, place))
+    inside(component).text, inside(component).statements = instance.text.path, tuple(equations)
+    return component
