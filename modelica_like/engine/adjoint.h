@@ -102,7 +102,7 @@ static inline double *vector_of(const Instance *c, int k) {
     return c->gradient->vectors + (size_t)k * (c->n_smooth + 1);
 }
 /* gradient.c */
-Result gradient_along(Instance *c, const Along *along, double *gradient);
+Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along *along, double *gradient);
 void add_doubt(Instance *c, FailureCode why, const double *slope);
 void lose_back(Instance *c);
 void add_seed(Instance *c, const Seed *seed);

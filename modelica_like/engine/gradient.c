@@ -272,7 +272,8 @@ static Result write_gradient(Instance *c, double *gradient) {
     return any || fail_with(c, first->why, by, first->t, 0);
 }
 
-static Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along *along, double *gradient) {
+/* By rows: of variables at the present point, or of what is read along the run, whose places are unchecked. */
+Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along *along, double *gradient) {
     Gradient *g = c->gradient;
     if (g->lost != 0) return fail_with(c, g->lost, UINT32_MAX, g->lost_at, 0);
     if (!factor_implicit(c)) return RESULT_ERROR;
@@ -297,9 +298,4 @@ int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, dou
     if (c == NULL || !allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED)) return 1;
     if (c->gradient == NULL || of == NULL || gradient == NULL) return !fail(c, NOT_ASKED, 0);
     return !check_unknowns(c, of, n_of) || !differentiate(c, of, n_of, NULL, gradient);
-}
-
-/* Derivatives of what is read along the run, by rows; places and sizes are unchecked. */
-Result gradient_along(Instance *c, const Along *along, double *gradient) {
-    return differentiate(c, NULL, (size_t)along->n_of, along, gradient);
 }

@@ -269,7 +269,6 @@ static void move_later(Instance *c, double side) {
     }
     for (int64_t k = 0; k < g->along->n_seeds && side > 0; k++)
         if (g->along->seeds[k].instant == g->instant) g->later[g->along->seeds[k].of] += g->along->seeds[k].moving;
-    c->variables_valid = 0;
 }
 
 /* Adds what is read before the instant, and what moves with it, at this speed of its guard. */

@@ -1,5 +1,4 @@
-/* Integrals over a run, read by an adjoint vector each: one more state in every step of adjoint.c, on which nothing
- * depends. */
+/* Integrals over a run, each read by an adjoint vector: one more state in the steps of adjoint.c. */
 #include "adjoint.h"
 
 #define JUMP_FELT 1e-4 /* of an integrand: less is a slope */
@@ -26,11 +25,10 @@ double integral_back(int of_error, double *stages, double *weights) {
 static double seed_integrand(Instance *c, double t, const double *point, int variable) {
     const Model *m = c->model;
     const Tape *ran = evaluate_on_tape(c, &m->tapes.variables, t, point, c->variables);
-    int place = output_place(&m->tapes.variables, ran, variable);
     c->variables_valid = 0;
     memset(c->dots, 0, (size_t)m->slot_results * sizeof(double));
     memset(c->outputs, 0, (size_t)ran->n_outputs * sizeof(double));
-    if (place >= 0) c->outputs[place] = 1;
+    c->outputs[output_place(&m->tapes.variables, ran, variable)] = 1;
     tape_adjoint(ran, c->slots, c->dots, c->outputs);
     memset(c->dots + m->n_slots, 0, (size_t)c->known_used * sizeof(double)); /* does not move */
     return c->variables[variable];

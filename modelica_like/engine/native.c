@@ -247,7 +247,7 @@ EXPORTED void native_drop(Native *n, void **copy) { state_release(n->c, copy); }
  * modelica_like_gradient_start has been told of. */
 EXPORTED void native_land(Native *n) { n->c->lands = 1; }
 EXPORTED int native_gradient_along(Native *n, const Along *along, double *gradient) {
-    return code(gradient_along(n->c, along, gradient));
+    return code(differentiate(n->c, NULL, (size_t)along->n_of, along, gradient));
 }
 
 /* Since the reset: steps, rejected steps, evaluations of the equations, mode changes. */

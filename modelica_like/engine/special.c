@@ -161,13 +161,11 @@ const Tape *run_on_tape(Instance *c, const Tape *tape, double *outputs) {
     return tape;
 }
 
-/* Which output of the tape that has run is an output of a tape; -1: none. */
+/* Which output of the tape that has run is a wanted output of a tape. */
 int output_place(const Tape *tape, const Tape *ran, int output) {
-    const Special *s = (const Special *)(const void *)ran;
-    if (ran == tape) return output;
-    for (int k = 0; k < ran->n_outputs; k++)
-        if (s->wanted[k] == output) return k;
-    return -1;
+    int k = 0;
+    while (ran != tape && ((const Special *)(const void *)ran)->wanted[k] != output) k++;
+    return ran == tape ? output : k;
 }
 
 /* The same for outputs alone, by compiled code where there is some. */

@@ -35,6 +35,8 @@ class Buffers:
         points: number of equal intervals of the results.
         widths: arrays to write (of `NativeRun` in native.c), with the number of columns.
         outputs: value references of the outputs.
+        room: for events and impacts at first. An instant for which there is none is passed again, and derivatives of
+            the run are lost.
 
     Attributes:
         emptied: takes the steps for which there is no more room.
@@ -43,8 +45,9 @@ class Buffers:
     emptied: Callable[[Vector], None]
 
     def __init__(
-        self, instance: Instance, end: float, points: int, widths: Mapping[str, int], outputs: Any = ()
-    ) -> None:
+        self, instance: Instance, end: float, points: int, widths: Mapping[str, int], outputs: Any = (),
+        *, room: int = _LEAST,
+    ) -> None:  # fmt: skip
         self.instance, self.end, self.points = instance, end, points
         self.references = np.array(outputs, np.uint32)
         self.run = Run(steps=_BREATH, n_outputs=len(self.references), references=self.references.ctypes.data)
@@ -53,7 +56,8 @@ class Buffers:
         written = {counted: [name for name in names if name in widths] for counted, names in _COUNTED.items()}
         self._written = {counted: names for counted, names in written.items() if names or counted == "points"}
         for counted, names in self._written.items():
-            self._make_room(counted, names, points + 2 * _LEAST if counted == "points" else _LEAST)
+            first = {"points": points + 2 * _LEAST, "events": room, "impacts": room}.get(counted, _LEAST)
+            self._make_room(counted, names, first)
 
     def go(self, reached: Callable[[float], bool]) -> int:
         """Run to the end, and return the last code.

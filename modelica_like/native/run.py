@@ -29,6 +29,8 @@ _PARTS = 100
 """Parts of a run that may take `max_steps` each, if it has so many results."""
 _ROUNDING = 1e-9
 """Relative one of the times of results."""
+_EVENTS, _KEPT_EVENTS = 32, 2000
+"""Events for which there is room at first; of a run that is kept for its derivatives there should be room for all."""
 _SAME_START = 1e-8
 """Difference of two starts, relative to their states, up to which they are one: start values are solved to 1e-10."""
 
@@ -126,7 +128,7 @@ class EngineLoop:
             "times": 1, "states": unknowns, "modes": model.discrete_size, "firsts": 1, "events": 7,
             "impacts": _impact_size(model), "steps_taken": 3 + 5 * unknowns,
         }  # fmt: skip
-        self._buffers = Buffers(self._instance, end, options.points, widths)
+        self._buffers = Buffers(self._instance, end, options.points, widths, room=_KEPT_EVENTS if by else _EVENTS)
         self._buffers.emptied = self.record.keeper.forget
 
     @property

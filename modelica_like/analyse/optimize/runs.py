@@ -103,7 +103,7 @@ class Runs:
         return design
 
     def values_at(self, x: Vector) -> Vector | None:
-        """Return the outputs only, shape (cases, outputs), None where a run is refused: no replay is needed."""
+        """Return the outputs only, shape (cases, outputs), None where a run is refused: no derivatives are needed."""
         known = self._known.get(x.tobytes())
         if isinstance(known, Design):
             return known.values

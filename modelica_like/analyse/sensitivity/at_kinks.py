@@ -17,7 +17,7 @@ from modelica_like.analyse.replay.edges import Edge
 from modelica_like.analyse.replay.kinks import arguments_of_kinks
 from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.compile.buffers import Vector
-from modelica_like.compile.cached import Cached
+from modelica_like.compile.cached import Cached, Key
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ModelicaLikeError, NoGradient
 from modelica_like.options import Options
@@ -46,10 +46,9 @@ _DECADES = range(-15, 16)
 """Powers of ten in SI units among which the size of a parameter that is zero is looked for."""
 
 
-def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
-    """Return the arguments of operations with a kink, and the guards, that are zero all along some segments."""
-    model, texts = chain.model, _texts(outputs)
-    given = [*model.arguments.values()]
+def kink_arguments(model: CompiledDae, outputs: Sequence[Output]) -> tuple[Key, ca.Function]:
+    """Return what is zero at kinks of the equations and of outputs, and the guards, as one function, and its key."""
+    given, texts = [*model.arguments.values()], _texts(outputs)
 
     def make() -> ca.Function:
         values = [_equations(model, texts), model.events.guards(*given)]
@@ -58,7 +57,13 @@ def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
         return ca.Function("arguments", given, [ca.densify(ca.SX(ca.vertcat(*arguments.values(), values[1])))])
 
     key = Cached.KINK_ARGUMENTS, texts
-    function = model.once(key, make)
+    return key, model.once(key, make)
+
+
+def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
+    """Return the arguments of operations with a kink, and the guards, that are zero all along some segments."""
+    model = chain.model
+    key, function = kink_arguments(model, outputs)
     if not function.size1_out(0):
         return []
     fast = model.fast(key, lambda: function)

@@ -12,6 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from modelica_like.analyse.replay.chain import Reading
+from modelica_like.analyse.replay.guards import Guards
+from modelica_like.analyse.replay.when import event_time
+from modelica_like.analyse.sensitivity.at_kinks import kink_arguments
 from modelica_like.analyse.sensitivity.moving_kinks import kinks_at
 from modelica_like.analyse.sensitivity.of_formulas import formula_kinks
 from modelica_like.analyse.sensitivity.values import slopes_of
@@ -28,8 +31,8 @@ from modelica_like.runs.conserve import find_astray
 from modelica_like.runs.readings import CONDITIONS, INTEGRATED, Output, by_output, joined, leaves
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Statistics
-from modelica_like.solve.initialize import Point, StartKind
-from modelica_like.solve.initialize.slopes import Sizes, Slopes
+from modelica_like.solve.initialize import Point, StartKind, call
+from modelica_like.solve.initialize.slopes import Sizes, Slopes, slopes
 from modelica_like.solve.recorder import Event
 
 _NEAR = 1e-9
@@ -74,26 +77,27 @@ def differentiated_run(
     wanted = [part for leaf in parts if leaf.kind in INTEGRATED for part in leaf.parts(model)]
     try:
         run = _kept(model, with_expressions(model, wanted, edges=True), end, options, start, names)
-        if run is None:
+        if run is None or _stands_at_kink(run.solution, outputs, names):
             return None
         values = run.solution.read(*(leaf.name for leaf in parts))
         rows = [run.row(leaf, value) for leaf, value in zip(parts, values, strict=True)]
         if not np.all(np.isfinite(values)) or any(row is None for row in rows) or _at_kinks(outputs, values):
             return None
-        slopes = run.slopes([row for row in rows if row is not None])
+        of_leaves = run.slopes([row for row in rows if row is not None])
     except (ExportError, InitializationError, LanguageError, MissingExtra, NoGradient, SolveError):
         return None
-    if not np.all(np.isfinite(slopes)):
+    if not np.all(np.isfinite(of_leaves)):
         return None
-    return Differentiated(run.solution, np.ravel(joined(outputs, values)), _chained(outputs, values, slopes))
+    return Differentiated(run.solution, np.ravel(joined(outputs, values)), _chained(outputs, values, of_leaves))
 
 
 def _kept(
     model: CompiledDae, extended: CompiledDae, end: float, options: Options, start: StartKind, names: Sequence[str]
 ) -> _Run | None:
     """Simulate and keep the run; None if it is not certain."""
-    loop = EngineLoop(extended, replace(options, points=_RESULTS), initialize(model, 0.0, start), end, by=names)
-    if not loop.starts_there:
+    begin = initialize(model, 0.0, start)
+    loop = EngineLoop(extended, replace(options, points=_RESULTS), begin, end, by=names)
+    if not loop.starts_there or _moves_at_start(model, begin, names):
         return None
     record = loop.run()
     steps, evaluations, integrations = loop.counts
@@ -102,15 +106,59 @@ def _kept(
         model, options, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
         tuple(record.notices), start, dense=record.keeper.dense(loop),
     )  # fmt: skip
-    refused = solution.dense is None or solution.ended is not None or _meet(solution.events)
+    refused = solution.dense is None or solution.ended is not None or _meet(solution)
     astray = options.on_energy_drift != "off" and not refused and find_astray(solution) is not None
     return None if refused or astray else _Run(solution, extended, loop)
 
 
-def _meet(events: Sequence[Event]) -> bool:
-    """Whether several changes at an instant may have different causes, or something is held that has not slid."""
-    first = [event.segment for event in events if event.round == 0 and event.segment > 0]
-    return len({*first}) < len(first)
+def _moves_at_start(model: CompiledDae, begin: Point, names: Sequence[str]) -> bool:
+    """Whether a parameter moves what happens by the clock just at the start: it may come before or behind that."""
+    columns = [len(begin.x) + model.fixed_position[name] for name in names]
+    moments = call(model, model.events.moments, begin)
+    there = {transition.index for transition in model.events.transitions
+             if transition.timed and abs(float(moments[transition.index]) - begin.t) <= _NEAR}  # fmt: skip
+    return bool(there) and bool(np.any(slopes(model, begin, "moments", sorted(there)).by[:, columns]))
+
+
+def _stands_at_kink(solution: Solution, outputs: Sequence[Output], names: Sequence[str]) -> bool:
+    """Whether a parameter leads off a kink, or the limit of a mode, at which the run stays all along a segment."""
+    model, fixed, guards = solution.model, (solution.model.p, solution.model.u), Guards(solution.model)
+    key, function = kink_arguments(model, outputs)
+    count = int(function.size1_out(0)) - int(model.events.guards.size1_out(0))
+    fast = model.fast(key, lambda: function)
+
+    def at(point: Point) -> Vector:
+        values = fast(point.t, point.x, point.z, *fixed, point.d)[0][:count]
+        return np.concatenate([values, guards.at(point)[0]]) if guards.count else values.copy()  # idle ones are -1
+
+    rows = [*range(count), *(count + transition.index for transition in guards.state_events)]
+    along = [np.array([at(segment.point(k)) for k in range(len(segment.times))]) for segment in solution.segments]
+    near = _NEAR * np.max([np.abs(values).max(axis=0) for values in along], axis=0)
+    columns = [len(model.states) + model.fixed_position[name] for name in names]
+    for segment, values in zip(solution.segments, along, strict=True):
+        still = [rows[k] for k in np.flatnonzero(np.all(np.abs(values) <= near, axis=0))]
+        if still and np.any(slopes(model, segment.point(-1), key, still, lambda: function).by[:, columns]):
+            return True
+    return False
+
+
+def _meet(solution: Solution) -> bool:
+    """Whether events at an instant have different causes, or something is held that has not slid before."""
+    model = solution.model
+    instants: dict[int, list[Event]] = {}
+    for event in solution.events:
+        instants.setdefault(event.segment, []).append(event)
+    held = {(motion.mode, motion.number) for motion in model.held.motions}
+    later = [model.events.transitions[event.transition] for event in solution.events if event.round]
+    if any((transition.mode, transition.target) in held for transition in later):
+        return True
+    for segment, events in instants.items():
+        if segment and sum(not event.round for event in events) > 1:
+            last = solution.segments[segment - 1]
+            when = event_time(model, last.point(-1), tuple(events), last.start)
+            if when.reason is not None or when.apart:
+                return True
+    return False
 
 
 def _at_kinks(outputs: Sequence[Output], values: Sequence[float]) -> bool:

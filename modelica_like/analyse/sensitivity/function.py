@@ -32,11 +32,11 @@ _CHANGE = 1e-3
 _UNCERTAIN = 1e-2
 """Error of second derivatives over the largest one, each by relative changes, from which on they are refused."""
 _FINER = 1e-2
-"""Tolerance of a run relative to that of its replay, so that both agree."""
+"""Tolerance of a run relative to that of its derivatives: what the adjoint adds to it is about ten times as large."""
 
 
 class SimulationFunction(NamedCallback):
-    """y = f(p): simulates with all events; its Jacobian is that of the replay, exact through the events.
+    """y = f(p): simulates with all events; its Jacobian is exact through the events, by the run-time or the replay.
 
     Second derivatives are extrapolated differences of the exact Jacobian. The object must live as long as anything
     built from it. CasADi rewrites an error of the simulation; `refusal` has the original.
