@@ -31,6 +31,8 @@ _CHANGE = 1e-3
 """Relative change of a parameter for second derivatives, and twice it: gradients known to 1e-8 give about 1e-5."""
 _UNCERTAIN = 1e-2
 """Error of second derivatives over the largest one, each by relative changes, from which on they are refused."""
+_AGREE = 1e-5
+"""Difference of the derivatives of run-time and replay, beyond which one of them has gone over something."""
 _FINER = 1e-2
 """Tolerance of a run relative to that of its derivatives: what the adjoint adds to it is about ten times as large."""
 
@@ -65,6 +67,7 @@ class SimulationFunction(NamedCallback):
         self._run = {**run, "parameters": freed.values}
         self._precision = precision
         self._nan_where_refused = nan_where_refused
+        self._agrees = True
         self._last: tuple[bytes, Sensitivities] | None = None
         self._simulated: tuple[bytes, Solution] | None = None
         self._sequence: list[tuple[str, str, str]] | None = None
@@ -78,6 +81,8 @@ class SimulationFunction(NamedCallback):
         self._names = [parameter.name for parameter in self._first.parameters]
         self.start_values = np.array([parameter.value for parameter in self._first.parameters])
         self._sequence = None if any_sequence else mode_sequence(solution.events)
+        check = self._by_run_time(self.start_values)
+        self._agrees, self.runs = check is not None and _agree(check, self._first), 0
         self._jacobian = _Jacobian(self)
         dense = ca.Sparsity.dense
         self.declare("simulation", {"p": dense(len(self.inputs))}, {"y": dense(len(self.outputs))})
@@ -91,6 +96,8 @@ class SimulationFunction(NamedCallback):
 
         What refuses derivatives for all values, as a motion that begins at rest, it has told at the start values.
         """
+        if not self._agrees:
+            return None
         model = self._model.with_parameters(self._given(values))
         kind = self._run["start"] or model.settings.get("start", "given")
         result = differentiated_run(model, self._tight["until"], self._options, kind, self._read, self._names)
@@ -311,6 +318,15 @@ def mode_sequence(events: Sequence[Event]) -> list[tuple[str, str, str]]:
         groups[-1].append(event)
     ordered = (event for group in groups for event in sorted(group, key=lambda transition: transition.mode))
     return [(event.mode, event.before, event.after) for event in ordered]
+
+
+def _agree(some: Sensitivities, others: Sensitivities) -> bool:
+    """Whether the run-time and the replay have the same derivatives, relative to the largest of each output."""
+    effects = np.array([abs(parameter.value) or 1.0 for parameter in others.parameters])
+    values = np.array([abs(output.value) for output in others.outputs])
+    first, second = some.derivatives * effects, others.derivatives * effects
+    sizes = np.maximum(np.abs(second).max(axis=1), values)
+    return bool(np.all(np.abs(first - second).max(axis=1) <= _AGREE * sizes))
 
 
 def _changed(expected: Sequence[Any], results: Sequence[Any], solution: Solution) -> NoGradient:
