@@ -89,6 +89,10 @@ function down(event) {
 }
 
 function move(event) {
+  if (held && Math.hypot(event.clientX - held.x, event.clientY - held.y) > MOVED) {
+    held.take();
+    [carried.dragged, held] = [true, null];
+  }
   if (carried) return hover(event);
   if (pressed && Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) > MOVED && !pressed.moved) {
     pressed.moved = true;
@@ -107,7 +111,7 @@ function hover(event) {
 
 function up(event) {
   const start = pressed, what = meant(event);
-  pressed = null;
+  [pressed, held] = [null, null];
   hint("");
   if (carried?.dragged || (carried && start)) return lay(what, event);
   if (!start) return;

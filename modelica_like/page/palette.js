@@ -1,5 +1,5 @@
 /* The shelf: types of the libraries, classes and netlists of the folder, found by typing. */
-let sought = 0;
+let sought = 0, held = null; // the entry on which a button of the mouse is down
 
 async function search(words = at("search").value.trim()) {
   const mine = ++sought, answer = await ask("palette", { words }).catch(tell);
@@ -26,18 +26,10 @@ function entryOf({ kind, group, about, symbol }) {
       element("small", {}, about)));
   button.dataset.kind = kind;
   const take = () => carry({ kind, replace: at("shelf").dataset.replace });
-  let from = null;
-  button.onpointerdown = (event) => { from = event.pointerType === "mouse" && !event.button ? [event.clientX,
-    event.clientY] : null; };
-  button.onpointermove = (event) => {
-    if (!from || Math.hypot(event.clientX - from[0], event.clientY - from[1]) < MOVED) return;
-    from = null;
-    button.releasePointerCapture?.(event.pointerId);
-    take();
-    carried.dragged = true;
+  button.onpointerdown = (event) => {
+    if (event.pointerType === "mouse" && !event.button) held = { x: event.clientX, y: event.clientY, take };
   };
   button.onclick = () => {
-    from = null;
     if (carried?.dragged) return;
     if (at("shelf").dataset.replace) return replaceBy(kind);
     take();

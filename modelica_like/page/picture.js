@@ -1,5 +1,5 @@
 /* The schematic: what is selected in it, what a problem marks, and how one looks for ends and lines near the pointer. */
-const NEAR = { open: 11, joined: 7, optional: 6 }, OVER = 6;
+const NEAR = { open: 11, joined: 5, optional: 6 }, OVER = 6;
 // pixels around an end that belong to it; over a part, fewer
 const SMALLEST = 0.72; // scale below which the picture is moved instead
 
@@ -47,7 +47,9 @@ function select(names, line = null) {
 
 /* What a pointer means: an end nearby, or else a part, or a line, or the sheet. */
 function meant(event) {
-  const target = document.elementFromPoint(event.clientX, event.clientY), over = target?.closest(".part") &&
+  const stack = document.elementsFromPoint(event.clientX, event.clientY);
+  const behind = stack.find((one) => one.matches(".wire"));
+  const target = stack[0], over = target?.closest(".part") &&
     !target.closest(".end");
   let best = null, nearest = over ? OVER : Infinity;
   for (const end of at("sheet").querySelectorAll(".end")) {
@@ -56,7 +58,8 @@ function meant(event) {
     if (away < Math.min(nearest, NEAR[end.classList[1]]) && shownEnd(end, over)) [best, nearest] = [end, away];
   }
   if (best) return { end: best.dataset.ground && event.altKey ? best.dataset.ground : best.dataset.end, node: best };
-  const wire = target?.closest(".wire"), part = target?.closest(".part");
+  // The room of a part, for its name, is wider than its symbol, and lies over lines.
+  const part = target?.matches(".hold") && behind ? null : target?.closest(".part"), wire = part ? null : behind;
   if (part) return { part: part.dataset.part, node: part };
   if (wire) return { line: wire.dataset.ends.split(" "), node: wire };
   return target?.closest("#sheet") ? { sheet: true, node: at("sheet") } : {};

@@ -66,21 +66,11 @@ class Hand:
         self.page.locator(f'.entry[data-kind="{kind}"]').click()
         if end:
             self.page.mouse.click(*self.end(end))
-        elif line:
-            self.page.locator(f'.wire[data-ends="{line}"]').dispatch_event("pointerdown")
-            self.page.mouse.click(*self.on_line(line))
+        elif line:  # a straight one
+            self.page.mouse.click(*self.middle(f'.wire[data-ends="{line}"]'))
         else:
             self.page.locator("#sheet").click(position={"x": 8, "y": 8})
         self.wait()
-
-    def on_line(self, ends: str) -> tuple[float, float]:
-        """Return a place on a line."""
-        x, y = self.browser.run(
-            f"""(() => {{ const wire = document.querySelector('.wire[data-ends="{ends}"]');
-            const p = wire.getPointAtLength(wire.getTotalLength() / 2).matrixTransform(wire.getScreenCTM());
-            return [p.x, p.y]; }})()"""
-        )
-        return x, y
 
     def drag(self, first: str, second: str) -> None:
         """Drag from an end to another."""

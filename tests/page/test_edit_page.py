@@ -99,6 +99,20 @@ def test_thirty_mistakes_are_told_and_taken_back(hand: Hand) -> None:
 
 
 @pytest.mark.browser
+def test_a_part_is_clicked_or_dragged_onto_a_line(hand: Hand) -> None:
+    hand.put("SpringDamper", line="J1.flange_b shaft1.flange_a")
+    assert hand.browser.run("page.data.series.drive.indexOf('spring_damper')") == 4
+    hand.find("Inertia")
+    hand.page.mouse.move(*hand.middle('.entry[data-kind="Inertia"]'))
+    hand.page.mouse.down()
+    hand.page.mouse.move(300, 300, steps=3)
+    hand.page.mouse.move(*hand.middle('.wire[data-ends="J3.flange_b shaft2.flange_a"]'), steps=3)
+    hand.page.mouse.up()
+    hand.wait()
+    assert hand.browser.run("page.data.series.drive.slice(8, 11).join()") == "J3,inertia,shaft2"
+
+
+@pytest.mark.browser
 def test_a_suggestion_is_applied_by_one_click(hand: Hand) -> None:
     write(hand, TEXT.replace('is = "Inertia"', 'is = "Inertai"', 1))
     assert hand.page.locator(".marked").inner_text() == "Inertai"
