@@ -90,7 +90,7 @@ class Desk:
             text = kept or dumps(drive, folder=path.parent)
         except NetlistError as error:
             text = f"# {error.what}\n"
-        desk = cls(Document.draft(path, text), read(path) if origin == path else None, trusted=True)
+        desk = cls(Document.draft(path, text), read(path) if origin == path else None)
         if desk.drive is None:
             desk._fixed, desk.drive, desk.valid, desk.problems = True, drive, True, []
             desk._draw(drive)
@@ -114,7 +114,7 @@ class Desk:
     def trusting(self) -> AbstractContextManager[None]:
         """Run the modules of the folder, if it is trusted."""
         home = self.folder
-        return trusting(lambda folder: folder == home or folder in home.parents) if self.trusted else nullcontext()
+        return trusting(lambda folder: folder == home) if self.trusted else nullcontext()
 
     # -- changes -----------------------------------------------------------------------------------------------------
 
