@@ -96,7 +96,10 @@ class Native:
         self._instance.reset(t0, until, *self._tolerances)
         if given:
             self.set(given)
-        self._instance.begin_differentiable(self._by)
+        if self._by.size:
+            self._instance.begin_differentiable(self._by)
+        else:
+            self._instance.check(self._library.begin(self._address))
         if self.inputs.size:
             self._instance.check(self._library.get(self._address, *self._step[:3]))
         self._instance.check(self._library.get(self._address, *self._step[3:]))

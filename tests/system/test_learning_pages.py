@@ -4,6 +4,7 @@ import contextlib
 import io
 import re
 import shlex
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +53,9 @@ def test_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
             (name,) = re.findall(r"`(\w+\.(?:toml|mo))`", before)
             Path(name).write_text(block, encoding="utf-8")
         elif language == "python":
-            with contextlib.redirect_stdout(io.StringIO()) as stream:
-                exec(compile(block, str(page), "exec"), names)
+            # In a thread: what drives a browser leaves a loop of events in this one, and asyncio.run needs its own.
+            with contextlib.redirect_stdout(io.StringIO()) as stream, ThreadPoolExecutor(1) as thread:
+                thread.submit(exec, compile(block, str(page), "exec"), names).result()
             printed = stream.getvalue()
         else:
             assert language == "text"

@@ -9,7 +9,7 @@ import numpy as np
 
 from modelica_like.analyse.optimize.modal import is_modal, modal_slopes, modal_values
 from modelica_like.analyse.optimize.problem import Problem
-from modelica_like.analyse.sensitivity.function import SimulationFunction, simulation_function
+from modelica_like.analyse.sensitivity.function import SimulationFunction
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.simulation import simulate
@@ -59,10 +59,10 @@ class Runs:
         order = [*self.read, *self.modal, *self.sized]
         self._places = [order.index(name) for name in problem.outputs]
         for case in problem.cases if self.read else ():
-            run = {"until": question.until, "start": question.start, "parameters": dict(case.values)}
+            run = {"until": question.until, "start": question.start, "parameters": dict(case.values), "options": None}
             try:
-                function = simulation_function(
-                    problem.model, names, self.read, **run, precision=PRECISION, any_sequence=True
+                function = SimulationFunction(
+                    problem.model, names, self.read, run, precision=PRECISION, any_sequence=True, steering=True
                 )
             except ModelicaLikeError as error:
                 place = f" in the load case '{case.name}'" if case.name else ""
@@ -101,6 +101,17 @@ class Runs:
         self.designs.append(design)
         self._told()
         return design
+
+    def certain(self, x: Vector) -> bool:
+        """Return whether the replay has the same derivatives at a design; if not, it is asked from now on."""
+        try:
+            uncertain = [function for function in self.functions if not function.certain(x)]
+        except ModelicaLikeError as error:
+            self.refusals.append((x.copy(), error))
+            return True
+        if uncertain:
+            self._known.clear()
+        return not uncertain
 
     def values_at(self, x: Vector) -> Vector | None:
         """Return the outputs only, shape (cases, outputs), None where a run is refused: no derivatives are needed."""

@@ -104,7 +104,8 @@ class Search:
     def from_design(self, x: Vector) -> Outcome:
         """Search from a design."""
         try:
-            return self._from(x)
+            outcome = self._from(x)
+            return outcome if self.runs.certain(outcome.x) else self._from(outcome.x)
         except KeyboardInterrupt as interrupt:
             interrupt.add_note(self._best_so_far())
             raise

@@ -38,10 +38,12 @@ _FINER = 1e-2
 
 
 class SimulationFunction(NamedCallback):
-    """y = f(p): simulates with all events; its Jacobian is exact through the events, by the run-time or the replay.
+    """y = f(p): simulates with all events; its Jacobian is exact through the events.
 
-    Second derivatives are extrapolated differences of the exact Jacobian. The object must live as long as anything
-    built from it. CasADi rewrites an error of the simulation; `refusal` has the original.
+    It is that of the replay. `steering` takes the adjoint of the run-time instead, several times as fast, where both
+    agree at the start values; `certain` compares them where a search has ended. Second derivatives are extrapolated
+    differences of the exact Jacobian. The object must live as long as anything built from it. CasADi rewrites an error
+    of the simulation; `refusal` has the original.
 
     Attributes:
         inputs: paths of the parameters p.
@@ -54,7 +56,7 @@ class SimulationFunction(NamedCallback):
 
     def __init__(
         self, drive: Model, inputs: Sequence[str], outputs: Sequence[str], run: Mapping[str, Any], *,
-        precision: float, any_sequence: bool, nan_where_refused: bool,
+        precision: float, any_sequence: bool, nan_where_refused: bool = False, steering: bool = False,
     ) -> None:  # fmt: skip
         super().__init__()
         self.inputs = tuple(inputs)
@@ -67,7 +69,7 @@ class SimulationFunction(NamedCallback):
         self._run = {**run, "parameters": freed.values}
         self._precision = precision
         self._nan_where_refused = nan_where_refused
-        self._agrees = True
+        self._agrees = steering
         self._last: tuple[bytes, Sensitivities] | None = None
         self._simulated: tuple[bytes, Solution] | None = None
         self._sequence: list[tuple[str, str, str]] | None = None
@@ -82,7 +84,8 @@ class SimulationFunction(NamedCallback):
         self.start_values = np.array([parameter.value for parameter in self._first.parameters])
         self._sequence = None if any_sequence else mode_sequence(solution.events)
         check = self._by_run_time(self.start_values)
-        self._agrees, self.runs = check is not None and _agree(check, self._first), 0
+        self._agrees = check is not None and _agree(check, self._first)
+        self.runs = 0
         self._jacobian = _Jacobian(self)
         dense = ca.Sparsity.dense
         self.declare("simulation", {"p": dense(len(self.inputs))}, {"y": dense(len(self.outputs))})
@@ -132,6 +135,20 @@ class SimulationFunction(NamedCallback):
             result = self._by_run_time(values)
             self._last = values.tobytes(), result or self._differentiate(self._simulate(values))
         return self._last[1]
+
+    def certain(self, p: Vector) -> bool:
+        """Return whether the derivatives at parameter values are those of the replay, which has them from now on else.
+
+        Raises:
+            NoGradient, ModelicaLikeError: as in `at`.
+        """
+        if not self._agrees:
+            return True
+        values = np.asarray(p, float).ravel()
+        known, replayed = self.at(values), self._differentiate(self._simulate(values))
+        self._agrees = _agree(known, replayed)
+        self._last = values.tobytes(), replayed
+        return self._agrees
 
     def values_at(self, p: Vector | Sequence[float]) -> list[float]:
         """Return only the outputs.

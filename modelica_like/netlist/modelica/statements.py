@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
@@ -81,7 +82,7 @@ class Statements(Whens):
         for left, right, source in start.equations:
             if left.kind == right.kind == "number":  # of parameters that are known when the text is read
                 continue
-            if self._is_discrete(left):
+            if self._is_discrete(left) and not _uses_time(right):
                 self.memory[left.args[0][0]] = right
             elif left.kind == "call" and left.args[0] == "pre":
                 self.memory[left.args[1][0].args[0][0]] = right
@@ -354,3 +355,10 @@ def _text(node: Expr) -> str:
     if node.kind == "call":
         inner = (node.args[0], *(_text(argument) for argument in node.args[1]))
     return f"{node.kind}:{','.join(inner)}"
+
+
+def _uses_time(value: Any) -> bool:
+    """Tell whether an expression names the time: a run begins at any."""
+    if isinstance(value, Expr):
+        return (value.kind == "name" and value.args[0][0] == "time") or _uses_time(value.args)
+    return isinstance(value, tuple | list) and any(_uses_time(inner) for inner in value)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from modelica_like.analyse.optimize.terms import split
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.runs.calls import call_of
 from modelica_like.runs.signals import read_signals
+from modelica_like.show.plot import picture_bytes
 from modelica_like.show.report.overlay import overlay
 from modelica_like.show.report.page.tables import details, table
 
@@ -75,7 +75,5 @@ def _signals(optimum: Optimum) -> Iterator[str]:
 
 
 def _image(figure: Figure, title: str) -> str:
-    data = io.BytesIO()
-    figure.savefig(data, format="svg")
-    text = base64.b64encode(data.getvalue()).decode("ascii")
+    text = base64.b64encode(picture_bytes(figure, "svg")).decode("ascii")
     return f'<p><img alt="{escape(title)}" style="max-width:100%" src="data:image/svg+xml;base64,{text}"></p>'
