@@ -24,6 +24,7 @@ from modelica_like.language.units import (
     read_quantity,
     same_dimension,
 )
+from modelica_like.parsing import parse
 
 _MAX_LENGTH = 2000
 _MAX_DEPTH = 150
@@ -231,7 +232,7 @@ def parse_formula(text: str) -> Formula:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             replaced, quantities = _without_quantities(plain_digits(text.strip()))
-            tree = ast.parse(replaced, mode="eval")
+            tree = parse(replaced, mode="eval")
     except _NO_SYNTAX:
         advice = in_brackets(text)
         raise _not_a_formula(text, "" if advice else _unknown_unit(text), advice) from None
@@ -295,7 +296,7 @@ def in_brackets(text: str) -> str:
         return ""
     changed = _QUANTITY.sub(put, text)
     try:
-        ast.parse(_without_quantities(changed)[0], mode="eval")
+        parse(_without_quantities(changed)[0], mode="eval")
     except _NO_SYNTAX:
         return ""
     told = f'In a formula, a quantity that goes on with / or * is in brackets: "{changed}".'

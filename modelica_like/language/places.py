@@ -17,6 +17,7 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError, Source, UnknownName
+from modelica_like.parsing import parse, source_lines
 
 _LANGUAGE = str(Path(__file__).parent)
 _PACKAGE = str(Path(__file__).parent.parent)
@@ -124,7 +125,7 @@ def _left_open(error: RuntimeError) -> LanguageError | None:
 
 def _class_source(kind: type) -> Source:
     try:
-        lines, first = inspect.getsourcelines(kind)
+        lines, first = source_lines(kind)
     except (OSError, TypeError):  # created at a prompt
         return NOWHERE
     return Source(inspect.getfile(kind), first, lines[0].strip())
@@ -178,7 +179,7 @@ def texts_of_fields(kind: type) -> dict[str, str]:
 @cache
 def _own_texts(kind: type) -> dict[str, str]:
     """Return the texts in the body of one class, once: many classes share their bases."""
-    body = ast.parse(dedent(inspect.getsource(kind))).body[0]
+    body = parse(dedent("".join(source_lines(kind)[0]))).body[0]
     assert isinstance(body, ast.ClassDef)
     return {
         field.target.id: _text_of(below)

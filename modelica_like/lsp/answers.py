@@ -21,6 +21,7 @@ from modelica_like.netlist.json_schema import sections
 from modelica_like.netlist.outline import Span
 from modelica_like.netlist.read import is_modelica
 from modelica_like.netlist.registry import find_type, library_types
+from modelica_like.parsing import source_lines
 
 _AFTER_NUMBER = re.compile(r"\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?\s+(?P<unit>\S*)")
 _MOST_SYMBOLS = 2000
@@ -185,7 +186,7 @@ def _type_place(text: Text, name: str) -> Place | None:
         if text.kind == "netlist" and (name.endswith(".toml") or is_modelica(name)):
             return text.path.parent / name.partition(":")[0], 1, 1, 0
         of: Any = design_checks().get(name) if text.kind == "sizing" else find_type(name, text.path.parent)
-        return (Path(inspect.getsourcefile(of) or ""), inspect.getsourcelines(of)[1], 1, 0) if of else None
+        return (Path(inspect.getsourcefile(of) or ""), source_lines(of)[1], 1, 0) if of else None
     except (OSError, TypeError, ModelicaLikeError):
         return None  # its source is not there
 

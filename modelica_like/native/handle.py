@@ -135,7 +135,8 @@ class Native:
         """Return the derivatives of `outputs` with respect to `by`, through all events since the start.
 
         It costs about three runs, for any number of parameters and one output. Where the run stays at a kink that
-        changes no mode (an output limited to what it just is), they are those of one side: `sensitivities` refuses it.
+        changes no mode (an output limited to what it just is), they are not certain, not even those of one side:
+        `sensitivities` tells or refuses them.
 
         Returns:
             Shape (outputs, by); nan by what has none, where others have. Alone it is refused with the reason.

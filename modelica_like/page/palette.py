@@ -12,6 +12,7 @@ from typing import Any
 from modelica_like.language.inside import declarations
 from modelica_like.lsp.names import Owner, owner_of, units_like
 from modelica_like.netlist.registry import GROUP, library_types
+from modelica_like.parsing import parse
 from modelica_like.show.draw.symbol import symbol
 from modelica_like.show.report.types import summary
 
@@ -81,7 +82,7 @@ def _own(folder: Path, without: Path) -> list[tuple[str, str]]:
 
 def _classes(text: str) -> list[str]:
     try:
-        statements = ast.parse(text).body
+        statements = parse(text).body
     except (SyntaxError, ValueError, RecursionError):
         return []  # what it is is told where it is used
     return [one.name for one in statements if isinstance(one, ast.ClassDef) and one.bases and one.name[0] != "_"]

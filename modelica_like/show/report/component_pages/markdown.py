@@ -9,13 +9,14 @@ from pathlib import Path
 
 from modelica_like.language import Component
 from modelica_like.netlist.registry import library_types
+from modelica_like.parsing import source_lines
 from modelica_like.show.report.declared import filled
 
 
 def source_link(kind: type, file: Path) -> str:
     """Return a link to the first line of a class, relative to a page."""
     source = Path(inspect.getsourcefile(kind) or "")
-    line = inspect.getsourcelines(kind)[1]
+    line = source_lines(kind)[1]
     return f"[{source.name}:{line}]({relative(source, file.resolve())}#L{line})"
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from modelica_like.language import Component
 from modelica_like.language.inside import declarations, inside
+from modelica_like.parsing import source_lines
 from modelica_like.show.report.component_pages import latex_names as names
 from modelica_like.show.report.component_pages.markdown import (
     cell,
@@ -123,7 +124,7 @@ def _parts(kind: type[Component]) -> list[str]:
     """Return the parts that the class declares, and how it builds others."""
     by_name = {name: part if isinstance(part, list) else [part] for name, part in declarations(kind).parts.items()}
     rows = ((f"`{name}`", page_link(type(e)), _values(e)) for name, part in by_name.items() for e in part)
-    code = dedent(inspect.getsource(kind.build)).strip() if kind.build is not Component.build else ""
+    code = dedent("".join(source_lines(kind.build)[0])).strip() if kind.build is not Component.build else ""
     parts = [table("", ("part", "type", "values"), rows), code and f"```python\n{code}\n```"]
     return ["## Parts", *parts] if any(parts) else []
 

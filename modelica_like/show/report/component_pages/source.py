@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import inspect
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -14,6 +13,7 @@ from typing import Any, NamedTuple
 
 from modelica_like.language import Component
 from modelica_like.language.inside import declarations
+from modelica_like.parsing import parse, source_lines
 from modelica_like.show.report.component_pages import latex_names as names
 from modelica_like.show.report.component_pages.latex import (
     OR,
@@ -130,7 +130,7 @@ def plain_function(name: str, function: FunctionType) -> Function:
 
 @lru_cache(maxsize=1024)
 def _parsed(function: FunctionType) -> ast.FunctionDef:
-    (code,) = ast.parse(dedent(inspect.getsource(function))).body
+    (code,) = parse(dedent("".join(source_lines(function)[0]))).body
     assert isinstance(code, ast.FunctionDef)
     return code
 
