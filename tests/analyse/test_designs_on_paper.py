@@ -165,6 +165,29 @@ def test_a_design_check_limits_a_design(tmp_path: Path) -> None:
     assert least["shaft.safety"] == pytest.approx(2.5 * most / 10.0, rel=1e-6)
 
 
+def test_checks_that_nobody_asks_for_do_not_count(tmp_path: Path) -> None:
+    """Neither one whose load has a run of its own, nor a file with an error: the wheel stops after J·w/M = 4 s."""
+    (tmp_path / "brake.toml").write_text(BRAKE + 'subject_to = ["brake.lock_time <= 4 s"]\n')
+    own = CHECKS.replace('peak = "brake.tau"', 'peak = "brake.tau", until = "1 s"').replace(
+        "checks.shaft", "checks.short"
+    )
+    for text in (CHECKS + own, "this is no table"):
+        (tmp_path / "checks.toml").write_text(text)
+        best = optimum(load(tmp_path / "brake.toml"), minimize="brake.capacity")
+        assert best["brake.capacity"] == pytest.approx(25.0, rel=1e-6)
+
+
+def test_only_loads_that_a_line_takes_are_differentiated(tmp_path: Path) -> None:
+    """A load that stands at a kink of another check has no derivative, and needs none."""
+    kink = CHECKS.replace("checks.shaft", "checks.other").replace(
+        'peak = "brake.tau"', 'reading = "at(brake.tau, 5 s)"'
+    )
+    (tmp_path / "checks.toml").write_text(kink + CHECKS)  # at 5 s the wheel of the drive as it is stops
+    (tmp_path / "brake.toml").write_text(BRAKE + 'subject_to = ["shaft.safety >= 2.5"]\n')
+    most = 275e6 / 2.5 / math.sqrt(3.0) * math.pi * 0.01**3 / 16.0
+    assert optimum(load(tmp_path / "brake.toml"))["brake.capacity"] == pytest.approx(most, rel=1e-6)
+
+
 def test_a_page_about_the_best_design(tmp_path: Path) -> None:
     """It has the values, the limits, the sentences and the runs before and after."""
     (tmp_path / "checks.toml").write_text(CHECKS)

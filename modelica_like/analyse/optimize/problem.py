@@ -139,8 +139,8 @@ def make_problem(
         model = model.with_parameters(dict(question.parameters or {}))
         free = read_free(model, plain | cells)
     with placed("minimize" if question.minimize else "maximize"):
-        sized = Sized(drive, model)
-        unit_of = _units(model, sized, question)
+        sized = Sized(drive, model, lambda: quick_run(model, question.until, start=question.start))
+        unit_of = _units(model, sized)
         aims = read_aims(unit_of, question.minimize, question.maximize)
     with placed("subject_to"):
         limits = read_limits(unit_of, question.subject_to)
@@ -154,20 +154,13 @@ def make_problem(
     return Problem(question, model, free, aims, limits, cases, order, outputs, sized)
 
 
-def _units(model: CompiledDae, sized: Sized, question: Question) -> Callable[[str], Unit]:
+def _units(model: CompiledDae, sized: Sized) -> Callable[[str], Unit]:
     """Return what knows the units of outputs: of the linearized drive, of a design check, of a run."""
-    loads: list[Vector] = []
 
     def unit_of(name: str) -> Unit:
         if is_modal(name):
             return modal_unit(model, name)
-        if not sized.has(name):
-            return read_number(model, name).unit
-        if not loads:
-            names = sized.loads
-            run = quick_run(model, question.until, start=question.start, readings=names) if names else None
-            loads.append(np.array(run.read(*names) if run is not None else (), float).reshape(len(names)))
-        return sized.unit(name, loads[0])
+        return sized.unit(name) if sized.has(name) else read_number(model, name).unit
 
     return unit_of
 

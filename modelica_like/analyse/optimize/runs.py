@@ -52,7 +52,7 @@ class Runs:
         self.functions: list[SimulationFunction] = []
         self.modal = [name for name in problem.outputs if is_modal(name)]
         self.sized = [name for name in problem.outputs if problem.sized.has(name)]
-        loads = problem.sized.loads if self.sized else ()
+        loads = problem.sized.loads
         runs = [name for name in problem.outputs if name not in self.modal and name not in self.sized]
         self.read = list(dict.fromkeys([*runs, *loads]))
         self._loads = [self.read.index(name) for name in loads]
@@ -103,15 +103,11 @@ class Runs:
         return design
 
     def certain(self, x: Vector) -> bool:
-        """Return whether the replay has the same derivatives at a design; if not, it is asked from now on."""
-        try:
-            uncertain = [function for function in self.functions if not function.certain(x)]
-        except ModelicaLikeError as error:
-            self.refusals.append((x.copy(), error))
-            return True
-        if uncertain:
+        """Return whether the replay has the same derivatives at a design; if not, it gives those of all designs now."""
+        checks = [function.certain(x) for function in self.functions]
+        if not all(checks):
             self._known.clear()
-        return not uncertain
+        return all(checks)
 
     def values_at(self, x: Vector) -> Vector | None:
         """Return the outputs only, shape (cases, outputs), None where a run is refused: no derivatives are needed."""

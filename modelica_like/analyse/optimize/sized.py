@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.sizing.document import read_document
+from modelica_like.analyse.sizing.document import SizingDocument, read_document
 from modelica_like.analyse.sizing.formulas import Value
 from modelica_like.analyse.sizing.run import Checks
 from modelica_like.analyse.sizing.simulated import READERS, Simulations, name_of_load
@@ -19,7 +21,9 @@ from modelica_like.language import Assembly
 from modelica_like.language.inside import inside
 from modelica_like.language.units import Unit, parse_unit
 from modelica_like.runs.readings import read_output
+from modelica_like.runs.solution import Solution
 
+_LINE = re.compile(r"\s*([A-Za-z_]\w*)\.[\w.\[\]]+\s*")
 _STEP, _ZERO = 1e-4, 1e-2
 """Steps relative to a load, and half of it: checks are formulas that are known to 1e-15, and extrapolation leaves the
 fourth power. A load of 0 has steps as of one of 0.01 in SI units."""
@@ -29,48 +33,60 @@ _LOAD = "Of a load of this netlist the run of the optimisation counts, so it has
 class Sized:
     """The design checks of a drive's sizing file, as functions of the loads that its run gives them.
 
+    The file is read when a line of it is asked for, and only what that line takes counts.
+
     Args:
         drive: the drive; without a sizing file there are no outputs.
         model: compiled.
+        simulate: runs the model as it is; once, for the loads that a line takes.
 
     Attributes:
-        loads: readings of the run that the file takes, each once.
+        loads: readings of the run that the lines asked for take, each once.
     """
 
-    def __init__(self, drive: Any, model: CompiledDae) -> None:
-        path = Path(inside(drive).sizing) if isinstance(drive, Assembly) and inside(drive).sizing else None
-        self._document = read_document(path) if path is not None else None
-        self.loads: tuple[str, ...] = ()
+    def __init__(self, drive: Any, model: CompiledDae, simulate: Callable[[], Solution]) -> None:
+        self._drive, self._simulate = drive, simulate
         self._parts = {name.partition(".")[0] for name in model.units}
-        if self._document is None or path is None:
-            return
-        origin = Path(inside(drive).origin).resolve()
-        self._simulations = _Known(path.parent, origin)
-        given = [*self._document.parameters.values(), *self._document.checks.values()]
-        names = [name_of_load(table) for table in _tables(given) if self._simulations.is_own(table)]
-        self.loads = tuple(dict.fromkeys(names))
-        self._simulations.units = {name: parse_unit(str(read_output(model, name).unit)) for name in self.loads}
+        self._run: Solution | None = None
+        self.loads: tuple[str, ...] = ()
+
+    @cached_property
+    def _document(self) -> SizingDocument | None:
+        path = inside(self._drive).sizing if isinstance(self._drive, Assembly) else ""
+        return read_document(Path(path)) if path else None
+
+    @cached_property
+    def _simulations(self) -> _Known:
+        known = inside(self._drive)
+        return _Known(Path(known.sizing).parent, Path(known.origin).resolve())
 
     def has(self, name: str) -> bool:
-        """Return whether a name is that of a line of a check; a part of the drive comes first."""
-        first = name.strip().partition(".")[0]
-        return self._document is not None and first in self._document.checks and first not in self._parts
-
-    def unit(self, name: str, loads: Vector) -> Unit:
-        """Return the unit of a line.
+        """Return whether a name is that of a line of a check; a part of the drive comes first.
 
         Raises:
-            NetlistError: it is not a single number.
-            ModelicaLikeError: the check has no such line, or the sizing file has an error.
+            NetlistError: it is no part, and the sizing file has an error.
         """
-        value = self._checks(loads).lookup(name.strip())
+        match = _LINE.fullmatch(name)
+        if match is None or match[1] in self._parts:
+            return False
+        return self._document is not None and match[1] in self._document.checks
+
+    def unit(self, name: str) -> Unit:
+        """Return the unit of a line, whose loads are known from now on.
+
+        Raises:
+            NetlistError: it is not a single number, or one of its loads has a run of its own.
+            ModelicaLikeError: the check has no such line, the sizing file has an error, or the drive does not run.
+        """
+        value = self._checks(self._read).lookup(name.strip())
         if np.ndim(value.number):
             raise NetlistError(f"'{name}' has {np.size(value.number)} values.", advice=f"Write one of them: {name}[0].")
         return value.unit
 
     def values(self, names: Sequence[str], loads: Vector) -> Vector:
         """Return lines of checks, shape (names,), at loads, shape (loads,)."""
-        checks = self._checks(loads)
+        given = dict(zip(self.loads, map(float, loads), strict=True))
+        checks = self._checks(given.__getitem__)
         return np.array([float(checks.lookup(name.strip()).number) for name in names])
 
     def slopes(self, names: Sequence[str], loads: Vector) -> Vector:
@@ -84,9 +100,17 @@ class Sized:
             slopes[:, k] = (4.0 * differences[1] - differences[0]) / 3.0
         return slopes
 
-    def _checks(self, loads: Vector) -> Checks:
+    def _read(self, name: str) -> float:
+        """Read a load off the drive as it is, and remember that it counts."""
+        if self._run is None:
+            self._run = self._simulate()
+        self.loads = tuple(dict.fromkeys([*self.loads, name]))
+        self._simulations.units[name] = parse_unit(str(read_output(self._run.model, name).unit))
+        return float(self._run.read(name)[0])
+
+    def _checks(self, value_of: Callable[[str], float]) -> Checks:
         assert self._document is not None
-        self._simulations.values = dict(zip(self.loads, map(float, loads), strict=True))
+        self._simulations.value_of = value_of
         return Checks(self._document, self._simulations)
 
 
@@ -96,31 +120,15 @@ class _Known(Simulations):
     def __init__(self, folder: Path, origin: Path) -> None:
         super().__init__(folder)
         self._origin = origin
-        self.values: dict[str, float] = {}
+        self.value_of: Callable[[str], float] = lambda name: np.nan
         self.units: dict[str, Unit] = {}
 
-    def is_own(self, table: Mapping[str, Any]) -> bool:
-        """Return whether a load is one of the netlist.
-
-        Raises:
-            NetlistError: it is that of another run of it.
-        """
-        own = (self.folder / str(table["from"])).resolve() == self._origin
-        if own and not table.keys().isdisjoint(("until", "set")):
-            raise NetlistError(f"A load of '{table['from']}' has a run of its own.", advice=_LOAD)
-        return own
-
     def load(self, table: Mapping[str, Any], where: str) -> Value:
-        if not self.is_own(table):
+        own = (self.folder / str(table.get("from", ""))).resolve() == self._origin
+        if not own or len(table.keys() & READERS.keys()) != 1:  # which the other ones refuse
             return super().load(table, where)
+        if not table.keys().isdisjoint(("until", "set")):
+            raise NetlistError(f"A load of '{table['from']}' has a run of its own.", advice=_LOAD)
         name = name_of_load(table)
-        return Value(self.values[name], self.units[name])
-
-
-def _tables(given: Any) -> Iterator[Mapping[str, Any]]:
-    """Yield the loads from simulations in what a sizing file gives."""
-    if isinstance(given, dict) and isinstance(given.get("from"), str) and len(given.keys() & READERS.keys()) == 1:
-        yield given
-    elif isinstance(given, dict | list):
-        for inner in given.values() if isinstance(given, dict) else given:
-            yield from _tables(inner)
+        number = self.value_of(name)
+        return Value(number, self.units[name])

@@ -105,7 +105,9 @@ class Search:
         """Search from a design."""
         try:
             outcome = self._from(x)
-            return outcome if self.runs.certain(outcome.x) else self._from(outcome.x)
+            if outcome.optimal and not self.runs.certain(outcome.x):
+                return self._from(outcome.x)
+            return outcome
         except KeyboardInterrupt as interrupt:
             interrupt.add_note(self._best_so_far())
             raise

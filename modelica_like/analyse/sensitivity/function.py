@@ -137,15 +137,18 @@ class SimulationFunction(NamedCallback):
         return self._last[1]
 
     def certain(self, p: Vector) -> bool:
-        """Return whether the derivatives at parameter values are those of the replay, which has them from now on else.
+        """Return whether the replay has the same derivatives at parameter values; if not, all come from it now.
 
-        Raises:
-            NoGradient, ModelicaLikeError: as in `at`.
+        What the replay refuses is not certain; `at` raises its reason then.
         """
         if not self._agrees:
             return True
         values = np.asarray(p, float).ravel()
-        known, replayed = self.at(values), self._differentiate(self._simulate(values))
+        try:
+            known, replayed = self.at(values), self._differentiate(self._simulate(values))
+        except ModelicaLikeError:
+            self._agrees, self._last = False, None
+            return False
         self._agrees = _agree(known, replayed)
         self._last = values.tobytes(), replayed
         return self._agrees
