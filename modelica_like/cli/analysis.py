@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from modelica_like.cli.models import Start
 from modelica_like.cli.reader import Option
@@ -19,6 +19,9 @@ from modelica_like.cli.shared import (
     load_netlist,
     told,
 )
+
+if TYPE_CHECKING:
+    from modelica_like.analyse.optimize.result import Front, Optimum
 
 
 def modes(
@@ -197,9 +200,7 @@ def optimize(
     with told(debug, json=json, pictures=[plot], files=[output, report]) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.optimize.optimize import optimize as find
-        from modelica_like.analyse.optimize.result import Optimum
         from modelica_like.analyse.sweeps.ranges import by_name, read_bounds
-        from modelica_like.errors import ValueOutOfRange
         from modelica_like.show.plot import save_plot
         from modelica_like.show.report.analysis import optimum_report
 
@@ -214,20 +215,28 @@ def optimize(
         page.print(optimum_report(result))
         if plot:
             save_plot(result.plot(), plot)
-        if not isinstance(result, Optimum):
-            if output or report:
-                raise ValueOutOfRange(
-                    "A front is no single design to write.", advice="Limit one of the objectives by --subject-to."
-                )
-            return
-        if output:
-            result.save(output)
-        if report:
-            from modelica_like.show.report.page import save_report
+        _write_design(result, output, report)
 
-            save_report(result.best_drive(), result.simulate(), report, optimum=result)
-        if not result.feasible:
-            raise SystemExit(SOLVE_FAILED)  # as `size` does where a limit is exceeded
+
+def _write_design(result: Optimum | Front, output: Path | None, report: Path | None) -> None:
+    """Write the netlist and the page of a best design, and leave with a failure where it exceeds a limit."""
+    from modelica_like.analyse.optimize.result import Front
+    from modelica_like.errors import ValueOutOfRange
+
+    if isinstance(result, Front):
+        if output or report:
+            raise ValueOutOfRange(
+                "A front is no single design to write.", advice="Limit one of the objectives by --subject-to."
+            )
+        return
+    if output:
+        result.save(output)
+    if report:
+        from modelica_like.show.report.page import save_report
+
+        save_report(result.best_drive(), result.simulate(), report, optimum=result)
+    if not result.feasible:
+        raise SystemExit(SOLVE_FAILED)  # as `size` does where a limit is exceeded
 
 
 def calibrate(

@@ -1,7 +1,5 @@
 """Drives of the examples are built from an empty sheet with a mouse and the fields of the page."""
 
-import contextlib
-import threading
 import tomllib
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
@@ -10,25 +8,14 @@ from typing import Any
 
 import pytest
 from hand import Hand
+from pages import serving
 
 from modelica_like import load
 from modelica_like.language import Assembly
-from modelica_like.page import PageServer, Session
+from modelica_like.page import Session
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 READY = "() => document.querySelector('#trail h1')"
-
-
-@contextlib.contextmanager
-def served(path: Path, **options: Any) -> Iterator[PageServer]:
-    with PageServer(Session(path, **options)) as server:
-        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
-        thread.start()
-        try:
-            yield server
-        finally:
-            server.shutdown()
-            thread.join()
 
 
 def flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
@@ -96,7 +83,7 @@ def meaning(text: str) -> dict[str, Any]:
     "name", ["machine_table_direct", *(pytest.param(name, marks=pytest.mark.slow) for name in ("winch", "launch"))]
 )
 def test_a_drive_is_built_from_an_empty_sheet(browser: Any, tmp_path: Path, name: str) -> None:
-    with served(tmp_path / "drive.toml") as server:
+    with serving(Session(tmp_path / "drive.toml")) as server:
         browser.open(server.address, 1500, 1000, ready=READY)
         hand = Hand(browser)
         build(hand, EXAMPLES / f"{name}.toml")

@@ -1,14 +1,13 @@
 """The page in a browser: mistakes, curves, keys, other editors, hostile names, and clicks without a meaning."""
 
-import contextlib
 import random
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hand import Hand
+from pages import serving
 
 from modelica_like import simulate
 from modelica_like.page import PageServer, Session
@@ -38,22 +37,10 @@ PAYLOADS = (
 )  # fmt: skip
 
 
-@contextlib.contextmanager
-def served(path: Path, **options: Any) -> Iterator[PageServer]:
-    with PageServer(Session(path, folder=path.parent, **options)) as server:
-        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
-        thread.start()
-        try:
-            yield server
-        finally:
-            server.shutdown()
-            thread.join()
-
-
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[PageServer]:
     (tmp_path / "drive.toml").write_text(TEXT)
-    with served(tmp_path / "drive.toml") as made:
+    with serving(Session(tmp_path / "drive.toml", folder=tmp_path)) as made:
         yield made
 
 
@@ -285,7 +272,7 @@ def test_clicks_and_keys_without_a_meaning(hand: Hand, server: PageServer, seed:
 @pytest.mark.browser
 def test_a_server_that_has_ended_is_told(browser: Any, tmp_path: Path) -> None:
     (tmp_path / "drive.toml").write_text(TEXT)
-    with served(tmp_path / "drive.toml") as server:
+    with serving(Session(tmp_path / "drive.toml", folder=tmp_path)) as server:
         browser.open(server.address, 1400, 900, ready=READY)
         hand = Hand(browser)
         hand.wait()

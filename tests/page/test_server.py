@@ -8,7 +8,7 @@ import socket
 import threading
 import time
 import webbrowser
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -16,6 +16,7 @@ from urllib.request import url2pathname
 
 import numpy as np
 import pytest
+from pages import serving
 
 from modelica_like import load, run_fmu, sensitivities, simulate
 from modelica_like.page import PageServer, Session, server
@@ -24,22 +25,9 @@ from modelica_like.page.runs import Runs
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-@contextlib.contextmanager
-def served(name: str, folder: Path, show: Sequence[str] = ()) -> Iterator[PageServer]:
-    session = Session(EXAMPLES / f"{name}.toml", folder=folder, show=show)
-    with PageServer(session) as page:
-        thread = threading.Thread(target=page.serve_forever, kwargs={"poll_interval": 0.02})
-        thread.start()
-        try:
-            yield page
-        finally:
-            page.shutdown()
-            thread.join()
-
-
 @pytest.fixture
 def page(tmp_path: Path) -> Iterator[PageServer]:
-    with served("machine_tool_startup", tmp_path) as made:
+    with serving(Session(EXAMPLES / "machine_tool_startup.toml", folder=tmp_path)) as made:
         built(made)
         yield made
 

@@ -172,21 +172,7 @@ def calibrate(
     """
     drive = loaded(drive)
     model = build(drive, free=parameters)
-    measured = [data] if isinstance(data, Measurement | str | Path) else list(data)
-    if not measured or not parameters or starts < 1:
-        raise ValueOutOfRange(
-            "A calibration needs data, at least one parameter, and at least one start.",
-            advice='Write calibrate(drive, [Trajectories("meas.csv")], {"clutch.mu": (0.1, 0.5)}), or on the command '
-            "line --data meas.csv --free clutch.mu=0.1:0.5.",
-        )
-    for item in measured:
-        if not isinstance(item, Measurement):
-            raise ValueOutOfRange(
-                f"{repr(item) if isinstance(item, str | Path) else type(item).__name__} is no measurement.",
-                advice='Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the '
-                "uncertainties.",
-            )
-        item.check([*parameters])
+    measured = _measurements(data, parameters, starts)
     problem = _Problem(model, measured, parameters)
     begins = problem.starts(guess or {}, starts, seed)
     results: list[Any] = []
@@ -204,6 +190,28 @@ def calibrate(
     best = min(results, key=lambda r: r.cost)
     result = problem.result(best, tuple(2 * result.cost for result in results))
     return replace(result, drive=drive if isinstance(drive, Component) else None)
+
+
+def _measurements(data: Any, parameters: Mapping[str, Any], starts: int) -> list[Measurement]:
+    """Return the measurements, after checking that something can be found from them."""
+    given = [data] if isinstance(data, Measurement | str | Path) else list(data)
+    measured: list[Measurement] = []
+    if not given or not parameters or starts < 1:
+        raise ValueOutOfRange(
+            "A calibration needs data, at least one parameter, and at least one start.",
+            advice='Write calibrate(drive, [Trajectories("meas.csv")], {"clutch.mu": (0.1, 0.5)}), or on the command '
+            "line --data meas.csv --free clutch.mu=0.1:0.5.",
+        )
+    for item in given:
+        if not isinstance(item, Measurement):
+            raise ValueOutOfRange(
+                f"{repr(item) if isinstance(item, str | Path) else type(item).__name__} is no measurement.",
+                advice='Say what it measures: Trajectories("meas.csv"), OperatingPoints(…) or Numbers(…), with the '
+                "uncertainties.",
+            )
+        item.check([*parameters])
+        measured.append(item)
+    return measured
 
 
 class _Problem:
