@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from modelica_like.arguments import checked
@@ -11,6 +12,16 @@ from modelica_like.edit.sheet import Sheet
 from modelica_like.errors import NetlistError
 from modelica_like.netlist import spell
 from modelica_like.netlist.outline import Outline
+
+_TITLES = {
+    "replace": "Write '{new}'", "set": "Give {path} a value", "free": "Leave {end} free",
+    "connect": "Connect {first} to {second}", "insert": "Put a {kind} between {between[0]} and {between[1]}",
+}  # fmt: skip
+
+
+def title(suggestion: Mapping[str, Any]) -> str:
+    """Return what an editor or a page writes on the button that applies a suggestion."""
+    return _TITLES[suggestion["operation"]].format(**suggestion)
 
 
 @checked

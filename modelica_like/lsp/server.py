@@ -15,6 +15,7 @@ from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 
 from modelica_like.analyse.sizing.run import survey
+from modelica_like.edit.suggested import title
 from modelica_like.errors import DEFECTS, ModelicaLikeError
 from modelica_like.lsp import answers
 from modelica_like.lsp.change import Edit, applied, renamed
@@ -32,10 +33,6 @@ _KINDS = {
     "value": types.CompletionItemKind.Field, "part": types.CompletionItemKind.Variable,
     "end": types.CompletionItemKind.Interface, "unit": types.CompletionItemKind.Unit,
     "word": types.CompletionItemKind.Value,
-}  # fmt: skip
-_FIXES = {
-    "replace": "Write '{new}'", "set": "Give {path} a value", "free": "Leave {end} free",
-    "connect": "Connect {first} to {second}", "insert": "Put a {kind} between {between[0]} and {between[1]}",
 }  # fmt: skip
 
 
@@ -210,9 +207,9 @@ def _change(server: Server) -> None:
             if not suggestion or place.end < params.range.start or params.range.end < place.start:
                 continue
             if problem["file"] == str(text.path) and (changes := applied(text, suggestion)):
-                title = _FIXES[suggestion["operation"]].format(**suggestion)
+                label = title(suggestion)
                 edit, told = server.edits(text, uri, changes), [_diagnostic(place, problem)]
-                actions.append(types.CodeAction(title, types.CodeActionKind.QuickFix, diagnostics=told, edit=edit))
+                actions.append(types.CodeAction(label, types.CodeActionKind.QuickFix, diagnostics=told, edit=edit))
         return actions
 
 

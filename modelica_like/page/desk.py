@@ -11,6 +11,7 @@ from typing import Any
 from modelica_like.edit.document import Document
 from modelica_like.edit.saving import rewritten
 from modelica_like.edit.sheet import Sheet
+from modelica_like.edit.suggested import title
 from modelica_like.edit.wires import misfits
 from modelica_like.errors import ModelicaLikeError, NetlistError, UntrustedModule
 from modelica_like.language import Assembly
@@ -161,7 +162,7 @@ class Desk:
                     self.drive, self.drawn, self._picture = None, None, ""
         except ModelicaLikeError as error:
             self.valid = False
-            self.problems = [problem.as_json() for problem in error.problems()]
+            self.problems = problems_of(error)
             if any(isinstance(problem, UntrustedModule) for problem in error.problems()):
                 self.problems[0]["kind"] = UntrustedModule.__name__
 
@@ -222,3 +223,9 @@ class Desk:
         with self.trusting():
             answer = answers.explain(Text(self.path, text), offset)
         return answer[0] if answer else ""
+
+
+def problems_of(error: ModelicaLikeError) -> list[dict[str, Any]]:
+    """Return problems as data, with the words on the button of those that have a suggestion (`fix`)."""
+    problems = [problem.as_json() for problem in error.problems()]
+    return [problem | ({"fix": title(told)} if (told := problem.get("suggestion")) else {}) for problem in problems]

@@ -180,16 +180,12 @@ async function rankNow() {
 
 /* ---- problems ---- */
 
-const FIXES = { replace: (one) => `Write ${one.new}`, set: (one) => `Give ${one.path}`, free: (one) =>
-  `Leave ${one.end} free` };
-
 function listProblems() {
   at("problems").replaceChildren(...page.problems.slice(0, 40).map((one) => {
     const text = element("button", { className: "problem" }, element("b", {}, one.what), element("span", {}, [one.why,
       one.advice].filter(Boolean).join(" ")));
     text.onclick = () => showProblem(one);
-    const actions = one.suggestion && isMine(one) ? [element("button", { className: "fix" },
-      FIXES[one.suggestion.operation](one.suggestion))] : [];
+    const actions = one.suggestion && isMine(one) ? [element("button", { className: "fix" }, one.fix)] : [];
     if (one.kind === "UntrustedModule") actions.push(element("button", { className: "fix" },
       "Run the modules of this folder"));
     if (actions.length) actions.at(-1).onclick = () => one.kind === "UntrustedModule" ? trust() : fix(one.suggestion);
@@ -208,16 +204,9 @@ function showProblem(one) {
   }
 }
 
-async function fix(one) {
-  if (one.operation === "free") return apply({ op: "set", section: "", path: "free", value: [...(page.data.free ?? []),
-    one.end] });
-  if (one.operation === "replace") {
-    const text = page.text.replaceAll("\r\n", "\n"), begin = offsetOf(text, one.line, one.column),
-      end = begin + one.old.length;
-    if (text.slice(begin, end) === one.old) await change("text", { text: text.slice(0,
-      begin) + one.new + text.slice(end) }).catch(tell);
-    return;
-  }
+/* Applies a suggestion; a value that it cannot know is asked for in its field. */
+function fix(one) {
+  if (one.operation !== "set" || one.value !== undefined) return apply(one);
   select([head(one.path)]);
   setTimeout(() => at("inspector").querySelector(`[data-path="${CSS.escape(one.path)}"]`)?.focus(), 60);
 }

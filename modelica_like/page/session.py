@@ -12,7 +12,7 @@ from modelica_like.errors import ModelicaLikeError, NetlistError
 from modelica_like.language import Assembly
 from modelica_like.netlist.further import thoroughly
 from modelica_like.page import files
-from modelica_like.page.desk import Desk, read
+from modelica_like.page.desk import Desk, problems_of, read
 from modelica_like.page.palette import palette
 from modelica_like.page.runs import Runs, number
 from modelica_like.show.draw.running import running
@@ -130,7 +130,7 @@ class Session:
                 content = runs.content(shown)
                 self._built = desk, revision, runs
             except ModelicaLikeError as error:
-                content, problems = None, [problem.as_json() for problem in error.problems()]
+                content, problems = None, problems_of(error)
         return {"revision": revision, "problems": problems, "content": content}
 
     def _build(self, drive: Assembly) -> tuple[Runs, list[dict[str, Any]]]:

@@ -103,8 +103,45 @@ def test_a_part_is_clicked_or_dragged_onto_a_line(hand: Hand) -> None:
 def test_a_suggestion_is_applied_by_one_click(hand: Hand) -> None:
     write(hand, TEXT.replace('is = "Inertia"', 'is = "Inertai"', 1))
     assert hand.page.locator(".marked").inner_text() == "Inertai"
-    hand.page.get_by_role("button", name="Write Inertia").click()
+    hand.page.get_by_role("button", name="Write 'Inertia'").click()
     assert hand.text == TEXT
+
+
+SUGGESTED = {
+    "Connect s.flange_b to b.flange_a": (
+        """[parts]
+a = { is = "Inertia", J = 1 }
+s = { is = "Spring", c = 5 }
+b = { is = "Inertia", J = 2 }
+[series]
+x = ["a", "s"]
+""", "page.problems.every((one) => !one.what.includes('s.flange_b'))"),
+    "Put a SpringDamper between a.flange and b.flange": (
+        """[parts]
+a = { is = "ConstantSpeed", w_fixed = 1 }
+b = { is = "ConstantSpeed", w_fixed = 2 }
+[connect]
+x = ["a.flange", "b.flange"]
+""", "page.data.parts.spring.is === 'SpringDamper'"),
+    "Give m.tau a value": (
+        """[parts]
+m = { is = "Torque" }
+a = { is = "Inertia", J = 1 }
+[series]
+x = ["m", "a"]
+""", "document.activeElement.dataset.path === 'm.tau'"),
+}  # fmt: skip
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("button", SUGGESTED)
+def test_every_kind_of_suggestion_is_a_button(hand: Hand, button: str) -> None:
+    text, reached = SUGGESTED[button]
+    write(hand, text)
+    hand.page.get_by_role("button", name=button, exact=True).click()
+    hand.wait()
+    hand.until(reached)
+    assert not any("is not a function" in one for one in hand.browser.complaints)
 
 
 @pytest.mark.browser
