@@ -57,7 +57,7 @@ def run_example(name: str) -> Outcome:
         run: Any = simulate(model, float(times[-1]), points=POINTS, rtol=1e-7)
     except ModelicaLikeError as error:
         return Outcome("refused", str(error).splitlines()[0])
-    comparison = compare(run, times, columns)
+    comparison = compare(name, run, times, columns)
     if comparison.right:
         return Outcome("right")
     outside = {column: distance for column, distance in comparison.worst.items() if distance}
