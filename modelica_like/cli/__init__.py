@@ -71,8 +71,8 @@ def _libraries(words: list[str]) -> tuple[list[str], list[str]]:
         name, equals, place = word.partition("=")
         if name != "--library":
             rest.append(word)
-        elif path := place if equals else next(pending, ""):
-            places.append(path)
+        else:  # without a path, or with an empty one, there is no such library
+            places.append(place if equals else next(pending, ""))
     return rest, places
 
 

@@ -80,3 +80,14 @@ def test_the_command_line_names_libraries(library: Path, tmp_path: Path) -> None
 def test_a_library_that_is_not_there_is_told(tmp_path: Path) -> None:
     with pytest.raises(ModelicaTextError, match="There is no library of Modelica text at "):
         with_libraries([tmp_path / "nowhere"])
+
+
+@pytest.mark.parametrize("words", [["--library"], ["--library="]])
+def test_a_library_without_a_path_is_told(tmp_path: Path, words: list[str]) -> None:
+    (tmp_path / "u.mo").write_text("model D\n  Real x(start = 1, fixed = true);\nequation\n  der(x) = -x;\nend D;\n")
+    command = [sys.executable, "-m", "modelica_like", "check", "u.mo", *words]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "There is no library of Modelica text at ''.\nName a package's folder or file, or a folder with packages.\n"
+    )

@@ -42,7 +42,7 @@ def with_libraries(places: Sequence[str | Path]) -> AbstractContextManager[None]
         ModelicaTextError: one of them is not there.
     """
     for place in places:
-        if not Path(place).exists():
+        if not str(place) or not Path(place).exists():  # an empty path is the present folder
             raise ModelicaTextError(
                 f"There is no library of Modelica text at '{place}'.",
                 advice="Name a package's folder or file, or a folder with packages.",
