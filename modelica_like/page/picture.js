@@ -1,7 +1,7 @@
 /* The schematic: what is selected in it, what a problem marks, and how one looks for ends and lines near the pointer. */
 const NEAR = { open: 11, joined: 5, optional: 6 }, OVER = 6;
 // pixels around an end that belong to it; over a part, fewer
-const SMALLEST = 0.72; // scale below which the picture is moved instead
+const SMALLEST = 0.5; // scale below which the picture is moved instead: names are 7 pixels high there
 
 const drawing = () => at("sheet").querySelector("svg");
 const partAt = (name) => [...at("sheet").querySelectorAll(".part")].find((one) => one.dataset.part === name);
