@@ -96,6 +96,7 @@ def conserving(run: Solution, repeat: Callable[[Options], Solution]) -> Solution
     raise error
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what is not finite has its notice in the balance
 def find_astray(run: Solution) -> Astray | None:
     """Find the results between which the integration of a run is wrong.
 
@@ -105,8 +106,7 @@ def find_astray(run: Solution) -> Astray | None:
     model, segments, options = run.model, run.segments, run.options
     if not model.states or not model.components:
         return None
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite has its notice in the balance
-        drifts, moved = drifts_of_results(model, segments)
+    drifts, moved = drifts_of_results(model, segments)
     suspects = np.flatnonzero(np.abs(drifts) > _SUSPICIOUS * options.rtol * moved)
     # Where the tolerances allow it anyway, finer results could only be limited by them, too.
     if suspects.size:
