@@ -7,7 +7,7 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from modelica_like.netlist.modelica.tree import Expr, joined
+from modelica_like.netlist.modelica.tree import Expr, joined, with_operands
 
 _BINARY: dict[str, Callable[[float, float], float]] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "^": operator.pow,
@@ -21,8 +21,12 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": abs, "sign": lambda x: float((x > 0) - (x < 0)), "integer": math.floor, "min": min, "max": max,
     "mod": lambda x, y: x - math.floor(x / y) * y, "div": lambda x, y: float(math.trunc(x / y)), "rem": math.fmod,
 }  # fmt: skip
-_SAME_TYPE = ("pre", "noEvent", "previous", "hold")
+ARGUMENT, SILENT = "argument", "silent"
+"""Calls round an argument of a function, whose relations make events, and round a relation or a jump of the function
+itself, which makes none."""
+_SAME_TYPE = ("pre", "noEvent", "previous", "hold", ARGUMENT, SILENT)
 """Calls that have the type of their argument."""
+_JUMPING = ("sign", "floor", "integer", "ceil", "mod", "div", "rem")
 _ANSWERS = ("initial", "terminal", "edge", "change", "sample", "Clock")
 """Calls that are conditions."""
 KNOWN = ("number", "boolean", "literal", "string")
@@ -45,6 +49,26 @@ def known(expression: Expr) -> Expr:
         taken = (value for condition, value in zip(args[:-1:2], args[1::2], strict=True) if condition.args[0])
         return next(taken, args[-1])
     return expression if expression.kind in KNOWN else operation(expression.kind, args, expression.line)
+
+
+def jumps(expression: Expr) -> bool:
+    """Tell whether an expression has relations, or functions that jump."""
+    inner = expression.args[1] if expression.kind == "call" else expression.args
+    return _jumps_itself(expression) or any(isinstance(argument, Expr) and jumps(argument) for argument in inner)
+
+
+def _jumps_itself(expression: Expr) -> bool:
+    return expression.kind in _RELATIONS or (expression.kind == "call" and expression.args[0] in _JUMPING)
+
+
+def quiet(result: Expr) -> Expr:
+    """Return the result of a function: its relations make no events, those of its arguments do."""
+    if result.kind == "call" and result.args[0] == ARGUMENT:
+        return result.args[1][0]
+    if result.kind == "call" and result.args[0] == SILENT:  # of another function, which this one calls
+        return with_operands(result, lambda inner: with_operands(inner, quiet))
+    changed = with_operands(result, quiet)
+    return call(SILENT, (changed,), result.line) if _jumps_itself(result) else changed
 
 
 def number(value: float, line: int = 0) -> Expr:
@@ -273,6 +297,8 @@ def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
     of_numbers = _FUNCTIONS[name]
 
     def make(items: tuple[Expr, ...]) -> Expr:
+        if name in ("min", "max") and all(map(is_condition, items)):  # false is less than true
+            return operation("and" if name == "min" else "or", items, line)
         if any(map(is_condition, items)):
             raise Unfit(f"{name} needs numbers, and a condition is none")
         return _computed(of_numbers, items, line) if _all_known(items) else call(name, items, line)

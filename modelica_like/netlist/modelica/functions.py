@@ -146,9 +146,7 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
     if resolver.depth > _DEEPEST:
         raise refused(f"{name}, which calls itself,", resolver.text, line)
     result = _Call(resolver, text).result(given, named, line)
-    if result.kind == "tuple":
-        return Expr("tuple", tuple(_silent(item, line) for item in result.args), line)
-    return _silent(result, line)
+    return fold.quiet(result)
 
 
 def _record(resolver: Resolver, text: ClassText, given: tuple[Expr, ...], named: Mapping[str, Expr]) -> Expr:
@@ -162,10 +160,12 @@ def _record(resolver: Resolver, text: ClassText, given: tuple[Expr, ...], named:
     return Expr("record", (tuple(inside.members), *every), text.line)
 
 
-def _silent(result: Expr, line: int) -> Expr:
-    """Return what a function gives: its relations make no events."""
-    is_constant = result.kind in (*fold.KNOWN, "array", "object", "curve", "record")
-    return result if is_constant else Expr("call", ("noEvent", (result,), ()), line)
+def _eventful(argument: Expr) -> Expr:
+    """Return an argument as it is inlined: its own relations make the events that they make outside."""
+    if argument.kind == "array":
+        return Expr("array", tuple(map(_eventful, argument.args)), argument.line)
+    kept = argument.kind in ("record", "object", "curve") or not fold.jumps(argument)
+    return argument if kept else fold.call(fold.ARGUMENT, (argument,), argument.line)
 
 
 class _Call(Algorithm):
@@ -202,7 +202,7 @@ class _Call(Algorithm):
         return fold.each(self.text.name, tuple(taken[name] for name in scalar), line, of)
 
     def _one(self, taken: dict[str, Expr], outputs: list[str], line: int) -> Expr:
-        self.local.update(taken)
+        self.local.update((name, _eventful(value)) for name, value in taken.items())
         for name in taken:
             self._check(name)
         for name in self.declared:

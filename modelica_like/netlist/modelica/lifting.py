@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from modelica_like.netlist.modelica.instance import Instance
-from modelica_like.netlist.modelica.tree import Expr
+from modelica_like.netlist.modelica.tree import Expr, with_operands
 
 UP = "^"
 
@@ -17,11 +17,7 @@ def renamed(node: Expr, change: Callable[[str], str]) -> Expr:
     """Return a resolved expression with other paths of its variables."""
     if node.kind in ("name", "condition"):
         return Expr(node.kind, ((change(node.args[0][0]), ()),), node.line)
-    if node.kind == "call":
-        name, given, named = node.args
-        return Expr("call", (name, tuple(renamed(argument, change) for argument in given), named), node.line)
-    args = tuple(renamed(argument, change) if isinstance(argument, Expr) else argument for argument in node.args)
-    return Expr(node.kind, args, node.line)
+    return with_operands(node, lambda operand: renamed(operand, change))
 
 
 def outside(node: Expr, levels: int) -> Expr:

@@ -16,7 +16,7 @@ from modelica_like.netlist.modelica.sections import Section
 from modelica_like.netlist.modelica.signals import Memories, inner_signals
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement, calls_in
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside, is_signal
-from modelica_like.netlist.modelica.whens import Whens, as_condition, is_ending
+from modelica_like.netlist.modelica.whens import Whens, as_condition, is_demand, is_ending
 from modelica_like.netlist.modelica.wiring import Wire, groups
 from modelica_like.netlist.modelica.written import ASSERT, MEMORY, Happening
 
@@ -228,7 +228,7 @@ class Statements(Whens):
             place = text.place(statement.line)
             Section(self, text, place, initial=self.initially).equations(statement.parts[0])
         elif statement.kind == "call":
-            if statement.parts[0].args[0] != "assert":
+            if not is_demand(statement.parts[0]):
                 raise refused(f"{statement.parts[0].args[0]}(…) among equations", text, statement.parts[0].line)
             demand = self.demanded(statement.parts[0], resolver, text)
             if demand is not None:
@@ -276,13 +276,16 @@ class Statements(Whens):
             )
             if holds.kind == "boolean" and not holds.args[0]:
                 continue
-            target = Statements(self.instance) if open_branches or holds.kind != "boolean" else self
+            is_open = bool(open_branches) or holds.kind != "boolean"
+            target = Statements(self.instance, in_branch=True) if is_open else self
             for inner in body:
                 target.statement(inner, text, local)
             if target is self:
                 return
-            if target.connections or target.happenings:
+            if target.connections or any(not happening.text for happening in target.happenings):
                 raise refused("a connection or an event in a branch that changes during a run", text, statement.line)
+            before = [other for other, _ in open_branches if other is not None]
+            self.happenings += [_if_taken(holds, before, happening) for happening in target.happenings]
             open_branches.append((None if holds.kind == "boolean" else holds, target))
             if holds.kind == "boolean":
                 break
@@ -292,6 +295,8 @@ class Statements(Whens):
 
     def _joined(self, branches: list[tuple[Expr | None, Statements]], text: ClassText, line: int) -> None:
         counts = {len(branch.equations) for _, branch in branches}
+        if counts == {0}:
+            return
         if len(counts) > 1 or branches[-1][0] is not None:
             raise refused("an 'if' whose branches have different numbers of equations", text, line)
         for k in range(counts.pop()):
@@ -336,6 +341,16 @@ class Statements(Whens):
                 what = "A condition is no number: write `if … then 1 else 0`."
                 raise ModelicaTextError(what, where=text.place(line))
             self.equations.append((left, fitting, text.place(line)))
+
+
+def _if_taken(holds: Expr, before: list[Expr], assertion: Happening) -> Happening:
+    """Return an assertion in a branch: it demands nothing where another one is taken."""
+    ((conditions, new),) = assertion.branches
+    taken = holds
+    for other in before:
+        taken = fold.operation("and", (fold.operation("not", (other,), other.line), taken), other.line)
+    demand = fold.operation("or", (fold.operation("not", (taken,), holds.line), conditions[0]), holds.line)
+    return Happening((((demand,), new),), assertion.source, assertion.text)
 
 
 def _is_numeric(node: Expr) -> bool:

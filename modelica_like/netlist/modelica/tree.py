@@ -221,6 +221,15 @@ def substituted(expression: Expr, values: dict[str, Expr]) -> Expr:
     return Expr(expression.kind, args, expression.line)
 
 
+def with_operands(expression: Expr, change: Callable[[Expr], Expr]) -> Expr:
+    """Return an expression with changed operands or arguments."""
+    if expression.kind == "call":
+        name, given, named = expression.args
+        return Expr("call", (name, tuple(map(change, given)), named), expression.line)
+    args = tuple(change(operand) if isinstance(operand, Expr) else operand for operand in expression.args)
+    return Expr(expression.kind, args, expression.line)
+
+
 def names_in(expression: Expr) -> Iterator[Expr]:
     """Yield the names in an expression."""
     if expression.kind == "name":

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Instance, refused
+from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
 from modelica_like.netlist.modelica.types import Basic, basic_type, misfit
@@ -24,12 +25,14 @@ class Whens:
         happenings: whens and assertions.
         assigned: names that only events change.
         reset: states that events change.
+        in_branch: whether what is read stands in an `if` that only a run decides.
     """
 
     instance: Instance
     happenings: list[Happening] = field(default_factory=list, kw_only=True)
     assigned: set[str] = field(default_factory=set, kw_only=True)
     reset: set[str] = field(default_factory=set, kw_only=True)
+    in_branch: bool = field(default=False, kw_only=True)
 
     def read_when(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
         """Read a `when`."""
@@ -90,22 +93,51 @@ class Whens:
                 self.reset |= {target.args[0][0] for target in targets}
             elif call is not None and call.args[0] == "terminate":
                 values[TERMINATE] = Expr("string", (_words(call.args[1][0]),), statement.line)
-            elif call is not None and call.args[0] == "assert":
+            elif call is not None and is_demand(call):
                 demand = self.demanded(call, resolver, text)
                 values |= {} if demand is None else {f"{ASSERT}{len(values)}": Expr("demand", demand, statement.line)}
+            elif statement.kind == "if":
+                values |= self._chosen(statement, text, local)
             else:
                 raise refused(f"'{statement.kind}' in a 'when'", text, statement.line)
         return values
 
+    def _chosen(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> dict[str, Expr]:
+        """Return the new values of an `if`: each of its branches gives the same variables one, or keeps it."""
+        resolver = Resolver(self.instance, text, local)
+        branches: list[tuple[Expr, dict[str, Expr]]] = []
+        for condition, body in statement.parts:
+            true = Expr("boolean", (True,))
+            holds = true if condition is None else resolver.condition(condition, "if", statement.line)
+            if holds.kind != "boolean" or holds.args[0]:
+                branches.append((holds, self.changes(body, text, local)))
+            if holds.kind == "boolean" and holds.args[0]:
+                break
+        names = dict.fromkeys(name for _, values in branches for name in values)
+        if any(is_ending(name) or name in self.reset for name in names) and len(branches) > 1:
+            raise refused("reinit, terminate or assert in an 'if' of a 'when'", text, statement.line)
+        return {name: self._by_branch(name, branches, statement.line) for name in names}
+
+    def _by_branch(self, name: str, branches: list[tuple[Expr, dict[str, Expr]]], line: int) -> Expr:
+        """Return the value that one of the branches gives a variable, else the one it has."""
+        left = Resolver(self.instance, self.instance.text)(parse_expression(name))
+        value = fold.call("pre", (left,), line)
+        for holds, values in reversed(branches):
+            new = values.get(name, fold.call("pre", (left,), line))
+            value = new if holds.kind == "boolean" else fold.choice([holds, new], value, line)
+        return as_condition(value) if left.kind == "condition" else value
+
     def demanded(self, call: Expr, resolver: Resolver, text: ClassText) -> tuple[Expr, Expr] | None:
         """Return the condition of an assertion and its words; None of a warning and of what always holds."""
-        _, given, named = call.args
+        name, given, named = call.args
+        if name != "assert":  # an error
+            given = (Expr("boolean", (False,), call.line), *given)
         level = given[2] if len(given) > 2 else dict(named).get("level")
         if level is not None and not (level.kind == "name" and level.args[-1][0] == "error"):
             return None
         condition = resolver.condition(given[0], "assert", call.line)
         words = _words(given[1]) if len(given) > 1 else "an assertion is broken"
-        if condition.kind != "boolean":
+        if condition.kind != "boolean" or (self.in_branch and not condition.args[0]):
             return condition, Expr("string", (words,), call.line)
         if not condition.args[0]:
             raise ModelicaTextError(f"An assertion is broken: {words}.", where=text.place(call.line))
@@ -126,6 +158,11 @@ class Whens:
         target = left.args[1][0] if left.kind == "call" and left.args[0] == "pre" else left
         basic = self.check_type(target, right, text, line)
         return fold.numbered(right) if basic is not None and basic.kind == "enumeration" else right
+
+
+def is_demand(call: Expr) -> bool:
+    """Tell whether a call is an assertion or an error."""
+    return call.args[0] == "assert" or call.args[0].endswith("Streams.error")
 
 
 def is_ending(name: str) -> bool:

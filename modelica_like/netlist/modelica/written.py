@@ -42,6 +42,7 @@ from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import InsideAssembly
+from modelica_like.netlist.modelica.fold import SILENT
 from modelica_like.netlist.modelica.tree import Expr as Node
 
 MEMORY = "_condition"
@@ -198,10 +199,19 @@ class Written(Assembly):
         if kind == "call":
             if args[0] in ("pre", "edge", "change", "previous") and args[1][0].kind == "name":
                 return self._called(args[0], [self._remembered(args[1][0].args[0][0])], events)
+            if args[0] == SILENT:
+                return self._operation(args[1][0], events, quiet=True)
             events = False if args[0] == "noEvent" else events
-            return self._called(args[0], [self.symbolic(argument, events) for argument in args[1]], events)
-        result = _OPERATIONS[kind](*(self.symbolic(argument, events) for argument in args))
-        return silent(result) if events is False and kind in _RELATIONS else result
+        return self._operation(node, events, quiet=events is False)
+
+    def _operation(self, node: Node, events: bool | None, *, quiet: bool) -> Any:
+        """Return a call or an operation in symbols; `quiet` is its own, `events` what its operands have."""
+        operands = node.args[1] if node.kind == "call" else node.args
+        values = [self.symbolic(operand, events) for operand in operands]
+        if node.kind == "call":
+            return self._called(node.args[0], values, False if quiet else events)
+        result = _OPERATIONS[node.kind](*values)
+        return silent(result) if quiet and node.kind in _RELATIONS else result
 
     def _remembered(self, path: str) -> Any:
         """Return the symbol of a variable; of a signal that changes at events that of its value itself."""
@@ -304,7 +314,7 @@ def _formula(node: Node, prefix: str) -> Formula | None:
         return Formula("number", (args[0],))
     if kind == "name" and args[0][0] != "time" and not args[0][0].startswith("^"):
         return Formula("name", (prefix + args[0][0],))
-    if kind == "call" and args[0] in ("noEvent", "homotopy"):
+    if kind == "call" and args[0] in ("noEvent", "homotopy", SILENT):
         return _formula(args[1][0], prefix)
     operation = {"^": "**"}.get(kind, kind) if kind in ("+", "-", "*", "/", "^", "neg") else ""
     operands = args

@@ -1,0 +1,106 @@
+"""Events of functions, of branches in a `when`, and of assertions in branches: against closed forms."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from modelica_like import load, simulate
+from modelica_like.errors import LimitPassed
+
+
+def run(folder: Path, text: str, until: float = 1.0) -> Any:
+    (folder / "a.mo").write_text(text)
+    return simulate(load(folder / "a.mo"), until)
+
+
+FUNCTION = """
+model A
+  function f
+    input Real u;
+    input Real v;
+    output Real y;
+  algorithm
+    y := if u > 0.5 then v else 2*v;
+  end f;
+  function g
+    input Boolean b[:];
+    output Boolean y = f(sum(if b[i] then 1 else 0 for i in 1:size(b, 1)), 1) < 1.5 and max(b) and not min(b);
+  algorithm
+  end g;
+  Real x(start = 0, fixed = true), y(start = 0, fixed = true);
+  Boolean some;
+equation
+  der(x) = f(if time > 0.3 then 1 else 0, if time > 0.71 then 1 else 3);
+  some = g({time >= 0.1*k and time < 0.1*k + 0.05 for k in 1:3});
+  der(y) = if some then 1 else 0;
+end A;
+"""
+
+
+def test_relations_in_arguments_of_functions_make_events(tmp_path):
+    """6 until 0.3 s, 3 until 0.71 s, then 1; and three pulses of 0.05 s."""
+    result = run(tmp_path, FUNCTION)
+    assert result["x"][-1] == pytest.approx(0.3 * 6 + 0.41 * 3 + 0.29, abs=1e-12)
+    assert result["y"][-1] == pytest.approx(0.15, abs=1e-12)
+
+
+def test_relations_of_functions_make_none(tmp_path):
+    text = FUNCTION.replace("if time > 0.3 then 1 else 0, if time > 0.71 then 1 else 3", "time, 1")
+    result = run(tmp_path, text.replace("der(y) = if some then 1 else 0", "der(y) = 0"))
+    assert {event.source.line for event in result.events} == {19}  # those of `some`
+    assert result["x"][-1] == pytest.approx(1.5, rel=1e-6)
+
+
+BRANCHES = """
+model A
+  Real low(start = 0, fixed = true), high(start = 0, fixed = true), tl(start = -1, fixed = true);
+  Real th(start = -1, fixed = true), u = sin(10*time);
+  Boolean up(start = false, fixed = true);
+equation
+  when sample(0.1, 0.1) then
+    low = min(u, pre(low));
+    high = max(u, pre(high));
+    if low < pre(low) then
+      tl = time; th = pre(th); up = false;
+    elseif high > pre(high) then
+      th = time; up = true;
+      tl = pre(tl);
+    else
+      tl = pre(tl); th = pre(th);
+    end if;
+  end when;
+end A;
+"""
+
+
+def test_an_if_in_a_when(tmp_path):
+    """Samples of sin at 1, 2, … 10: the largest is sin 8, the smallest sin 5."""
+    result = run(tmp_path, BRANCHES, 1.05)
+    assert [result[name][-1] for name in ("tl", "th", "up")] == pytest.approx([0.5, 0.8, 1.0])
+
+
+DEMANDS = """
+model A
+  parameter Real begin = 0.5;
+  Real x(start = begin, fixed = true);
+equation
+  der(x) = 1;
+  if begin < 0 or begin > 1 then
+    Modelica.Utilities.Streams.error("begin is not in [0, 1]");
+  end if;
+  if x > 0.9 then
+    assert(time < 0.6, "late");
+  else
+    assert(time < 0.5, "too late");
+  end if;
+end A;
+"""
+
+
+def test_assertions_in_branches(tmp_path):
+    assert run(tmp_path, DEMANDS, 0.55)["x"][-1] == pytest.approx(1.05)
+    with pytest.raises(LimitPassed, match=r"At 0\.6 s A late\."):
+        run(tmp_path, DEMANDS)
+    with pytest.raises(LimitPassed, match=r"At 0 s A begin is not in \[0, 1\]\."):
+        run(tmp_path, DEMANDS.replace("begin = 0.5", "begin = 1.5"))
