@@ -308,3 +308,38 @@ model A
 end A;
 """)  # fmt: skip
     assert result["y"] == pytest.approx(10 + 3 * result.time)
+
+
+RECORDS = """
+record RC
+  parameter Real R, C;
+end RC;
+record Cell
+  parameter Integer n = 1;
+  parameter Real Ri = 2;
+  parameter RC rc[n] = {RC(R = 0, C = 0)};
+  parameter Real R0 = Ri - sum(rc.R);
+end Cell;
+model Element
+  parameter Real T = 1;
+  Real x(start = 0, fixed = true);
+equation
+  T*der(x) = 1 - x;
+end Element;
+model Stack
+  parameter Integer Ns = 1;
+  parameter Cell cell;
+  Element e[cell.n](final T = Ns*cell.rc.R .* cell.rc.C);
+end Stack;
+model A
+  parameter Cell two(n = 2, rc = {RC(R = 0.2*two.Ri, C = 1/(0.2*two.Ri)), RC(R = 0.1*two.Ri, C = 10)});
+  Stack s(Ns = 3, cell = two);
+  Real left = two.R0;
+end A;
+"""
+
+
+def test_arrays_of_records_are_given_with_names(tmp_path):
+    result = run(tmp_path, RECORDS, 6.0)
+    assert [result[f"s.e[{k}].x"][-1] for k in (1, 2)] == pytest.approx([1 - np.exp(-2), 1 - np.exp(-1)])
+    assert result["left"][-1] == pytest.approx(2 - 0.4 - 0.2)

@@ -344,6 +344,8 @@ def element(given: Given, index: int, size: int = 0) -> Given:
             )
         if value.kind == "array" and index <= len(value.args):
             entry.value = value.args[index - 1]
+            if entry.value.kind == "record" and given.value.kind == "array":
+                entry.value = given.value.args[index - 1]  # as it is written, with names of the place it is given at
     return entry
 
 

@@ -13,6 +13,7 @@ from modelica_like.netlist.modelica.classes import Classes
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
 from modelica_like.netlist.modelica.lifting import way
+from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Import
 from modelica_like.netlist.modelica.types import Basic, basic_type
 
@@ -148,6 +149,8 @@ class Resolver:
 
     def _name(self, expression: Expr) -> Expr:
         head, subscripts = expression.args[0]
+        if "." in head:  # of an element of an array, which has been resolved with the others
+            return self._name(parse_expression(head))
         if head in self.local:
             value = self.indexed(self.local[head], subscripts, expression.line)
             for name, subs in expression.args[1:]:
