@@ -136,6 +136,14 @@ void drop_returning(Instance *c, const double *modes, double *soon) {
     }
 }
 
+/* Would a relation that changed in this instant return, though its guard is so near zero that it falls below it soon?
+ */
+static int at_its_edge(const Instance *c, int guard, double now, double soon) {
+    const Transition *one = &c->model->transitions[c->model->guard_transition[guard]];
+    int begun = c->model->modes[one->mode].hidden && c->d_begun[one->mode] == one->target;
+    return begun && now < LATER * (now - soon);
+}
+
 void note_change(Instance *c, int name, int transition, int mode, int target) {
     const Model *m = c->model;
     const Mode *one = &m->modes[mode];
@@ -275,8 +283,9 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
 }
 
 /* Adds guards that an update has made positive, however soon they will fall again: a rebound may be that short. One
-   that jumps to zero, up to rounding and the location of the event, is judged by where it goes, as others are; so is
-   one that will not be positive once the relations and whole numbers have followed of which it is made. */
+   that jumps to zero, up to rounding and the location of the event, is judged by where it goes, as others are, also
+   where it was no further from it: a relation that changed in this instant does not return for that. So is one that
+   will not be positive once the relations and whole numbers have followed of which it is made. */
 static void want_jumped(Instance *c, const double *before, unsigned char *wanting) {
     double *now = c->guards_before, *rates = now + c->model->n_guards, *soon = c->guards;
     double step = TIME_RESOLUTION * fmax(1, fabs(c->state.t));
@@ -284,7 +293,7 @@ static void want_jumped(Instance *c, const double *before, unsigned char *wantin
     values_now(c, &c->model->tapes.guards_soon, soon);
     for (int g = 0; g < c->model->n_guards; g++)
         if (before[g] < 0 && now[g] > -JUMPED * before[g] && guard_active(c, g) &&
-            (number_or_false(soon[g]) > 0 || !(now[g] + step * rates[g] > 0)))
+            !at_its_edge(c, g, now[g], soon[g]) && (number_or_false(soon[g]) > 0 || !(now[g] + step * rates[g] > 0)))
             wanting[c->model->guard_transition[g]] = 1;
 }
 

@@ -1,5 +1,6 @@
 """Events of functions, of branches in a `when`, and of assertions in branches: against closed forms."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -104,3 +105,66 @@ def test_assertions_in_branches(tmp_path):
         run(tmp_path, DEMANDS)
     with pytest.raises(LimitPassed, match=r"At 0 s A begin is not in \[0, 1\]\."):
         run(tmp_path, DEMANDS.replace("begin = 0.5", "begin = 1.5"))
+
+
+SUPPLY = """
+model A
+  parameter Real V0 = 60, I0 = 50, P0 = 1200, Rcv = 0.01, Gcc = 0.01, C = 0.1, R = 1e-3;
+  Real u(start = 0, fixed = true), v, i;
+protected
+  parameter Real v_limit(fixed = false), i_limit(fixed = false);
+  parameter Boolean limited(fixed = false);
+  Boolean cv(start = false), cc(start = true);
+initial algorithm
+  v_limit := (V0 - Rcv*I0)/(1 - Rcv*Gcc);
+  i_limit := (I0 - Gcc*V0)/(1 - Gcc*Rcv);
+  limited := false;
+  if v_limit*i_limit > P0 then
+    limited := true;
+    v_limit := (I0 - sqrt(I0^2 - 4*Gcc*P0))/(2*Gcc);
+    i_limit := (V0 - sqrt(V0^2 - 4*Rcv*P0))/(2*Rcv);
+  end if;
+equation
+  cv = i <= i_limit;
+  cc = v <= v_limit;
+  if limited then
+    if cv then
+      v = V0 - Rcv*i;
+    elseif cc then
+      i = I0 - Gcc*v;
+    else
+      P0 = v*i;
+    end if;
+  else
+    if cv then
+      v = V0 - Rcv*i;
+    else
+      i = I0 - Gcc*v;
+    end if;
+  end if;
+  C*der(u) = i;
+  v = u + R*i;
+end A;
+"""
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-6, 1e-7, 3e-8, 1e-9])
+def test_relations_of_what_they_decide_switch_once(tmp_path, solver, rtol):
+    """The current and the voltage are solved anew on both sides of a limit, so they differ there by rounding.
+
+    At 1200 W the voltage rises from v_limit to V0 - Rcv*i_limit: dt = C*du/i with u = v - R*P0/v and i = P0/v.
+    """
+    (tmp_path / "a.mo").write_text(SUPPLY)
+    result = simulate(load(tmp_path / "a.mo"), 0.3, rtol=rtol, solver=solver)
+    first, second = [event.time for event in result.events]
+    low = (50 - (50**2 - 4 * 0.01 * 1200) ** 0.5) / 0.02
+    high = 60 - 0.01 * (60 - (60**2 - 4 * 0.01 * 1200) ** 0.5) / 0.02
+    power = 0.1 * ((high**2 - low**2) / 2400 + 1e-3 * math.log(high / low))
+    assert second - first == pytest.approx(power, rel=30 * rtol)
+
+
+def test_what_decides_equations_follows_from_an_initial_algorithm(tmp_path):
+    """Without the limit of power: one switch, from the current's limit to the voltage's."""
+    result = run(tmp_path, SUPPLY.replace("P0 = 1200", "P0 = 4000"), 0.3)
+    assert result.events[0].time == pytest.approx(result.events[-1].time, abs=1e-9)

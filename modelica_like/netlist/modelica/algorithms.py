@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from modelica_like.errors import ModelicaTextError
@@ -240,3 +240,21 @@ def _replaced(whole: Expr, places: list[int], value: Expr) -> Expr:
         items.append(fold.number(0))
     items[places[0]] = _replaced(items[places[0]], places[1:], value)
     return Expr("array", tuple(items), whole.line)
+
+
+def targets_of(body: list[Statement]) -> Iterator[str]:
+    """Yield the names that get values."""
+    yield from targets_in([(None, body)])
+
+
+def targets_in(branches: Iterable[tuple[Expr | None, list[Statement]]]) -> Iterator[str]:
+    """Yield the names that get values in branches."""
+    for _, body in branches:
+        for statement in body:
+            if statement.kind == ":=":
+                left = statement.parts[0]
+                yield from (part.args[0][0] for part in (left.args if left.kind == "tuple" else (left,)) if part.args)
+            elif statement.kind in ("if", "when"):
+                yield from targets_in(statement.parts)
+            elif statement.kind in ("for", "while"):
+                yield from targets_of(statement.parts[1])

@@ -9,9 +9,10 @@ from dataclasses import replace
 from modelica_like.errors import ModelicaTextError, UnknownName
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold, resolve
+from modelica_like.netlist.modelica.algorithms import Algorithm, targets_of
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, refused, unknown_class
 from modelica_like.netlist.modelica.library import Known
-from modelica_like.netlist.modelica.tree import ClassText, Expr, names_in
+from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement, names_in
 from modelica_like.netlist.modelica.types import basic_type, misfit
 
 
@@ -81,7 +82,9 @@ def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
     if given.value is None and "start" in given.inner and not free:
         given = given.inner["start"]
     if given.value is None or given.scope is None:
-        value = _from_the_start(owner, name) if member.declaration.dimensions and name not in owner.folded else None
+        basic = basic_type(owner, member)
+        decides = bool(member.declaration.dimensions) or (basic is not None and basic.kind != "Real")
+        value = _from_the_start(owner, name) if decides and name not in owner.folded else None
         if value is not None:
             owner.values[name] = value
             return value
@@ -105,7 +108,7 @@ def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
 
 
 def _from_the_start(owner: Instance, name: str) -> Expr | None:
-    """Return the value of an array that initial equations of known numbers give, None if there is none."""
+    """Return what initial equations and algorithms of known numbers give an array or a choice, None if they do not."""
     pending = list(owner.initial_equations)
     for statement, text in pending:
         resolver = resolve.Resolver(owner, text, numeric=True)
@@ -122,7 +125,28 @@ def _from_the_start(owner: Instance, name: str) -> Expr | None:
             if places:
                 value = resolver(statement.parts[1])
                 return value.args[places[0]] if value.kind == "tuple" else value
+        elif statement.kind == "algorithm" and name in targets_of(statement.parts[0]):
+            return _AtOnce(owner, text, statement.parts[0]).local[name]
     return None
+
+
+class _AtOnce(Algorithm):
+    """An initial algorithm of known numbers."""
+
+    def __init__(self, owner: Instance, text: ClassText, body: list[Statement]) -> None:
+        super().__init__(owner.classes, text)
+        self.owner = owner
+        self.declared = {name: member.declaration for name, member in owner.members.items()}
+        for name in set(targets_of(body)) & owner.members.keys():
+            value = fold.number(0)
+            for size in reversed(sizes(owner, owner.members[name])):
+                value = Expr("array", (value,) * size)
+            self.local[name] = value
+        self.run(body)
+
+    def here(self, text: ClassText | None = None) -> resolve.Resolver:
+        """Return what resolves expressions with the values so far."""
+        return resolve.Resolver(self.owner, text or self.text, self.local, numeric=True)
 
 
 def check_value(owner: Instance, member: Member, value: Expr) -> None:

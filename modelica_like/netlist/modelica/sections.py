@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from modelica_like.errors import Source
 from modelica_like.netlist.modelica import fold
-from modelica_like.netlist.modelica.algorithms import Algorithm
+from modelica_like.netlist.modelica.algorithms import Algorithm, targets_in, targets_of
 from modelica_like.netlist.modelica.instance import refused
 from modelica_like.netlist.modelica.members import named_array, sizes, value_of
 from modelica_like.netlist.modelica.resolve import Resolver
@@ -47,8 +47,8 @@ class Section(Algorithm):
         Raises:
             ModelicaTextError: something in it is not supported.
         """
-        in_whens = {name for statement in _whens(body) for name in _targets(statement.parts)}
-        for name in _targets([(None, body)]):
+        in_whens = {name for statement in _whens(body) for name in targets_in(statement.parts)}
+        for name in targets_of(body):
             if name not in self.declared:
                 raise refused(f"an assignment to {name}", self.text, body[0].line)
             self.local[name] = self._before(name, discrete=name in in_whens or self.initial)
@@ -72,7 +72,7 @@ class Section(Algorithm):
 
     def _when(self, statement: Statement) -> None:
         branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]] = []
-        for name in _targets(statement.parts):
+        for name in targets_in(statement.parts):
             if name not in self.local:  # another 'when' has given it a value
                 self.local[name] = self._before(name, discrete=True)
         for condition, body in statement.parts:
@@ -131,16 +131,3 @@ def _whens(body: list[Statement]) -> Iterator[Statement]:
                 yield from _whens(inner)
         elif statement.kind in ("for", "while"):
             yield from _whens(statement.parts[1])
-
-
-def _targets(branches: Iterable[tuple[Expr | None, list[Statement]]]) -> Iterator[str]:
-    """Yield the names that get values."""
-    for _, body in branches:
-        for statement in body:
-            if statement.kind == ":=":
-                left = statement.parts[0]
-                yield from (part.args[0][0] for part in (left.args if left.kind == "tuple" else (left,)) if part.args)
-            elif statement.kind in ("if", "when"):
-                yield from _targets(statement.parts)
-            elif statement.kind in ("for", "while"):
-                yield from _targets([(None, statement.parts[1])])
