@@ -123,6 +123,11 @@ void keep_before_change(Instance *c);
 int delays_due(const Instance *c);
 Result reach_instant(Instance *c);
 Result leave_instant(Instance *c, int happened);
+/* crowd.c */
+double number_or_false(const Instance *c, int guard, double value);
+void count_in_crowd(Instance *c, int transition);
+void leave_crowd(Instance *c);
+Result crowded(Instance *c);
 /* events.c */
 double just_after(const State *s);
 int at_located_event(const State *s);
@@ -139,7 +144,6 @@ int count_clocks(const Instance *c);
 Result tick(Instance *c, double *step);
 Result update_discrete(Instance *c, int *restart, double *next);
 Result check_turned_back(Instance *c, const double *before);
-double number_or_false(double guard);
 void note_change(Instance *c, int name, int transition, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
 /* resets.c */

@@ -6,18 +6,10 @@
 #define ALONE 6    /* further rounds per motion that may be held, in which only one fires */
 #define BALANCED 1e-3
 #define SAME_TIME 1e-12
-#define LATER 1e3     /* time resolutions, for the difference of a rate: what turns round in less is at rest */
-#define CLEARS 0.5    /* least height of a rebound above zero, in its whole height: less of it is rounding */
-#define NEVER 1e29    /* s: a moment that does not come */
-#define JUMPED 1e-6   /* share of what a guard was before an update: a jump to less is one to zero */
-#define CONVERGES 0.9 /* length of a crowd over the one before: rebounds come to their end, chattering does not */
-#define CROWDED 1e-6  /* of the run: in less time, CROWD further instants follow each other ever faster */
-
-/* A guard that is not a number is false; what is nothing but rounding is zero. */
-double number_or_false(double guard) {
-    if (isnan(guard)) return -1;
-    return fabs(guard) < NOISE && fabs(guard) > JUST_TRUE ? 0 : guard;
-}
+#define LATER 1e3   /* time resolutions, for the difference of a rate: what turns round in less is at rest */
+#define CLEARS 0.5  /* least height of a rebound above zero, in its whole height: less of it is rounding */
+#define NEVER 1e29  /* s: a moment that does not come */
+#define JUMPED 1e-6 /* share of what a guard was before an update: a jump to less is one to zero */
 
 int is_source(const Instance *c, const Transition *one) {
     double mode = c->d[one->mode];
@@ -96,7 +88,7 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
         if (c->state.resting > 0 && c->state.resting < later) look_ahead(c, &m->tapes.guards_soon, later, values);
         else values_now(c, &m->tapes.guards_soon, values);
         for (int k = 0; k < m->n_guards; k++)
-            if (number_or_false(values[k]) > 0) wanting[m->guard_transition[k]] = 1;
+            if (number_or_false(c, k, values[k]) > 0) wanting[m->guard_transition[k]] = 1;
     }
     for (int k = 0; k < m->n_transitions; k++) any |= wanting[k] = wanting[k] && is_source(c, &m->transitions[k]);
     return any;
@@ -108,11 +100,11 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
 void drop_balanced(Instance *c, double *soon) {
     double *now = c->guards_before;
     int any = 0;
-    for (int k = 0; k < c->model->n_guards; k++) any |= number_or_false(soon[k]) > 0 && guard_active(c, k);
+    for (int k = 0; k < c->model->n_guards; k++) any |= number_or_false(c, k, soon[k]) > 0 && guard_active(c, k);
     if (!any) return;
     values_now(c, &c->model->tapes.guards, now);
     for (int k = 0; k < c->model->n_guards; k++)
-        if (number_or_false(now[k]) < 0 && soon[k] > 0 && soon[k] <= BALANCED * fabs(now[k])) soon[k] = now[k];
+        if (number_or_false(c, k, now[k]) < 0 && soon[k] > 0 && soon[k] <= BALANCED * fabs(now[k])) soon[k] = now[k];
 }
 
 /* At the same edge a mode that was left in this round is not wanted back where that soon is no longer so, and a
@@ -124,7 +116,7 @@ void drop_returning(Instance *c, const double *modes, double *soon) {
     const Model *m = c->model;
     double *now = c->guards_before;
     int any = 0;
-    for (int k = 0; k < m->n_guards; k++) any |= number_or_false(soon[k]) > 0 && guard_active(c, k);
+    for (int k = 0; k < m->n_guards; k++) any |= number_or_false(c, k, soon[k]) > 0 && guard_active(c, k);
     if (!any) return;
     values_now(c, &m->tapes.guards, now);
     for (int k = 0; k < m->n_guards; k++) {
@@ -150,6 +142,7 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
     const int *names = m->mode_names + one->first_name;
     double before = c->d[mode];
     c->state.n_events++;
+    count_in_crowd(c, transition);
     if (c->noted != NULL && !c->passing) c->noted(c, transition, mode, target);
     if (before >= 0 && before < one->n_names && target >= 0 && target < one->n_names)
         report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, text_of(m, name),
@@ -241,33 +234,10 @@ Result tick(Instance *c, double *step) {
     return changes ? fail(c, NOT_SETTLED, c->state.t, ROUNDS) : share_and_solve(c);
 }
 
-/* Forgets a crowd of instants that has ended. */
-static void leave_crowd(State *s) {
-    double span = s->stop_time_defined ? s->stop_time - s->start_time : 1;
-    double last = s->n_instants > 0 ? s->instants[(s->n_instants - 1) % CROWD] : s->t;
-    if (s->t - last >= CROWDED * span) s->resting = 0;
-}
-
-/* Notes an instant at which modes have changed. Where the last ones came ever faster, impacts end in contact if the
-   model asks for it, and what is not held goes on as long as it converges; an error otherwise. */
-static Result crowded(Instance *c) {
-    State *s = &c->state;
-    double span = s->stop_time_defined ? s->stop_time - s->start_time : 1;
-    double first = s->instants[s->n_instants % CROWD]; /* CROWD instants ago, once there were so many */
-    s->instants[s->n_instants % CROWD] = s->t;
-    if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
-    if (c->model->settings->rests && (s->resting == 0 || s->t - first < CONVERGES * s->resting)) {
-        s->resting = max_of(s->t - first, DBL_MIN);
-        s->n_instants = 0;
-        return RESULT_OK;
-    }
-    return fail(c, EVER_FASTER, s->t);
-}
-
 /* Of state events that want to fire, keep those whose guards are positive. */
 static void keep_wanting(Instance *c, const double *soon, unsigned char *wanting) {
     for (int k = 0; k < c->model->n_guards; k++)
-        if (!(number_or_false(soon[k]) > 0)) wanting[c->model->guard_transition[k]] = 0;
+        if (!(number_or_false(c, k, soon[k]) > 0)) wanting[c->model->guard_transition[k]] = 0;
 }
 
 /* Before one of several that hold a motion gives way, let the others take more. */
@@ -293,7 +263,8 @@ static void want_jumped(Instance *c, const double *before, unsigned char *wantin
     values_now(c, &c->model->tapes.guards_soon, soon);
     for (int g = 0; g < c->model->n_guards; g++)
         if (before[g] < 0 && now[g] > -JUMPED * before[g] && guard_active(c, g) &&
-            !at_its_edge(c, g, now[g], soon[g]) && (number_or_false(soon[g]) > 0 || !(now[g] + step * rates[g] > 0)))
+            !at_its_edge(c, g, now[g], soon[g]) &&
+            (number_or_false(c, g, soon[g]) > 0 || !(now[g] + step * rates[g] > 0)))
             wanting[c->model->guard_transition[g]] = 1;
 }
 
@@ -306,7 +277,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     double events = c->state.n_events;
     c->stopped = 0;
     memset(c->entered, 0, (size_t)m->n_holds);
-    leave_crowd(&c->state);
+    leave_crowd(c);
     if (find_wanting(c, wanting, !located)) {
         if (!located && !c->bounded && m->n_guards > 0) {
             drop_returning(c, NULL, c->guards);

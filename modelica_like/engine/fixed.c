@@ -21,8 +21,8 @@ static double first_zero(const Instance *c, const double *first, int rates_known
     double part = 1, h = c->piece->end - c->piece->begin;
     for (int g = 0; g < n; g++) {
         double g0, r0, r1 = isfinite(last[n + g]) ? h * last[n + g] : 0;
-        if (!guard_active(c, g) || !(number_or_false(last[g]) > 0)) continue;
-        g0 = min_of(number_or_false(first[g]), 0);
+        if (!guard_active(c, g) || !(number_or_false(c, g, last[g]) > 0)) continue;
+        g0 = min_of(number_or_false(c, g, first[g]), 0);
         r0 = rates_known ? h * first[n + g] : 2 * (last[g] - g0) - r1;
         part = min_of(part, cubic_guess(g0, isfinite(r0) ? r0 : 0, last[g], r1) + BEHIND);
     }
@@ -36,8 +36,9 @@ static double next_zero(Instance *c, double before, double part, double behind) 
     int n = c->model->n_guards;
     double *last = c->looks, *first = last + 2 * n, *now = c->guards, next = 1;
     for (int g = 0; g < n; g++) {
-        double v0 = min_of(number_or_false(first[g]), 0), v1 = min_of(number_or_false(now[g]), 0), slope, bend, zero;
-        if (!guard_active(c, g) || !(number_or_false(last[g]) > 0)) continue;
+        double v0 = min_of(number_or_false(c, g, first[g]), 0), v1 = min_of(number_or_false(c, g, now[g]), 0), slope,
+               bend, zero;
+        if (!guard_active(c, g) || !(number_or_false(c, g, last[g]) > 0)) continue;
         slope = (v1 - v0) / (part - before);
         bend = ((last[g] - v1) / (1 - part) - slope) / (1 - before);
         slope += bend * (part - before);
@@ -54,7 +55,7 @@ static double first_crossing(Instance *c, int behind_event) {
     int n = c->model->n_guards, any = 0;
     double *last = c->looks;
     evaluate(c, &c->model->tapes.guards, piece->end, last_of(c->model, piece), last);
-    for (int g = 0; g < n; g++) any |= guard_active(c, g) && number_or_false(last[g]) > 0;
+    for (int g = 0; g < n; g++) any |= guard_active(c, g) && number_or_false(c, g, last[g]) > 0;
     if (any && behind_event) return first_zero(c, c->guards, 0); /* as the last round has left them */
     if (any && !c->state.looked) evaluate(c, &c->model->tapes.guards, piece->begin, piece->points, c->end_look);
     if (any) return first_zero(c, c->end_look, 1);

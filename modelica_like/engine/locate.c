@@ -37,7 +37,7 @@ static int look_at(Instance *c, double t, double *point, int candidates, Look *l
     active_guards(c);
     EACH_ACTIVE (g) {
         if (candidates && c->kinds[g] == QUIET) continue;
-        look->values[g] = number_or_false(look->values[g]);
+        look->values[g] = number_or_false(c, g, look->values[g]);
         if (!isfinite(look->rates[g])) look->rates[g] = 0;
     }
     return 1;
@@ -174,7 +174,8 @@ static int mark_wanting(Instance *c, const Look *look, double tolerance) {
     values_at(c, &m->tapes.guards_soon, c->piece->end, last_of(m, c->piece), soon);
     EACH_ACTIVE (g) {
         int near = look->values[g] > 0 || (look->rates[g] > 0 && -look->values[g] <= 10 * tolerance * look->rates[g]);
-        if (c->kinds[g] != QUIET && near && number_or_false(soon[g]) > 0) any = c->wanting[m->guard_transition[g]] = 1;
+        if (c->kinds[g] != QUIET && near && number_or_false(c, g, soon[g]) > 0)
+            any = c->wanting[m->guard_transition[g]] = 1;
     }
     return any;
 }

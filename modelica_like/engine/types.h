@@ -146,10 +146,10 @@ typedef struct { /* of something for which there may be another way */
 typedef enum { KEPT_FAILED, KEPT_LED, KEPT_SETTLING, KEPT_TICK, N_KEPT_STARTS } KeptStart;
 
 /* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns; `wanting` transitions fire at the
- * end of the piece. */
+ * end of the piece; `noisy`: how often a guard has fired in a crowd, or that all it does is noise. */
 #define SMOOTH_NUMBERS(A) \
     A(x, n), A(p, m->n_p), A(u, m->n_u), A(u_rate, m->n_u), A(d, n_d), A(mode_value, n_d), A(start_value, starts)
-#define STATE_MARKS(A) A(mode_given, n_d), A(start_given, starts), A(wanting, m->n_transitions)
+#define STATE_MARKS(A) A(mode_given, n_d), A(start_given, starts), A(wanting, m->n_transitions), A(noisy, guards)
 
 typedef struct Instance {
     const Model *model;

@@ -94,7 +94,7 @@ void get_indicators(Instance *c, double *indicators) {
     drop_balanced(c, c->guards);
     drop_returning(c, NULL, c->guards);
     for (int k = 0; k < c->model->n_guards; k++) {
-        double value = guard_active(c, k) ? number_or_false(c->guards[k]) : -1;
+        double value = guard_active(c, k) ? number_or_false(c, k, c->guards[k]) : -1;
         indicators[k] = value > 0 ? value : value - OFFSET;
     }
 }

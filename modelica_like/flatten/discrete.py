@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -334,6 +334,28 @@ def between_events(expression: Any) -> Any:
     if not pres:
         return expression
     return ca.substitute(ca.SX(expression), ca.vertcat(*pres), ca.vertcat(*(pre.of for pre in pres)))
+
+
+def following(expression: Any, determined: Sequence[Equation]) -> Any:
+    """Return an expression of a variable's equation, with what `pre(…)` and discrete values alone decide written out.
+
+    So it is there as soon as these have changed, before relations are judged: a clutch that has become `stuck` is
+    locked at once, and whether it breaks loose is judged by the torque that it bears, not by the one of sliding.
+
+    Args:
+        expression: of the equation, in which `pre(v)` is v.
+        determined: equations of discrete variables.
+    """
+    rules = {id(symbols_in(e.left)[0]): (symbols_in(e.left)[0], between_events(e.right)) for e in determined}
+    follows = {
+        key: rule for key, rule in rules.items()
+        if any(isinstance(s, Pre) for e in determined if symbols_in(e.left)[0] is rule[0] for s in symbols_in(e.right))
+        and all(s.owner is not None and s is not rule[0] and not moves(ca.SX(s)) for s in symbols_in(rule[1]))
+    }  # fmt: skip
+    if not follows or not is_expression(expression):
+        return expression
+    symbols, values = zip(*follows.values(), strict=True)
+    return ca.substitute(ca.SX(expression), ca.vertcat(*symbols), ca.vertcat(*values))
 
 
 def _in_a_round(transition: Transition) -> Transition:

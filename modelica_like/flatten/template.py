@@ -11,7 +11,7 @@ import casadi as ca
 from modelica_like.errors import LanguageError, Source
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
-from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, between_events, is_discrete
+from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, between_events, following, is_discrete
 from modelica_like.flatten.holds import HoldForm, IdealForm, hold_forms, ideal_forms, starts_at_rest
 from modelica_like.flatten.reasons import reason
 from modelica_like.flatten.steps import honest, with_events
@@ -230,7 +230,7 @@ def _build(component: Component) -> Template:
     initial = [e for e in at_start if not is_discrete(e)]
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
-    residuals = [with_events(between_events(e.left - e.right)) for e in equations]
+    residuals = [with_events(following(between_events(e.left - e.right), determined)) for e in equations]
     sources = tuple(e.source for e in (*equations, *initial))
     residuals += [honest(start - (e.left - e.right)) for start, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
