@@ -198,7 +198,10 @@ def _contents(
         "nominals": model.equations.nominals,
         "state_names": [text(name) for name in model.states],
         "implicit_names": [text(name) for name in model.implicit],
-        "singular_names": [text(", ".join(names[:6])) for names, _ in model.equations.singular],
+        "singular_names": [
+            text(", ".join(names[:6]) or f"{origins[0].path} with other parameters")
+            for names, origins in model.equations.singular
+        ],
         "variables": [_variable(variable, text) for variable in sorted(variables, key=lambda v: v.reference)],
         "rising": [(*pair, *(text(model.flat_parameters[k].path) for k in pair)) for pair in model.rising],
         "delays": [

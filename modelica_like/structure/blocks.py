@@ -13,6 +13,7 @@ import casadi as ca
 
 from modelica_like.errors import StructureError
 from modelica_like.flatten.steps import STEPS
+from modelica_like.structure.decided import vanishing
 from modelica_like.structure.isolate import isolate
 
 SMALL = 3
@@ -100,6 +101,7 @@ class BlockSolver:
         moving = ca.which_depends(self.jacobian.nz[:], volatile, 1, True)
         places = zip(*self.jacobian.sparsity().get_triplet(), strict=True)
         self.safe = {place for place, moves in zip(places, moving, strict=True) if not moves}
+        self.safe -= vanishing(self.jacobian)
         self.rates, self.kept = set(rates), set(kept)
         self.first = self.rates - {c for r, row in enumerate(self.rows) for c in row if (r, c) not in self.safe}
         self.solved = Solved()

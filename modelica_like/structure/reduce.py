@@ -12,6 +12,7 @@ from modelica_like.errors import StructureError
 from modelica_like.flatten.model import FlatModel, Origin
 from modelica_like.structure.alias import Aliases, find_aliases
 from modelica_like.structure.blocks import Block, BlockSolver, Solved
+from modelica_like.structure.decided import decide, needs_decision
 from modelica_like.structure.diagnose import check_solvable
 from modelica_like.structure.following import (
     Choice,
@@ -55,7 +56,8 @@ class ReducedDae:
         values: expression of every node of the flat model in x, z, inputs, p, d and t.
         node_states: for every node (position in x, factor) if it is a state up to a factor, else None.
         blocks: blocks of the triangular form, with the names of their unknowns and the origins of their equations.
-        determinants: (names, origins, expression); a block is singular if the expression is zero.
+        determinants: (names, origins, expression); a block is singular if the expression is zero. Without names it is
+            an equation that was reduced for other parameters.
         implicit_blocks: (names, origins) of the blocks that stay implicit.
         level_values: expression of every level in x, z, inputs, p, d and t.
         explicit: (level, expression) of the explicit unknowns, each in states, z and earlier ones.
@@ -141,15 +143,22 @@ def reduce(flat: FlatModel) -> ReducedDae:
     Raises:
         Underdetermined, Overdetermined: the equations cannot determine the unknowns.
     """
-    chosen = _choose(flat, find_aliases(flat), ())
+    return _reduce(flat, decided=False)
+
+
+def _reduce(flat: FlatModel, *, decided: bool) -> ReducedDae:
+    """Reduce flat equations, with the branches of present parameters where others would not determine the unknowns."""
+    chosen = _choose(flat, find_aliases(flat), (), decided=decided)
     if groups := singular_groups(chosen.system, chosen.counts, chosen.states):
-        chosen = _choose(flat, find_aliases(flat), groups)
+        chosen = _choose(flat, find_aliases(flat), groups, decided=decided)
     system, counts, states, holds, flags = chosen.system, chosen.counts, chosen.states, chosen.holds, chosen.flags
     residual, origins = _differentiate(system, counts)
     determined = {*states, *system.inputs}
     unknowns = [n for n in range(len(system.levels)) if n not in determined]
     if flags.settle(residual, unknowns):
         residual, origins = _differentiate(system, counts)
+    if not decided and needs_decision(system, residual, unknowns):
+        return _reduce(flat, decided=True)
     derivatives = {system.derivative(state) for state in states}
     rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
     ideals = find_ideals(flat)
@@ -168,7 +177,11 @@ def reduce(flat: FlatModel) -> ReducedDae:
     held = tuple(_placed(holds, reduced, states))
     ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
     choices = tuple(write_choice(choice, system, states, reduced.level_values) for choice in chosen.following)
-    reduced = replace(reduced, ode=ode, holds=held, circuits=tuple(circuits), choices=choices)
+    kept_so = tuple(((), (system.origins[row],), check) for row, check in chosen.checks)
+    determinants = (*reduced.determinants, *kept_so)
+    reduced = replace(
+        reduced, ode=ode, holds=held, circuits=tuple(circuits), choices=choices, determinants=determinants
+    )
     return complete(reduced, ideals, solved.rows) if ideals else reduced
 
 
@@ -191,11 +204,13 @@ class _Chosen:
     holds: tuple[HeldMotion, ...]
     flags: Flags
     following: tuple[Following, ...]
+    checks: list[tuple[int, Any]]
 
 
-def _choose(flat: FlatModel, aliases: Aliases, groups: tuple[Group, ...]) -> _Chosen:
+def _choose(flat: FlatModel, aliases: Aliases, groups: tuple[Group, ...], *, decided: bool) -> _Chosen:
     """Choose states; those of `groups` follow the motion."""
     system = build_system(flat, aliases)
+    checks = decide(system) if decided else []
     following = follow(system, groups)
     holds = add_approaches(system)
     flags = Flags(system)
@@ -217,7 +232,7 @@ def _choose(flat: FlatModel, aliases: Aliases, groups: tuple[Group, ...]) -> _Ch
     counts = Pantelides(system, incidence).counts
     prefer(system, groups, following)
     states = select_states(system, counts, _top_slopes(system, counts), incidence)
-    return _Chosen(system, counts, states, holds, flags, following)
+    return _Chosen(system, counts, states, holds, flags, following, checks)
 
 
 def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:

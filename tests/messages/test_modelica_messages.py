@@ -4,11 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like import load
+from modelica_like import build, load, simulate
 from modelica_like.errors import (
     ComponentUnbalanced,
     ModelicaLikeError,
     ModelicaTextError,
+    SingularAtStart,
     Underdetermined,
     UnknownName,
     ValueOutOfRange,
@@ -471,8 +472,6 @@ def test_several_errors_are_told_together(tmp_path: Path) -> None:
 
 
 def test_errors_of_the_drive_point_into_the_text(tmp_path: Path) -> None:
-    from modelica_like import build
-
     (tmp_path / "a.mo").write_text(model("Real x; Real y;", "x = 1;\ny = x; y = 2;"))
     with pytest.raises(ModelicaLikeError) as caught:
         build(load(tmp_path / "a.mo"))
@@ -484,8 +483,6 @@ def test_errors_of_the_drive_point_into_the_text(tmp_path: Path) -> None:
 
 
 def test_an_input_of_a_part_with_a_connection_and_an_equation(tmp_path: Path, check_message) -> None:
-    from modelica_like import build
-
     block = "block G input Real u; output Real y; equation y = 3*u; end G;"
     (tmp_path / "a.mo").write_text(model("G g; G h(u = 1);", "connect(h.y, g.u);\ng.u = time;", block))
     check_message(
@@ -497,8 +494,6 @@ def test_an_input_of_a_part_with_a_connection_and_an_equation(tmp_path: Path, ch
 
 
 def test_rigid_parts_whose_ends_are_all_free(tmp_path: Path, check_message) -> None:
-    from modelica_like import build
-
     port = "Modelica.Thermal.HeatTransfer.Interfaces.HeatPort"
     collector = (
         f"model C parameter Integer m = 3; {port}_a a[m]; {port}_b b; "
@@ -526,6 +521,20 @@ def test_a_formula_with_names_inside_and_outside_of_a_class(tmp_path: Path, chec
         "Give it a number."
     )
     check_message(ModelicaTextError, lambda: modelica_text(load(tmp_path / "drive.toml")), told)
+
+
+def test_parameters_for_which_other_equations_hold(tmp_path: Path, check_message) -> None:
+    losses = "if G <= 0 then i = 0; else i = G*v; end if; x = y + i; der(x) = 6 - v; der(y) = v;"
+    text = model("parameter Real G = 0; Real x(start = 0, fixed = true), y, i, v;", losses)
+    (tmp_path / "a.mo").write_text(text)
+    built = build(load(tmp_path / "a.mo"))
+    check_message(
+        SingularAtStart,
+        lambda: simulate(built.with_parameters({"G": 0.5}), 1.0),
+        "A was built for other parameters, for which other equations hold.\n"
+        "  in a.mo:5 `if G <= 0 then i = 0; else i = G*v; end if; x = y + i; der(x) = 6 - v; der(y) = v;`\n"
+        "Build it with these parameters.",
+    )
 
 
 def test_what_python_cannot_go_down_into(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check_message) -> None:

@@ -65,6 +65,11 @@ def _singular(
 ) -> SingularAtStart:  # fmt: skip
     """Return the error for a block of unknowns and origins; `regular` checks it for other parameters."""
     names, origins = block
+    if not names:
+        return SingularAtStart(
+            f"{origins[0].path or model.name} was built for other parameters, for which other equations hold.",
+            where=origins[0].source, advice="Build it with these parameters.",
+        )  # fmt: skip
     owners = dict.fromkeys(origin.path for origin in origins)
     holding = [path for path in owners if _holds(model, point.d, path)]
     held = [name for name in names if name.rpartition(".")[0] in holding]
