@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
@@ -19,6 +20,7 @@ from modelica_like.language.discrete import (
     Marker,
     Pre,
     When,
+    change,
     edge,
     eventful,
     is_a,
@@ -26,7 +28,7 @@ from modelica_like.language.discrete import (
     moves,
 )  # fmt: skip
 from modelica_like.language.equation import Equation
-from modelica_like.language.expr import TIME, Expr, Symbol, is_expression, symbols_in
+from modelica_like.language.expr import TIME, Expr, Symbol, is_expression, symbol_of, symbols_in
 from modelica_like.language.fields import Discrete, Input, Variable
 from modelica_like.language.inside import inside
 from modelica_like.language.mode import BoundMode, Mode, StartMode, Transition
@@ -126,6 +128,7 @@ class DiscreteEquations:
             [*others, *expressions, *((e, u.source) for u in self.updates for e in (u.active, u.value))]
         )
         self.events = [_in_a_round(event) if isinstance(event, Transition) else event for event in self.events]
+        self.updates = [replace(u, active=_at_once(u.active), value=_at_once(u.value)) for u in self.updates]
 
     def forms(self, path: Any) -> tuple[UpdateForm, ...]:
         """Return the updates without their expressions; `path` names a symbol from the component."""
@@ -203,7 +206,7 @@ class DiscreteEquations:
                 raise LanguageError(what, advice="Keep one of them.")
         determined = {id(target) for target, _ in resets} | {*places, *begun}
         for name, field in self._component.fields.items():
-            if not isinstance(field, Discrete) or id(getattr(self._component, name)) in determined:
+            if not isinstance(field, Discrete) or id(symbol_of(self._component, name)) in determined:
                 continue
             if name in inside(self._component).elsewhere:
                 continue
@@ -356,6 +359,23 @@ def following(expression: Any, determined: Sequence[Equation]) -> Any:
         return expression
     symbols, values = zip(*follows.values(), strict=True)
     return ca.substitute(ca.SX(expression), ca.vertcat(*symbols), ca.vertcat(*values))
+
+
+def _at_once(expression: Any) -> Any:
+    """Return a new value in which relations of time and discrete variables follow these where they have just changed.
+
+    A relation has its value of the round before, which is that of the discrete variables before.
+    """
+    pairs: list[tuple[Any, Any]] = []
+    for symbol in symbols_in(expression) if is_expression(expression) else ():
+        inner = symbols_in(symbol.of) if isinstance(symbol, Marker) and symbol.kind == "relation" else ()
+        changing = [s for s in inner if s.owner is not None and is_a(s, Discrete)]
+        if changing and all(s is TIME or (s.owner is not None and (is_a(s, Discrete) or is_fixed(s))) for s in inner):
+            changed = functools.reduce(ca.logic_or, (ca.SX(change(s)) for s in changing))
+            pairs.append((symbol, ca.if_else(changed, cast(Any, symbol).of, symbol)))
+    if not pairs:
+        return expression
+    return ca.substitute(ca.SX(expression), ca.vertcat(*(p[0] for p in pairs)), ca.vertcat(*(p[1] for p in pairs)))
 
 
 def _in_a_round(transition: Transition) -> Transition:

@@ -34,6 +34,7 @@ class Component(Declared):
     outlet: ClassVar[str] = "flange_b flange"
     terminal: ClassVar[Terminal | None] = None
     icon: ClassVar[Icon | None] = None
+    parts_are_attributes: ClassVar[bool] = True
     units_checked: ClassVar[bool] = True
     """Whether the units of its equations, of its connections and of the values it gives to parts must fit."""
     _kept: ClassVar[type[Inside]] = InsideComponent
@@ -339,9 +340,9 @@ class Component(Declared):
 
     def _adopt(self, name: str, value: Component | list[Component]) -> None:
         record = self._inside
-        taken = (self.fields, record.connectors, self._declared.structural, self._declared.modes)
-        if any(name in names for names in taken) or hasattr(Component, name):
-            hint = ": every component has something of this name" * hasattr(Component, name)
+        reserved = hasattr(Component, name) and self.parts_are_attributes
+        if reserved or name in {*self.fields, *record.connectors, *self._declared.structural, *self._declared.modes}:
+            hint = ": every component has something of this name" * reserved
             raise DuplicateName(f"{self.label}: '{name}' is already in use{hint}.", where=caller())
         require_identifier(name, type(self).__name__)
         if isinstance(value, list):
@@ -349,7 +350,8 @@ class Component(Declared):
         else:
             adopted = self._owned(name, value)
         record.parts[name] = adopted
-        self.__dict__[name] = adopted
+        if not hasattr(Component, name):
+            self.__dict__[name] = adopted
         record.elements = None
 
     def _owned(self, name: str, part: Component) -> Component:

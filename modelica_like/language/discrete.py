@@ -191,7 +191,8 @@ def edge(condition: Expr) -> Expr:
     Raises:
         LanguageError: it is no condition.
     """
-    plain = isinstance(condition, Symbol) and condition.owner is not None and not moves(condition)
+    single = isinstance(condition, Symbol) and not isinstance(condition, Pre)
+    plain = single and cast(Symbol, condition).owner is not None and not moves(condition)
     before = condition if plain else marker("was", eventful(condition))
     return ca.logic_and(cast(Any, before), ca.logic_not(cast(Any, pre(before))))
 

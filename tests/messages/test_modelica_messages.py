@@ -25,6 +25,11 @@ def model(declarations: str = "", equations: str = "", before: str = "") -> str:
 
 
 CONNECTED = "connector U = input Boolean; connector Y = output Boolean; block C U u; end C;"
+CAUSAL = "connector K input Boolean b; output Boolean c; end K; block D K k; equation k.c = k.b; end D;"
+OUTER = (
+    "connector F Real v; flow Real i; end F; model W F f; equation f.v = 1; end W; "
+    "model B outer W w; F g; equation g.i = g.v; connect(g, w.f); end B;"
+)
 ENDLESS = "while true loop y := 1; end while"
 GROWING = "function f input Real u; output Real y; algorithm y := u; for i in 1:60 loop y := y*y + y; end for; end f;"
 TYPES = (
@@ -198,8 +203,8 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "Two whens determine x.\n  in a.mo:5 `when time > 1 then x = 1; end when; when time > 2 then x = 2; end when;`",
     ),
     "a when that never comes": (
-        model("discrete Real x;", "when 1 > 2 then x = 1; end when;"),
-        "The condition of this 'when' never changes.\n  in a.mo:5 `when 1 > 2 then x = 1; end when;`",
+        model("discrete Real x;", "when 2 > 1 then x = 1; end when;"),
+        "The condition of this 'when' never changes.\n  in a.mo:5 `when 2 > 1 then x = 1; end when;`",
     ),
     "branches of different length": (
         model("Real x; Real y;", "if time > 1 then x = 1; y = 1; else x = 2; end if;"),
@@ -260,10 +265,37 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "  in a.mo:5 `x = bessel(2);`\nOwn functions with an algorithm are read.",
     ),
     "ticks over a connection": (
-        model("B b; C c;", "connect(b.y, c.u);", "block B Y y; equation y = sample(0, 1); end B; " + CONNECTED),
+        model(
+            "B b; Modelica.Electrical.Analog.Ideal.IdealClosingSwitch s;",
+            "connect(b.y, s.control);",
+            "connector Y = output Boolean; block B Y y; equation y = sample(0, 1); end B;",
+        ),
         "b.y is true for instants only, which a connection does not carry here.\n"
-        "  in a.mo:5 `connect(b.y, c.u);`\n"
+        "  in a.mo:5 `connect(b.y, s.control);`\n"
         "Write the 'when' in the class of the sample, or name the variable: when block.y then.",
+    ),
+    "a connector's variable without a value": (
+        model("D d;", "", CAUSAL),
+        f"Nothing gives d.k.b a value.\n  in a.mo:1 `{CAUSAL}`\n"
+        "Connect it, or write an equation for it where its connector is.",
+    ),
+    "no end that gives a value": (
+        model("D d; D e;", "connect(d.k, e.k);", CAUSAL),
+        "None of d.k, e.k gives b a value.\n  in a.mo:5 `connect(d.k, e.k);`\nExactly one end of a connection does.",
+    ),
+    "an outer part's connector": (
+        model("inner W w; B b;", "", OUTER),
+        f"A connection with w.f, which is outer: that is not supported here.\n  in a.mo:1 `{OUTER}`\n"
+        "Connect it where the inner part is; equations may use its variables.",
+    ),
+    "a strange connector": (
+        model("C c;", "c.k.b = true;", "connector K input Boolean b; Boolean c; end K; model C K k; end C;"),
+        "c in a connector, neither input nor output,: that is not supported here.\n"
+        "  in a.mo:1 `connector K input Boolean b; Boolean c; end K; model C K k; end C;`",
+    ),
+    "cardinality of a number": (
+        model("Real x; Real y[2] = {1, 2};", "x = cardinality(y);"),
+        "cardinality(…) of what is no single connector: that is not supported here.\n  in a.mo:5 `x = cardinality(y);`",
     ),
     "a Boolean of a part": (
         model("C c;", "c.u = time > 1;", CONNECTED),

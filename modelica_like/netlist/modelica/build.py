@@ -30,19 +30,36 @@ from modelica_like.language.assembly import declare, end_at
 from modelica_like.language.fields import Discrete, Field, Input, Parameter
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.attributes import check_attributes, check_declared
-from modelica_like.netlist.modelica.connectors import bundle, connector_of, elements_of
+from modelica_like.netlist.modelica.carried import Carried
+from modelica_like.netlist.modelica.causal import is_causal, variables
+from modelica_like.netlist.modelica.connectors import bundle, connector_of
 from modelica_like.netlist.modelica.fold import KNOWN, number, numbered
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
 from modelica_like.netlist.modelica.library import Known, connector_type
-from modelica_like.netlist.modelica.members import demand_determined, element, exists, part_of, sizes, undetermined
+from modelica_like.netlist.modelica.members import (
+    demand_determined,
+    element,
+    elements_of,
+    exists,
+    part_of,
+    sizes,
+    undetermined,
+)
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.statements import Statements
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_signal
 from modelica_like.netlist.modelica.values import Notes, known, nominal_of, number_of, shown_unit, unit_of, value_of
 from modelica_like.netlist.modelica.wiring import Wire, bundled, paths, rank
-from modelica_like.netlist.modelica.written import MEMORY, Written, WrittenConnector, as_formula, written_class
+from modelica_like.netlist.modelica.written import (
+    MEMORY,
+    Written,
+    WrittenConnector,
+    as_formula,
+    check_determined,
+    written_class,
+)
 
 
 def build_component(instance: Instance, notes: Notes) -> Written:
@@ -55,7 +72,9 @@ def build_component(instance: Instance, notes: Notes) -> Written:
     Raises:
         ModelicaTextError: something is not supported; several errors come as `WiringErrors`.
     """
-    return _Builder(instance, notes).run()
+    component = _Builder(instance, notes).run()
+    check_determined(component)
+    return component
 
 
 _MEMORIES: dict[str, Any] = {
@@ -92,11 +111,16 @@ class _Builder:
         if self.errors:
             raise raise_together_or_one(self.errors)
         self._drive()
+        self.carried = Carried(component, self.instance)
+        for wire in self.wires:
+            self.carried.along(wire)
         record, statements = inside(component), self.statements
-        record.text, record.statements = text.path, (*statements.equations, *self.instance.adopted)
+        equations = (*statements.equations, *self.instance.adopted, *self.carried.equations)
+        record.text, record.statements = text.path, equations
         record.elsewhere, record.lent = frozenset(self.instance.lent), self.instance.balance
         record.initial, record.happenings = tuple(statements.initial), tuple(statements.happenings)
         record.instants = frozenset(name for name, (_, instant) in statements.outputs.items() if instant)
+        record.instants |= self.carried.instants
         self._connect()
         if self.errors:
             raise raise_together_or_one(self.errors)
@@ -142,7 +166,7 @@ class _Builder:
     # -- members -----------------------------------------------------------------------------------------------------
 
     def _member(self, name: str, member: Member) -> None:
-        if "outer" in member.declaration.prefixes or not exists(self.instance, member):
+        if member.declaration.is_outer or not exists(self.instance, member):
             self.absent.add(name)
             return
         basic = basic_type(self.instance, member)
@@ -185,6 +209,10 @@ class _Builder:
                 check_attributes(f"{name}.{field_name}", Basic("Real", entry, frozenset()), member.text)
             return connector
         if part.text.kind == "connector":
+            if is_causal(part):
+                part.lent |= {variable.name for variable in variables(part) if not variable.continuous}
+                part.balance += sum(variable.continuous for variable in variables(part))
+                return _Builder(part, self.notes).run()
             return bundle(name, part, self.instance, self.wires) if bundled(part) else connector_of(part)
         return _Builder(part, self.notes, moved=part.owner is not self.instance).run()
 
@@ -355,7 +383,7 @@ class _Builder:
         for end, connector in zip(ends, connectors, strict=True):
             if isinstance(connector, Connector) or not isinstance(connector.owner, Written):
                 continue
-            if connector.name in inside(connector.owner).instants:
+            if connector.name in inside(connector.owner).instants and not self.carried.reached >= {*ends}:
                 raise ModelicaTextError(
                     f"{end} is true for instants only, which a connection does not carry here.",
                     advice="Write the 'when' in the class of the sample, or name the variable: when block.y then.",

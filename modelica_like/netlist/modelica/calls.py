@@ -18,7 +18,7 @@ ARGUMENTS = {
 }  # fmt: skip
 """Least and largest number of arguments."""
 REFUSED = {
-    "spatialDistribution": "spatialDistribution", "cardinality": "cardinality(…)",
+    "spatialDistribution": "spatialDistribution",
     "inStream": "a stream connector", "actualStream": "a stream connector",
     "subSample": "a clock that follows another",
     "superSample": "a clock that follows another", "shiftSample": "a clock that follows another",

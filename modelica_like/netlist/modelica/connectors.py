@@ -9,21 +9,12 @@ from modelica_like.language import flow, var
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.attributes import check_attributes
 from modelica_like.netlist.modelica.instance import Instance, refused
-from modelica_like.netlist.modelica.members import part_of, sizes
+from modelica_like.netlist.modelica.members import elements_of, part_of, sizes
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import basic_type
 from modelica_like.netlist.modelica.values import Notes, nominal_of, unit_of
 from modelica_like.netlist.modelica.wiring import INSIDE, Wire, bundled
 from modelica_like.netlist.modelica.written import Written, WrittenConnector, written_class
-
-
-def elements_of(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:
-    """Return the names of an array's elements with their index, or the name itself with zero."""
-    if not shape:
-        return [(name, 0)]
-    if len(shape) == 1:
-        return [(f"{name}[{k}]", k) for k in range(1, shape[0] + 1)]
-    return [(f"{name}[{k},{m}]", 0) for k in range(1, shape[0] + 1) for m in range(1, shape[1] + 1)]
 
 
 def connector_of(instance: Instance) -> WrittenConnector:

@@ -288,6 +288,9 @@ def function(name: str, args: tuple[Expr, ...], line: int) -> Expr:
     if name in ("min", "max") and len(args) == 1 and args[0].kind == "array":
         if not elements(args[0]):
             raise Unfit(f"{name} of an array without elements has no value")
+        if all(map(is_condition, elements(args[0]))):
+            word = "and" if name == "min" else "or"
+            return joined(lambda left, other: operation(word, (left, other), line), elements(args[0]))
         return joined(lambda left, other: function(name, (left, other), line), elements(args[0]))
     wanted = 2 if name in ("atan2", "mod", "rem", "div", "min", "max") else 1
     if len(args) != wanted:

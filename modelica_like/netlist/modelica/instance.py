@@ -126,7 +126,9 @@ class Instance:
 
     Attributes:
         members: by name, those of bases first.
-        adopted: equations of parts that use what is in this instance; `adopted_connections` likewise.
+        adopted: equations of parts that use what is in this instance.
+        own_pairs: ends that its equations connect, once they are known.
+        pairs: likewise, without those of `outer` parts, with those of parts with its `inner` ones.
         lent: own discrete variables whose equations stand in an instance above.
         driving: protected signals that drive parts.
         balance: equations of continuous variables that are lent, less those that are adopted.
@@ -144,7 +146,8 @@ class Instance:
         self.free: dict[str, str] = {}
         self.values: dict[str, Expr] = {}
         self.adopted: list[tuple[Expr, Expr, Source]] = []
-        self.adopted_connections: list[tuple[Expr, Expr, Source]] = []
+        self.own_pairs: list[tuple[str, str, Source]] | None = None
+        self.pairs: list[tuple[str, str, Source]] | None = None
         self.lent: set[str] = set()
         self.balance = 0
         self.driving: set[str] = set()

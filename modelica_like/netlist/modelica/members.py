@@ -24,6 +24,15 @@ def named_array(path: str, shape: tuple[int, ...], kind: str) -> Expr:
     return Expr("array", tuple(named_array(index, shape[1:], kind) for index in inner))
 
 
+def elements_of(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:
+    """Return the names of an array's elements with their index, or the name itself with zero."""
+    if not shape:
+        return [(name, 0)]
+    if len(shape) == 1:
+        return [(f"{name}[{k}]", k) for k in range(1, shape[0] + 1)]
+    return [(f"{name}[{k},{m}]", 0) for k in range(1, shape[0] + 1) for m in range(1, shape[1] + 1)]
+
+
 def unknown_name(what: str, text: ClassText, line: int) -> UnknownName:
     """Return the error about a name."""
     return UnknownName(what, where=text.place(line))

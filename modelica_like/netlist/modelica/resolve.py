@@ -70,7 +70,13 @@ class Resolver:
             numbers = [self.number(argument) for argument in args]
             start, step, stop = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
             return self._told(lambda: fold.row(start, step, stop, line), line)
-        values = tuple(map(self, args))
+        if kind in ("and", "or"):
+            left = self(args[0])
+            if left.kind == "boolean" and left.args[0] is (kind == "or"):  # the other side may have no value
+                return left
+            values = left, self(args[1])
+        else:
+            values = tuple(map(self, args))
         if kind == "tuple":
             return Expr(kind, values, line)
         values = tuple(value.args[0] if value.kind == "tuple" else value for value in values)
@@ -202,15 +208,17 @@ class Resolver:
             raise ModelicaTextError(f"{what} 1 to {size}.", where=self.text.place(expression.line))
         return int(position)
 
-    def _member(self, owner: Instance, before: str, parts: tuple[Any, ...], line: int) -> Expr:
-        """Resolve a path that begins with a member of an instance."""
+    def _member(
+        self, owner: Instance, before: str, parts: tuple[Any, ...], line: int, *, inner: bool = False
+    ) -> Expr:  # fmt: skip
+        """Resolve a path that begins with a member of an instance, of `inner outer` what is outside or `inner`."""
         (name, subscripts), rest = parts[0], parts[1:]
         member = owner.members.get(name)
-        if member is not None and "outer" in member.declaration.prefixes:
-            inner = owner.inner(name)
-            if inner is None:
+        if member is not None and "outer" in member.declaration.prefixes and not inner:
+            holder = owner.inner(name)
+            if holder is None:
                 raise members.unknown_name(f"outer {name} has no inner {name} above it.", self.text, line)
-            return self._member(inner, way(self.instance, inner), parts, line)
+            return self._member(holder, way(self.instance, holder), parts, line, inner=True)
         if member is None:
             hint = did_you_mean(name, owner.members) or "."
             raise members.unknown_name(f"{owner.path or owner.text.name} has no '{name}'{hint}", self.text, line)
@@ -237,16 +245,16 @@ class Resolver:
             raise refused(f"{name}, a component, as a value", self.text, line)
         if isinstance(part, Instance):
             return self._member(part, f"{path}.", rest, line)
-        inner = ".".join(head + "".join(f"[{int(self.number(index))}]" for index in subs) for head, subs in rest)
+        below = ".".join(head + "".join(f"[{int(self.number(index))}]" for index in subs) for head, subs in rest)
         if isinstance(part, Known):
-            inner = part.here(inner)
+            below = part.here(below)
             if self.numeric:
-                return members.value_of_known(owner, member, part, inner, self.text, line)
+                return members.value_of_known(owner, member, part, below, self.text, line)
             fields = declarations(part.type).fields
-            for below in table()["rates"].get(inner, "").split() if inner not in fields else ():
-                if below in fields:
-                    return Expr("call", ("der", (Expr("name", ((f"{path}.{below}", ()),), line),), ()), line)
-        return Expr("name", ((f"{path}.{inner}", ()),), line)
+            for name in table()["rates"].get(below, "").split() if below not in fields else ():
+                if name in fields:
+                    return Expr("call", ("der", (Expr("name", ((f"{path}.{name}", ()),), line),), ()), line)
+        return Expr("name", ((f"{path}.{below}", ()),), line)
 
     def _scalar(
         self, owner: Instance, member: Member, basic: Basic, path: str, subscripts: tuple[Expr, ...], line: int
@@ -338,6 +346,10 @@ class Resolver:
         name, given, named = expression.args
         line = expression.line
         short = name.removeprefix("Modelica.Math.").removeprefix("Math.")
+        if short == "cardinality" and len(given) == 1:
+            from modelica_like.netlist.modelica.causal import cardinality
+
+            return cardinality(self, given[0])
         if short in REFUSED:
             raise refused(REFUSED[short], self.text, line)
         least, most = ARGUMENTS.get(short, (0, len(given)))

@@ -13,10 +13,12 @@ from modelica_like.netlist.modelica.members import named_array, sizes, value_of
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
 from modelica_like.netlist.modelica.types import Basic, basic_type
+from modelica_like.netlist.modelica.whens import is_ending
 
 if TYPE_CHECKING:
     from modelica_like.netlist.modelica.statements import Statements
 
+When = list[tuple[tuple[Expr, ...], dict[str, Expr]]]
 _CALLS = ("terminate", "reinit", "assert")
 
 
@@ -36,6 +38,7 @@ class Section(Algorithm):
         self.initial = initial
         self.declared = {name: member.declaration for name, member in self.instance.members.items()}
         self.changed: list[str] = []
+        self.whens: list[tuple[When, Source]] = []
 
     def here(self, text: ClassText | None = None) -> Resolver:
         """Return what resolves expressions with the values so far."""
@@ -53,9 +56,30 @@ class Section(Algorithm):
                 raise refused(f"an assignment to {name}", self.text, body[0].line)
             self.local[name] = self._before(name, discrete=name in in_whens or self.initial)
         self.run(body)
+        self._happen()
         for name in dict.fromkeys(self.changed):
             variable = Resolver(self.instance, self.text)(Expr("name", ((name, ()),)))
             self.statements.equate(variable, self.local[name], self.text, self.place_of_section.line)
+
+    def _happen(self) -> None:
+        """Take the whens; of several that give a variable a value, the last one that happens does."""
+        names = [
+            {name for _, values in branches for name in values if not is_ending(name)} for branches, _ in self.whens
+        ]
+        several = {name for k, mine in enumerate(names) for other in names[:k] for name in mine & other}
+        for branches, source in self.whens:
+            left = [(c, {name: new for name, new in values.items() if name not in several}) for c, values in branches]
+            if any(values for _, values in left):
+                self.statements.happen(left, source)
+        for name in sorted(several):
+            joined: When = []
+            for branches, source in reversed(self.whens):
+                mine = [(conditions, {name: values[name]}) for conditions, values in branches if name in values]
+                if mine and len(mine) < len(branches):
+                    what = f"{name}, which another 'when' and some branches of this one give a value,"
+                    raise refused(what, self.text, source.line or 0)
+                joined += mine
+            self.statements.happen(joined, self.whens[0][1])
 
     def assigned(self, name: str) -> None:
         """Note that a variable gets a value."""
@@ -90,7 +114,7 @@ class Section(Algorithm):
                 what = f"{inside[0]}, which a 'when' and other statements give a value,"
                 raise refused(what, self.text, statement.line)
             branches.append((holds.args if holds.kind == "array" else (holds,), values))
-        self.statements.happen(branches, self.text.place(statement.line))
+        self.whens.append((branches, self.text.place(statement.line)))
         for name in {name for _, values in branches for name in values}:
             self.local.pop(name.partition("[")[0], None)  # from here on, it is what it is
 

@@ -132,7 +132,7 @@ class Memories:
                 self.equations.append((left, right, source))
                 continue
             self.of[path] = basic, any(call.args[0] in INSTANTS for call in calls_in(right))
-            self.equations += [self._out(path, basic, source), (_kept(path), right, source)]
+            self.equations += [self._out(path, basic, source), (kept(path), right, source)]
         for path in sorted(self.assigned):
             basic = self._signal(path)
             if basic is not None and path not in self.of:
@@ -142,24 +142,25 @@ class Memories:
             basic = self._signal(path)
             if basic is not None and basic.kind != "Real" and "input" in basic.prefixes:
                 self.of[path] = basic, False
-                self.equations.append((_kept(path), _taken(path, basic), place))
+                self.equations.append((kept(path), taken(path, basic), place))
 
     def _signal(self, path: str) -> Basic | None:
         own = own_signal(self.instance, path) if path else None
         return own[1] if own is not None and is_signal(self.instance, *own) else None
 
     def _out(self, path: str, basic: Basic, source: Source) -> Equation:
-        kept: Expr = _kept(path)
+        value: Expr = kept(path)
         if basic.kind == "Boolean":
-            kept = Expr("if", (Expr("condition", kept.args), fold.number(1), fold.number(0)))
-        return Expr("name", ((path, ()),)), kept, source
+            value = Expr("if", (Expr("condition", value.args), fold.number(1), fold.number(0)))
+        return Expr("name", ((path, ()),)), value, source
 
 
-def _kept(path: str) -> Expr:
+def kept(path: str) -> Expr:
+    """Return the name of the value itself of a signal that changes at events."""
     return Expr("name", ((f"{path}{MEMORY}", ()),))
 
 
-def _taken(path: str, basic: Basic) -> Expr:
+def taken(path: str, basic: Basic) -> Expr:
     """Return what an input says: a truth value above one half, or the nearest whole number."""
     name, half = Expr("name", ((path, ()),)), fold.number(0.5)
     if basic.kind == "Boolean":

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.before import Before
+from modelica_like.netlist.modelica.causal import Joints, declared_at
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.lifting import above, height, levels_between, outside, owner_above, renamed
-from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
+from modelica_like.netlist.modelica.members import element, exists, named_array, part_of, sizes
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.sections import Section
 from modelica_like.netlist.modelica.signals import Memories, inner_signals
@@ -41,7 +42,6 @@ class Statements(Whens):
     Attributes:
         equations: sides and place.
         initial: the same, of the start.
-        connections: two ends each, with the place.
         memory: values of discrete variables before the start, from initial equations of `pre(…)`.
         wires: connections, gathered.
         outputs: types of the signals that change at events, and whether they are true for instants only.
@@ -49,9 +49,9 @@ class Statements(Whens):
     """
 
     initially: bool = False
+    connects: bool = field(default=False, init=False)
     equations: list[tuple[Expr, Expr, Source]] = field(default_factory=list)
     initial: list[tuple[Expr, Expr, Source]] = field(default_factory=list)
-    connections: list[tuple[Expr, Expr, Source]] = field(default_factory=list)
     memory: dict[str, Expr] = field(default_factory=dict)
     wires: list[Wire] = field(default_factory=list[Wire])
     outputs: dict[str, tuple[Basic, bool]] = field(default_factory=dict)
@@ -66,9 +66,14 @@ class Statements(Whens):
         self._bindings()
         for happening, text in self.instance.equations:
             self.statement(happening, text, {})
-        inner = inner_signals(self.instance, groups(self.connections, self.instance))
+        joints = Joints(self.instance)
+        inner = inner_signals(self.instance, groups(joints.others))
         self.wires = inner.wires
         resolver = Resolver(self.instance, self.instance.text)
+        for path, terms, source in joints.equations():
+            items = [fold.operation("neg", (self._variable(p),), 0) if s < 0 else self._variable(p) for s, p in terms]
+            self.equations.append((self._variable(path), fold.total(items, 0), source))
+        self.instance.balance -= joints.taken()
         for left, right, source in inner.equal:
             before = len(self.equations)
             self.equate(resolver(left), resolver(right), self.instance.text, 0)
@@ -76,18 +81,12 @@ class Statements(Whens):
         start = Statements(self.instance, initially=True)
         for happening, text in self.instance.initial_equations:
             start.statement(happening, text, {})
-        if start.connections or any(not h.text for h in start.happenings):
+        if any(not h.text for h in start.happenings):
             happening, text = self.instance.initial_equations[0]
             raise refused("a connection or a 'when' among initial equations", text, happening.line)
-        for left, right, source in start.equations:
-            if left.kind == right.kind == "number":  # of parameters that are known when the text is read
-                continue
-            if self._is_discrete(left) and not _uses_time(right):
-                self.memory[left.args[0][0]] = right
-            elif left.kind == "call" and left.args[0] == "pre":
-                self.memory[left.args[1][0].args[0][0]] = right
-            else:
-                self.initial.append((left, right, source))
+        self._orient()
+        before = Before(self.equations, start.equations, self._is_discrete, self._changes_at_events)
+        self.memory, self.initial = before.memory, before.others
         memories = Memories(self.instance, self.assigned)
         others = [v for h in self.happenings for conditions, new in h.branches for v in (*conditions, *new.values())]
         memories.read(self.equations, others, self.instance.text.place(self.instance.text.line))
@@ -108,6 +107,26 @@ class Statements(Whens):
             if not _is_numeric(value):
                 raise ModelicaTextError("A text, an array or a choice stands where a number belongs.", where=source)
 
+    def stay(self, names: list[str], source: Source) -> None:
+        """Take variables of a `when` that never happens: they stay what they are at the start."""
+        self.assigned |= {*names}
+        for name in names:
+            variable = self._variable(name)
+            self.equations.append((variable, fold.call("pre", (variable,), 0), source))
+
+    def _variable(self, path: str) -> Expr:
+        """Return a variable of the instance, or of a connector in it."""
+        place = declared_at(self.instance, path)
+        basic = basic_type(*place) if place is not None else None
+        return named_array(path, (), basic.kind if basic is not None else "Real")
+
+    def _orient(self) -> None:
+        """Turn `a = b` of discrete variables where another equation gives `a` its value, and none `b`."""
+        names = [left.args[0][0] if self._is_discrete(left) else "" for left, _, _ in self.equations]
+        for k, (left, right, source) in enumerate(self.equations):
+            if names[k] and names.count(names[k]) > 1 and self._is_discrete(right) and right.args[0][0] not in names:
+                self.equations[k], names[k] = (right, left, source), right.args[0][0]
+
     def _lift(self) -> None:
         """Give equations that use what is outside to the instance that has it all."""
         kept: list[tuple[Expr, Expr, Source]] = []
@@ -119,7 +138,7 @@ class Statements(Whens):
             target, path_there = owner_above(self.instance, levels), above(self.instance, levels)
             target.adopted.append((renamed(left, path_there), renamed(right, path_there), source))
             if self._is_discrete(left):
-                self.instance.lent.add(left.args[0][0])
+                self.instance.lent |= {left.args[0][0]} if "." not in left.args[0][0] else set()
             else:
                 self.instance.balance += 1
                 target.balance -= 1
@@ -130,13 +149,19 @@ class Statements(Whens):
         if left.kind not in ("name", "condition"):
             return False
         path = left.args[0][0]
-        member = self.instance.members.get(path.removesuffix(MEMORY).partition("[")[0])
-        basic = basic_type(self.instance, member) if member is not None else None
-        if basic is None or member is None:
+        place = declared_at(self.instance, path.removesuffix(MEMORY))
+        basic = basic_type(*place) if place is not None else None
+        if basic is None or place is None:
             return False
         if path.endswith(MEMORY) or path in self.assigned or "discrete" in basic.prefixes:
             return True
-        return basic.kind != "Real" and not is_signal(self.instance, member, basic)
+        return basic.kind != "Real" and not is_signal(*place, basic)
+
+    def _changes_at_events(self, variable: Expr) -> bool:
+        """Tell whether a variable, possibly a signal, changes at events only."""
+        place = declared_at(self.instance, variable.args[0][0])
+        basic = basic_type(*place) if place is not None else None
+        return self._is_discrete(variable) or (basic is not None and basic.kind != "Real")
 
     def _check_memory(self, call: Expr, source: Source) -> None:
         """Refuse `pre` and `change` of a variable that changes all the time."""
@@ -161,7 +186,7 @@ class Statements(Whens):
         """Collect declarations `Real x = …`."""
         for name, member in self.instance.members.items():
             declared, basic = member.declaration, basic_type(self.instance, member)
-            if {"parameter", "constant", "outer"} & declared.prefixes or not exists(self.instance, member):
+            if {"parameter", "constant"} & declared.prefixes or declared.is_outer or not exists(self.instance, member):
                 continue
             if basic is None:
                 self._part_bindings(name, member)
@@ -215,9 +240,10 @@ class Statements(Whens):
         self.instance.classes.spend(10, text, statement.line)
         if statement.kind == "=":
             self.equate(resolver(statement.parts[0]), resolver(statement.parts[1]), text, statement.line)
-        elif statement.kind == "connect":
-            left, right = (self._end(side, resolver) for side in statement.parts)
-            self.connections.append((left, right, text.place(statement.line)))
+        elif statement.kind == "connect":  # gathered for all of the instance
+            self.connects = True
+            if self.initially:
+                raise refused("a connection or a 'when' among initial equations", text, statement.line)
         elif statement.kind == "for":
             self._loop(list(statement.parts[0]), statement.parts[1], text, local)
         elif statement.kind == "if":
@@ -238,19 +264,6 @@ class Statements(Whens):
                 )
         else:
             raise refused(f"'{statement.kind}' among equations", text, statement.line)
-
-    def _end(self, end: Expr, resolver: Resolver) -> Expr:
-        """Resolve the subscripts of an end of a connection, and keep its names."""
-        if end.kind != "name":
-            raise refused("this end of a connection", resolver.text, end.line)
-        parts: list[tuple[str, tuple[Expr, ...]]] = []
-        for k, (name, subs) in enumerate(end.args):
-            inside = resolver.known()
-            member = self.instance.members.get(name) if subs and not k else None
-            if member is not None:
-                inside.local |= {"end": fold.number(([*sizes(self.instance, member), 0])[0])}
-            parts.append((name, tuple(inside(index) for index in subs)))
-        return Expr("name", tuple(parts), end.line)
 
     def _loop(
         self, iterators: list[tuple[str, Expr | None]], body: list[Statement], text: ClassText, local: dict[str, Expr]
@@ -282,7 +295,7 @@ class Statements(Whens):
                 target.statement(inner, text, local)
             if target is self:
                 return
-            if target.connections or any(not happening.text for happening in target.happenings):
+            if target.connects or any(not happening.text for happening in target.happenings):
                 raise refused("a connection or an event in a branch that changes during a run", text, statement.line)
             before = [other for other, _ in open_branches if other is not None]
             self.happenings += [_if_taken(holds, before, happening) for happening in target.happenings]
@@ -327,8 +340,7 @@ class Statements(Whens):
         elif left.kind == "condition":
             self.check_type(left, right, text, line)
             right = as_condition(right)
-            member = self.instance.members.get(left.args[0][0].partition("[")[0])
-            if member is None:
+            if declared_at(self.instance, left.args[0][0]) is None:
                 raise refused(
                     f"An equation for {left.args[0][0]}, a Boolean of a part", text, line, "Connect a signal."
                 )
@@ -370,10 +382,3 @@ def _text(node: Expr) -> str:
     if node.kind == "call":
         inner = (node.args[0], *(_text(argument) for argument in node.args[1]))
     return f"{node.kind}:{','.join(inner)}"
-
-
-def _uses_time(value: Any) -> bool:
-    """Tell whether an expression names the time: a run begins at any."""
-    if isinstance(value, Expr):
-        return (value.kind == "name" and value.args[0][0] == "time") or _uses_time(value.args)
-    return isinstance(value, tuple | list) and any(_uses_time(inner) for inner in value)

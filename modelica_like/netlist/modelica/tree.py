@@ -130,6 +130,11 @@ class Declaration:
     line: int
     constrained: Modification | None = None
 
+    @property
+    def is_outer(self) -> bool:
+        """Whether it only names what is declared further out; `inner outer` declares a part for what is inside."""
+        return "outer" in self.prefixes and "inner" not in self.prefixes
+
 
 @dataclass(slots=True)
 class Statement:

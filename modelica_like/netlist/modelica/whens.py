@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.causal import declared_at
 from modelica_like.netlist.modelica.instance import Instance, refused
 from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.resolve import Resolver
@@ -38,15 +39,27 @@ class Whens:
         """Read a `when`."""
         resolver, source = Resolver(self.instance, text, local), text.place(statement.line)
         branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]] = []
+        never: set[str] = set()
         for condition, body in statement.parts:
             if condition is None:
                 raise refused("'else' of a 'when'", text, statement.line)
             holds = resolver.condition(condition, "when", statement.line)
-            conditions = holds.args if holds.kind == "array" else (holds,)
+            every = holds.args if holds.kind == "array" else (holds,)
+            conditions = tuple(each for each in every if each != Expr("boolean", (False,), each.line))
             if any(each.kind == "boolean" for each in conditions):
                 raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
-            branches.append((conditions, self.changes(body, text, local)))
-        self.happen(branches, source)
+            changes = self.changes(body, text, local)
+            if conditions:
+                branches.append((conditions, changes))
+            else:
+                never |= {name for name in changes if not is_ending(name) and name not in self.reset}
+        if branches:
+            self.happen(branches, source)
+        self.stay(sorted(never - self.assigned), source)
+
+    def stay(self, names: list[str], source: Source) -> None:
+        """Take variables of a `when` that never happens: they stay what they are at the start."""
+        raise NotImplementedError
 
     def happen(self, branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]], source: Source) -> None:
         """Take a `when`: conditions and new values of its branches."""
@@ -146,8 +159,8 @@ class Whens:
     def check_type(self, left: Expr, right: Expr, text: ClassText, line: int) -> Basic | None:
         """Return the type of an own variable; refuse a value of another one."""
         name = left.args[0][0] if left.kind in ("name", "condition") and len(left.args) == 1 else ""
-        member = self.instance.members.get(name.partition("[")[0])
-        basic = basic_type(self.instance, member) if member is not None else None
+        place = declared_at(self.instance, name) if name and not name.startswith("^") else None
+        basic = basic_type(*place) if place is not None else None
         wrong = misfit(right, basic) if basic is not None else ""
         if wrong:
             raise ModelicaTextError(f"{name} {wrong}.", where=text.place(line))

@@ -13,6 +13,7 @@ from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Instance, refused
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.members import exists, part_of, sizes, unknown_name
+from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import basic_type
 
@@ -28,33 +29,44 @@ class Wire:
     source: Source
 
 
-def groups(connections: list[tuple[Expr, Expr, Source]], instance: Instance) -> list[Wire]:
-    """Gather connections that share ends.
-
-    Args:
-        connections: pairs of ends.
-        instance: whose members they name.
-
-    Raises:
-        UnknownName: an end does not exist.
-    """
+def groups(pairs: list[tuple[str, str, Source]]) -> list[Wire]:
+    """Gather pairs of ends that share some."""
     wires: list[Wire] = []
-    for left, right, source in connections:
-        for pair in _pairs(left, right, instance, source):
-            if "" in pair:
-                continue
-            touched = [w for w in wires if set(pair) & set(w.ends)]
-            wire = Wire([], touched[0].source if touched else source)
-            for end in (*(end for t in touched for end in t.ends), *pair):
-                if end not in wire.ends:
-                    wire.ends.append(end)
-            wires = [w for w in wires if w not in touched]
-            wires.append(wire)
+    for *pair, source in pairs:
+        touched = [w for w in wires if set(pair) & set(w.ends)]
+        ends = dict.fromkeys((*(end for t in touched for end in t.ends), *pair))
+        wires = [w for w in wires if w not in touched]
+        wires.append(Wire([*ends], touched[0].source if touched else source))
     return wires
 
 
-def _pairs(left: Expr, right: Expr, instance: Instance, source: Source) -> list[tuple[str, str]]:
-    """Return the paths of the ends of a connection, element by element of arrays."""
+def end_of(end: Expr, resolver: Resolver) -> Expr:
+    """Resolve the subscripts of an end of a connection, and keep its names."""
+    if end.kind != "name":
+        raise refused("this end of a connection", resolver.text, end.line)
+    parts: list[tuple[str, tuple[Expr, ...]]] = []
+    for k, (name, subs) in enumerate(end.args):
+        inside = resolver.known()
+        member = resolver.instance.members.get(name) if subs and not k and resolver.instance is not None else None
+        if member is not None and resolver.instance is not None:
+            inside.local |= {"end": fold.number(([*sizes(resolver.instance, member), 0])[0])}
+        parts.append((name, tuple(inside(index) for index in subs)))
+    return Expr("name", tuple(parts), end.line)
+
+
+def pairs_of(left: Expr, right: Expr, instance: Instance, source: Source) -> list[tuple[str, str]]:
+    """Return the paths of the ends of a connection, element by element of arrays; one that is absent is empty.
+
+    Args:
+        left: one end, its subscripts resolved.
+        right: the other one.
+        instance: whose members they name.
+        source: of the connection.
+
+    Raises:
+        UnknownName: an end does not exist.
+        ModelicaTextError: the ends are arrays of different sizes.
+    """
     ends = [_ends(left, instance), _ends(right, instance)]
     count = max(map(len, ends))
     for k, end in enumerate((left, right)):

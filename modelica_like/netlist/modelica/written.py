@@ -9,7 +9,7 @@ from typing import Any
 
 import casadi as ca
 
-from modelica_like.errors import LanguageError, ModelicaLikeError, Source
+from modelica_like.errors import LanguageError, ModelicaLikeError, ModelicaTextError, Source
 from modelica_like.language import (
     TIME,
     Assembly,
@@ -41,7 +41,7 @@ from modelica_like.language.equation import Equation
 from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field
 from modelica_like.language.formula import Formula
-from modelica_like.language.inside import InsideAssembly
+from modelica_like.language.inside import InsideAssembly, inside
 from modelica_like.netlist.modelica.fold import SILENT
 from modelica_like.netlist.modelica.tree import Expr as Node
 
@@ -106,6 +106,7 @@ class Written(Assembly):
     """
 
     units_checked = False
+    parts_are_attributes = False  # one may have the name of a method, such as `start`
     _kept = InsideWritten
     _inside: InsideWritten  # pyright: ignore[reportIncompatibleVariableOverride]
 
@@ -294,6 +295,33 @@ def written_class(name: str) -> type[Written]:
 def _revived(name: str) -> Written:
     kind = written_class(name)
     return kind.__new__(kind)
+
+
+def check_determined(component: Written) -> None:
+    """Refuse discrete variables of connectors that no class and no connection gives a value.
+
+    Raises:
+        ModelicaTextError: there is one.
+    """
+    owners = [
+        (part.path if part is not component else "", part) for part in component.walk() if isinstance(part, Written)
+    ]
+    given: set[str] = set()
+    for path, part in owners:
+        sides = [left for left, _, _ in inside(part).statements if left.kind in ("name", "condition")]
+        names = [left.args[0][0] for left in sides] + [
+            name for event in inside(part).happenings for _, new in event.branches for name in new
+        ]
+        given.update(f"{path}.{name}" if path else name for name in names)
+    for path, part in owners:
+        for name in sorted(inside(part).elsewhere):
+            variable = f"{path}.{name}" if path else name
+            if variable not in given:
+                raise ModelicaTextError(
+                    f"Nothing gives {variable} a value.",
+                    where=part.place_of(),
+                    advice="Connect it, or write an equation for it where its connector is.",
+                )
 
 
 def as_formula(node: Node, prefix: str = "") -> Formula | float | None:
