@@ -163,12 +163,13 @@ class Controller(Component, partial=True):
 
 
 class P(Controller):
-    """Proportional controller y = k·(u_s - u_m) + u_ff; it needs no anti-windup."""
+    """Proportional controller y = k·(wp·u_s - u_m) + u_ff; it needs no anti-windup."""
 
     icon = icons.CONTROL_P
+    wp: Parameter = param("1", "weight of the set value", default=1.0, min=0)
 
     def free_output(self) -> Expr:
-        return self.k * (self.u_s - self.u_m) + self.u_ff
+        return self.k * (self.wp * self.u_s - self.u_m) + self.u_ff
 
 
 class PI(Controller):

@@ -50,7 +50,8 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("Modelica.Mechanics.MultiBody.World world;"),
         "There is no class 'Modelica.Mechanics.MultiBody.World'.\n"
         "  in a.mo:3 `Modelica.Mechanics.MultiBody.World world;`\n"
-        "No component here stands for this class of the standard library.",
+        "No component here stands for this class of the standard library.\n"
+        "Give the library's own text by --library.",
     ),
     "unknown parameter": (
         model(f"{R}.Inertia a(JJ = 1);"),
@@ -219,7 +220,8 @@ MESSAGES: dict[str, tuple[str, str]] = {
     "a base with a component": (
         f"model A\n  extends {R}.Inertia;\nend A;\n",
         f"A extends {R}.Inertia, for which a component of its own stands here: that is not supported here.\n"
-        f"  in a.mo:2 `extends {R}.Inertia;`\nWrite it as a part, and connect its ends.",
+        f"  in a.mo:2 `extends {R}.Inertia;`\n"
+        "Write it as a part, and connect its ends. Give the library's own text by --library.",
     ),
     "a base that is not there": (
         "model A\n  extends B;\nend A;\n",
@@ -229,7 +231,7 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model(f"{R}.Clutch k(fn_max = 1, smoothness = Modelica.Blocks.Types.Smoothness.ContinuousDerivative);"),
         "Clutch.smoothness = ContinuousDerivative: that is not supported here.\n"
         f"  in a.mo:3 `{R}.Clutch k(fn_max = 1, smoothness = Modelica.Blocks.Types.Smoothness.ContinuousDerivative);`\n"
-        "The component Clutch has smoothness = LinearSegments only.",
+        "The component Clutch has smoothness = LinearSegments only. Give the library's own text by --library.",
     ),
     "an index outside": (
         model("parameter Real k[2] = {1, 2}; Real x;", "x = k[3];"),

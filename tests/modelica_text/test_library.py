@@ -42,7 +42,10 @@ def test_a_drive_written_and_read_back_moves_the_same(name: str, tmp_path: Path)
     drive = load(EXAMPLES / f"{name}.toml")
     (tmp_path / "drive.mo").write_text(modelica_text(drive))
     start = drive.simulate.get("start", "given")
-    same(simulate(drive, points=50), simulate(load(tmp_path / "drive.mo"), start=start, points=50))
+    read = simulate(load(tmp_path / "drive.mo"), start=start, points=50)
+    # Adaptors are written out, and what drives no input of theirs is a parameter there.
+    inputs = tuple(f"angleToTorque{end}.{name}" for end in ("2a", "2b", "3a", "3b") for name in ("w", "a"))
+    same(simulate(drive, points=50), read, without=inputs)
 
 
 def netlist(name: str) -> tuple[str, list[str]]:

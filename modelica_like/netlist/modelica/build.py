@@ -366,7 +366,10 @@ class _Builder:
             wires[key] = ends
             joined.update(ends)
             Assembly.place(component, f"connect.{key}", wire.source)
+            before = len(self.errors)
             self._attempt(wire.source, self._check_ends, ends)
+            if len(self.errors) > before:
+                self._lack(ends)
         inside(component).wires = wires
         inside(component).free = tuple(
             f"{name}.{end}"
@@ -374,6 +377,14 @@ class _Builder:
             for end, connector in part.connectors.items()
             if not connector.may_be_free and f"{name}.{end}" not in joined
         )
+
+    def _lack(self, ends: tuple[str, ...]) -> None:
+        """Remember the parts of a connection that are components: one of them lacks an end."""
+        for head in {end.partition(".")[0].partition("[")[0] for end in ends if "." in end}:
+            member = self.instance.members.get(head)
+            part = part_of(self.instance, member, 1 if sizes(self.instance, member) else 0) if member else None
+            if isinstance(part, Known):
+                self.instance.classes.lack(f"{self.instance.path}.{head}", part.path)
 
     def _check_ends(self, ends: tuple[str, ...]) -> None:
         connectors = [end_at(self.component, end) for end in ends]

@@ -196,7 +196,7 @@ package Modelica
       type Smoothness = enumeration(LinearSegments, ContinuousDerivative, ConstantSegments,
           MonotoneContinuousDerivative1, MonotoneContinuousDerivative2, ModifiedContinuousDerivative);
       type Extrapolation = enumeration(HoldLastPoint, LastTwoPoints, Periodic, NoExtrapolation);
-      type Regularization = enumeration(Exp, Sine, Linear, CoSine);
+      type Regularization = enumeration(Exp, Sine, Linear, Cosine);
       type Init = enumeration(NoInit, SteadyState, InitialState, InitialOutput);
       type SimpleController = enumeration(P, PI, PD, PID);
     end Types;
@@ -298,6 +298,72 @@ package Modelica
           flange_a.tau + flange_b.tau = 0;
         end PartialRelativeSensor;
       end Interfaces;
+      package Components
+        model TorqueToAngleAdaptor "end that takes what flows in and tells its motion"
+          parameter Boolean use_w = true;
+          parameter Boolean use_a = true;
+          Interfaces.Flange_a flange;
+          Modelica.Blocks.Interfaces.RealInput tau;
+          Modelica.Blocks.Interfaces.RealOutput phi;
+          Modelica.Blocks.Interfaces.RealOutput w if use_w;
+          Modelica.Blocks.Interfaces.RealOutput a if use_w and use_a;
+        protected
+          Real rate = der(flange.phi);
+        equation
+          flange.tau = tau;
+          phi = flange.phi;
+          if use_w then
+            w = rate;
+          end if;
+          if use_w and use_a then
+            a = der(rate);
+          end if;
+        end TorqueToAngleAdaptor;
+        model AngleToTorqueAdaptor "end that takes a motion and tells what flows"
+          parameter Boolean use_w = true;
+          parameter Boolean use_a = true;
+          Interfaces.Flange_b flange;
+          Modelica.Blocks.Interfaces.RealInput phi;
+          Modelica.Blocks.Interfaces.RealInput w if use_w "the rate, which follows from the motion";
+          Modelica.Blocks.Interfaces.RealInput a if use_w and use_a;
+          Modelica.Blocks.Interfaces.RealOutput tau;
+        equation
+          flange.phi = phi;
+          tau = -flange.tau;
+        end AngleToTorqueAdaptor;
+        model GeneralTorqueToAngleAdaptor "end that takes what flows in and tells its motion"
+          parameter Boolean use_pder = true;
+          parameter Boolean use_pder2 = true;
+          Interfaces.Flange_a flange;
+          Modelica.Blocks.Interfaces.RealInput f;
+          Modelica.Blocks.Interfaces.RealOutput p;
+          Modelica.Blocks.Interfaces.RealOutput pder if use_pder;
+          Modelica.Blocks.Interfaces.RealOutput pder2 if use_pder and use_pder2;
+        protected
+          Real rate = der(flange.phi);
+        equation
+          flange.tau = f;
+          p = flange.phi;
+          if use_pder then
+            pder = rate;
+          end if;
+          if use_pder and use_pder2 then
+            pder2 = der(rate);
+          end if;
+        end GeneralTorqueToAngleAdaptor;
+        model GeneralAngleToTorqueAdaptor "end that takes a motion and tells what flows"
+          parameter Boolean use_pder = true;
+          parameter Boolean use_pder2 = true;
+          Interfaces.Flange_b flange;
+          Modelica.Blocks.Interfaces.RealInput p;
+          Modelica.Blocks.Interfaces.RealInput pder if use_pder "the rate, which follows from the motion";
+          Modelica.Blocks.Interfaces.RealInput pder2 if use_pder and use_pder2;
+          Modelica.Blocks.Interfaces.RealOutput f;
+        equation
+          flange.phi = p;
+          f = -flange.tau;
+        end GeneralAngleToTorqueAdaptor;
+      end Components;
     end Rotational;
     package Translational
       package Interfaces
@@ -366,6 +432,40 @@ package Modelica
           flange_a.f + flange_b.f = 0;
         end PartialRelativeSensor;
       end Interfaces;
+      package Components
+        model GeneralForceToPositionAdaptor "end that takes what flows in and tells its motion"
+          parameter Boolean use_pder = true;
+          parameter Boolean use_pder2 = true;
+          Interfaces.Flange_a flange;
+          Modelica.Blocks.Interfaces.RealInput f;
+          Modelica.Blocks.Interfaces.RealOutput p;
+          Modelica.Blocks.Interfaces.RealOutput pder if use_pder;
+          Modelica.Blocks.Interfaces.RealOutput pder2 if use_pder and use_pder2;
+        protected
+          Real rate = der(flange.s);
+        equation
+          flange.f = f;
+          p = flange.s;
+          if use_pder then
+            pder = rate;
+          end if;
+          if use_pder and use_pder2 then
+            pder2 = der(rate);
+          end if;
+        end GeneralForceToPositionAdaptor;
+        model GeneralPositionToForceAdaptor "end that takes a motion and tells what flows"
+          parameter Boolean use_pder = true;
+          parameter Boolean use_pder2 = true;
+          Interfaces.Flange_b flange;
+          Modelica.Blocks.Interfaces.RealInput p;
+          Modelica.Blocks.Interfaces.RealInput pder if use_pder "the rate, which follows from the motion";
+          Modelica.Blocks.Interfaces.RealInput pder2 if use_pder and use_pder2;
+          Modelica.Blocks.Interfaces.RealOutput f;
+        equation
+          flange.s = p;
+          f = -flange.f;
+        end GeneralPositionToForceAdaptor;
+      end Components;
     end Translational;
   end Mechanics;
   package Thermal

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
@@ -26,6 +27,7 @@ _MOST_STEPS = 1_000_000
 """Of about 10 microseconds; 10,000 parts of own classes, or 100,000 equations."""
 _KEPT_FILES = 3_000
 """Files whose classes are kept by their text: the standard library has 2,555."""
+_SUBSCRIPT = re.compile(r"\[[^]]*\]")
 _libraries: ContextVar[tuple[Path, ...]] = ContextVar("libraries", default=())
 Found = ClassText | Known | str
 """A class with its text, one with a component, or the name of a basic type or a connector of the standard library."""
@@ -91,6 +93,8 @@ class Classes:
         self.open: set[tuple[int, str]] = set()
         self.found: dict[tuple[int, str], Found | None] = {}
         self.steps = 0
+        self.lacking: dict[str, str] = {}
+        self.untabled: set[str] = set()
 
     def chosen(self, name: str = "") -> ClassText:
         """Return the class to read: the one of this name, or the last model of the file.
@@ -106,8 +110,8 @@ class Classes:
             if name
             else outermost[-1:]
         )
-        elsewhere = self.full(name) if name and not matches else None
-        if isinstance(elsewhere, ClassText):
+        elsewhere = self.text_of(name) if name and not matches else None
+        if elsewhere is not None:
             return elsewhere
         if not matches:
             names = ", ".join(model.name for model in models) or "none"
@@ -229,6 +233,29 @@ class Classes:
             if inner is not None:
                 return inner
         return None
+
+    def text_of(self, path: str) -> ClassText | None:
+        """Return the text of a class, of which there may be a component, too; None if no library has it."""
+        known = self.full(path)
+        if not isinstance(known, Known):
+            return known if isinstance(known, ClassText) else None
+        head, _, rest = known.path.partition(".")
+        top = self._top(head)
+        inner = None if top is None else self._inside(top, rest)
+        return inner if isinstance(inner, ClassText) else None
+
+    def lack(self, part: str, path: str) -> None:
+        """Remember that the component for a class cannot be what a text says of a part.
+
+        Args:
+            part: its path; elements of an array are one.
+            path: of the class.
+        """
+        self.lacking[_SUBSCRIPT.sub("", part)] = path
+
+    def reads(self, part: str) -> bool:
+        """Tell whether the class of a part is read from its text, though there is a component."""
+        return bool(self.untabled) and _SUBSCRIPT.sub("", part) in self.untabled
 
     def tabled(self, path: str) -> Known | str | None:
         """Return a class of the standard library that a component or a connector stands for."""

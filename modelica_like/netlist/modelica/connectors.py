@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from modelica_like.errors import Source
-from modelica_like.language import flow, var
+from modelica_like.language import Connector, flow, var
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.attributes import check_attributes
-from modelica_like.netlist.modelica.instance import Instance, refused
+from modelica_like.netlist.modelica.instance import Instance, Member, refused
+from modelica_like.netlist.modelica.library import Known, connector_type
 from modelica_like.netlist.modelica.members import elements_of, part_of, sizes
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import basic_type
@@ -50,9 +51,7 @@ def bundle(path: str, instance: Instance, owner: Instance, wires: list[Wire]) ->
     for leaf in bundled(instance):
         name, _, index = leaf.partition("[")
         part = part_of(instance, instance.members[name], int(index.rstrip("]")) if index else 0)
-        if not isinstance(part, Instance) or part.text.kind != "connector" or bundled(part):
-            raise refused(f"{leaf} in a connector", instance.text, instance.members[name].declaration.line)
-        outer, inner = connector_of(part), connector_of(part)
+        outer, inner = (_side(leaf, part, instance.members[name]) for _ in (0, 1))
         setattr(component, leaf, outer)
         if f"{path}.{INSIDE}{leaf}" not in joined:
             flows = sum(quantity.is_flow for quantity in outer.quantities.values())
@@ -65,3 +64,13 @@ def bundle(path: str, instance: Instance, owner: Instance, wires: list[Wire]) ->
             equations.append((here, Expr("neg", (there,)) if quantity.is_flow else there, place))
     inside(component).text, inside(component).statements = instance.text.path, tuple(equations)
     return component
+
+
+def _side(leaf: str, part: Instance | Known | str, member: Member) -> Connector:
+    """Return a connector within a connector; there are two of it, towards the outside and the inside."""
+    kind = connector_type(part) if isinstance(part, str) else None
+    if kind is not None:
+        return kind(member.declaration.description, free=True)
+    if not isinstance(part, Instance) or part.text.kind != "connector" or bundled(part):
+        raise refused(f"{leaf} in a connector", member.text, member.declaration.line)
+    return connector_of(part)

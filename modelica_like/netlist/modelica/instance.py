@@ -17,6 +17,7 @@ from modelica_like.netlist.modelica.tree import (
     Statement,
 )
 
+GIVE = "Give the library's own text by --library."
 _DEEPEST = 40
 _NO_DECLARATION = Declaration(frozenset(), "", "", (), Modification(), None, "", 0)
 
@@ -223,6 +224,8 @@ class Instance:
 
     def _extend(self, clause: Extends, text: ClassText, outer: Given, depth: int) -> set[str]:
         base = self.find(clause.base, text)
+        if isinstance(base, Known):
+            base = self.classes.text_of(base.path) or base
         if isinstance(base, ClassText):
             inner = given(clause.modification, (self, text), clause.line)
             redeclared = {k: v for k, v in inner.inner.items() if isinstance(v.redeclared, ClassText)}
@@ -232,7 +235,7 @@ class Instance:
             return names
         if isinstance(base, Known):
             what = f"{text.name} extends {base.path}, for which a component of its own stands here"
-            raise refused(what, text, clause.line, "Write it as a part, and connect its ends.")
+            raise refused(what, text, clause.line, f"Write it as a part, and connect its ends. {GIVE}")
         if ".Icons." not in f".{clause.base}" and not clause.base.endswith((".Icon", "ExternalObject")):
             raise unknown_class(clause.base, text, clause.line)
         return set()
@@ -271,4 +274,5 @@ def unknown_class(name: str, text: ClassText, line: int) -> ModelicaTextError:
     """Return the error about a class that is nowhere."""
     library = name.lstrip(".").startswith("Modelica.") or text.within.startswith("Modelica")
     why = "No component here stands for this class of the standard library." if library else ""
-    return ModelicaTextError(f"There is no class '{name}'.", where=text.place(line), why=why)
+    advice = GIVE if library else ""
+    return ModelicaTextError(f"There is no class '{name}'.", where=text.place(line), why=why, advice=advice)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
-from modelica_like.errors import Source, UnknownName, did_you_mean
+from modelica_like.errors import ModelicaLikeError, Source, UnknownName, did_you_mean
 from modelica_like.language import Component, Parameter, Variable, guess
-from modelica_like.language.fields import Input, Output
-from modelica_like.language.inside import declarations
+from modelica_like.language.fields import Input, Output, in_range
+from modelica_like.language.inside import declarations, inside
 from modelica_like.language.scopes import give_by_path
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.attributes import check_attributes
-from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
+from modelica_like.netlist.modelica.instance import GIVE, Given, Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
 from modelica_like.netlist.modelica.members import demand_determined, record_of
 from modelica_like.netlist.modelica.parse import parse_expression
@@ -50,8 +51,12 @@ def library_part(
     Raises:
         ModelicaTextError, UnknownName: a parameter does not exist here, or has a value that is not supported.
     """
-    part = _Part(owner, name, member, entry, given, notes)
-    component = part.make(driven)
+    try:
+        part = _Part(owner, name, member, entry, given, notes)
+        component = part.make(driven)
+    except ModelicaLikeError:
+        owner.classes.lack(f"{owner.path}.{name}", entry.path)
+        raise
     initial += part.initial
     return component
 
@@ -90,21 +95,51 @@ class _Part:
                 self._read(name, start)
             elif isinstance(self.fields.get(here), Variable) or "." in here:
                 starts.append((here, start))
-            else:
+            elif here not in self._of_others():
                 self._unknown(name, start)
         self._defaults()
         settings = {self.known.here(name): value for name, value in self.values.items() if name not in used}
         for here, text in self.known.set.items():
             if here not in driven:
                 settings[here] = self._owners()(substituted(parse_expression(str(text)), self.values))
+        for here, value in settings.items():
+            self._demand_range(here, value)
         structural = {here: self._plain(here, value) for here, value in settings.items() if here in self.structural}
         part = new_component(self.kind, {**structural, **self.known.fix})
         for here, value in settings.items():
             if here not in structural:
                 part.give(here, self._value(value))
+        for here in self.known.fixed:
+            starts += [(here, Given())] if here not in dict(starts) else []
         for here, start in starts:
             self._start(part, here, start)
+        self._begin(part, dict(starts))
         return part
+
+    def _demand_range(self, here: str, value: Expr) -> None:
+        """Refuse a number that the component does not take; the class may."""
+        field = self.fields.get(here)
+        if isinstance(field, Parameter):
+            with suppress(ModelicaLikeError):  # what no constants determine is checked with the values of a run
+                value = self._owners().known()(value)
+        if isinstance(field, Parameter) and value.kind == "number":
+            label = f"{self.name}.{self.known.there(here)}"
+            in_range(value.args[0], f"{value.args[0]:g}", label, str(field.unit), field.bounds)
+
+    def _of_others(self) -> set[str]:
+        """Return the names of parameters that other types have which the same class may be."""
+        types = [find_type(name) for choice, name in self.known.by.items() if choice not in ("parameter", "default")]
+        return {name for kind in types for name in declarations(kind).fields}
+
+    def _begin(self, part: Component, starts: dict[str, Given]) -> None:
+        """Collect the initial equations of a class, unless a parameter switches them off or a start value is fixed."""
+        for here, source in self.known.begin.items():
+            if here in inside(part).starts and inside(part).starts[here].fixed:
+                continue
+            if not any(getattr(part, flag, False) for flag in self.known.exact.split()):
+                line = self.member.declaration.line
+                left, right = (Expr("name", ((f"{self.name}.{name}", ()),), line) for name in (here, source))
+                self.initial.append((left, right, self.member.text.place(line)))
 
     def _entries(self) -> Iterator[tuple[str, Given]]:
         """Yield names and modifications; those of a record are taken apart, as `losses.P`."""
@@ -136,11 +171,8 @@ class _Part:
         )
         name = str(value).rpartition(".")[2]
         if name not in choices:
-            raise refused(
-                f"{self.known.path.rpartition('.')[2]} with {parameter} = {name}",
-                self.member.text,
-                entry.line if entry else 0,
-            )
+            what = f"{self.known.path.rpartition('.')[2]} with {parameter} = {name}"
+            raise refused(what, self.member.text, entry.line if entry else 0, GIVE)
         return find_type(choices[name])
 
     def _owners(self) -> Resolver:
@@ -192,7 +224,7 @@ class _Part:
         if actual not in wanted:
             raise refused(
                 f"{self.known.path.rpartition('.')[2]}.{name} = {actual}", self.member.text, line,
-                f"The component {self.known.component} has {name} = {' or '.join(map(str, wanted))} only.",
+                f"The component {self.known.component} has {name} = {' or '.join(map(str, wanted))} only. {GIVE}",
             )  # fmt: skip
 
     def _plain(self, here: str, value: Expr) -> Any:
@@ -213,6 +245,8 @@ class _Part:
         return value.args[0]
 
     def _value(self, value: Expr) -> Any:
+        if value.kind == "array" and len(value.args) == 1:  # a class for several, of which the component is one
+            value = value.args[0]
         formula = as_formula(value)
         if formula is None:
             formula = as_formula(self._owners().known()(value))
@@ -231,7 +265,7 @@ class _Part:
         if "displayUnit" in attributes:
             self._show(here, attributes["displayUnit"])
         path, _, last = here.rpartition(".")
-        fixed = "fixed" in attributes and attributes["fixed"].args == (True,)
+        fixed = attributes["fixed"].args == (True,) if "fixed" in attributes else here in self.known.fixed
         if isinstance(part.find(path).fields[last], Output) and not fixed:
             return
         start = given.inner.get("start")
@@ -264,9 +298,11 @@ class _Part:
             return  # attributes of a variable that the component does not have
         ours = {back: front for front, back in self.known.names.items()}
         names = [self.known.names.get(key, key) for key in (*self.fields, *self.structural)]
+        near = did_you_mean(name, [*names, *ours])
         raise UnknownName(
-            f"{self.known.path} has no '{name}' here{did_you_mean(name, [*names, *ours]) or '.'}",
+            f"{self.known.path} has no '{name}' here{near or '.'}",
             where=self.member.text.place(given.line or self.member.declaration.line),
+            advice="" if near else GIVE,
         )
 
 

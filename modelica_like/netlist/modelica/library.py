@@ -33,6 +33,8 @@ class Known:
         default: of the class's parameters.
         fix: values of the component's fields.
         starts: start values of variables where none is given.
+        fixed: variables whose start values are fixed where nothing else is said.
+        begin: inputs that are the start values of variables, unless a Boolean of the component in `exact` is true.
         only: the one value that is supported, by the class's parameter.
         omit: values that stand for none, by the class's parameter.
         by: the component types by the value of a `parameter`, and the `default` one.
@@ -49,6 +51,9 @@ class Known:
     default: Mapping[str, Any] = field(default_factory=dict[str, Any])
     fix: Mapping[str, Any] = field(default_factory=dict[str, Any])
     starts: Mapping[str, float] = field(default_factory=dict[str, float])
+    fixed: frozenset[str] = frozenset()
+    begin: Mapping[str, str] = field(default_factory=dict[str, str])
+    exact: str = ""
     only: Mapping[str, Any] = field(default_factory=dict[str, Any])
     omit: Mapping[str, float] = field(default_factory=dict[str, float])
     by: Mapping[str, str] = field(default_factory=dict[str, str])
@@ -69,6 +74,15 @@ class Known:
         head, bracket, index = name.partition("[")
         pattern = here_of.get(f"{head}[#]") if bracket else None
         return pattern.replace("#", index.rstrip("]")) if pattern else name
+
+    def has(self, name: str) -> bool:
+        """Tell whether the component has a variable, a parameter, a rate or an end of this name of its own."""
+        declared, head = declarations(self.type), re.split(r"[.\[]", name)[0]
+        if name in table()["ignored"]["variables"].split():
+            return False
+        rates = table()["rates"].get(name, "").split()
+        own = {*declared.fields, *declared.structural, *declared.connectors}
+        return name in own or head in declared.connectors or any(rate in own for rate in rates)
 
     def there(self, name: str) -> str:
         """Return the class's name for one of the component's."""
@@ -94,6 +108,7 @@ def known_classes() -> dict[str, Known]:
     for package, classes in data["classes"].items():
         for name, entry in classes.items():
             rest = {key: value for key, value in entry.items() if key not in _READ}
+            rest["fixed"] = frozenset(entry.get("fixed", "").split())
             names = {**data["names"], **entry.get("names", {}), **entry.get("ports", {})}
             ignored = frozenset([*common, *entry.get("ignore", "").split()])
             path = f"{package}.{name}"

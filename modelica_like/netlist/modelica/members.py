@@ -288,6 +288,8 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
         member.declaration = declared = replace(declared, type=inner.short.base)
         member.text, inner = scope, base
     member.given = member.given.over(constraint, declared.name)
+    if isinstance(inner, Known) and owner.classes.reads(f"{owner.path}.{declared.name}"):
+        inner = owner.classes.text_of(inner.path) or inner
     if not isinstance(inner, ClassText):
         return inner
     if member.part is None:
@@ -390,6 +392,7 @@ def value_of_known(owner: Instance, member: Member, part: Known, name: str, text
     field = declarations(part.type).fields.get(name)
     if field is not None and isinstance(field.default, int | float):
         return Expr("number", (float(field.default),), line)
+    owner.classes.lack(f"{owner.path}.{member.declaration.name}", part.path)
     raise ModelicaTextError(
         f"{member.declaration.name}.{name} has no value that is known here.", where=text.place(line)
     )

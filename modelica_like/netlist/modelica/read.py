@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from modelica_like.errors import ModelicaTextError
+from modelica_like.errors import ModelicaLikeError, ModelicaTextError
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.build import build_component
 from modelica_like.netlist.modelica.classes import Classes, given_libraries
 from modelica_like.netlist.modelica.instance import Given, Instance
+from modelica_like.netlist.modelica.tree import ClassText
 from modelica_like.netlist.modelica.values import Notes
 from modelica_like.netlist.modelica.written import Written
 
@@ -37,13 +38,7 @@ def read_modelica(path: Path, name: str = "", *, table: bool = True) -> tuple[Wr
     """
     classes = Classes(path, table=table)
     text = classes.chosen(name)
-    notes = Notes()
-    try:
-        component = build_component(Instance(classes, text, Given()), notes)
-    except RecursionError:
-        raise ModelicaTextError(
-            "Classes, functions or formulas are nested too deeply.", where=text.place(text.line)
-        ) from None
+    component, notes = _built(classes, text)
     if text.experiment.get("StartTime", 0.0) != 0.0:
         raise ModelicaTextError(
             f"experiment(StartTime = {text.experiment['StartTime']:g}): a model that is read runs from 0 s.",
@@ -60,3 +55,19 @@ def read_modelica(path: Path, name: str = "", *, table: bool = True) -> tuple[Wr
         if isinstance(part, Written):
             inside(part).origin = f"{path.resolve()}:{inside(part).text}"
     return component, notes.told
+
+
+def _built(classes: Classes, text: ClassText) -> tuple[Written, Notes]:
+    """Return the component of a class; a part that a component of ours cannot be is read from its class's own text."""
+    while True:
+        notes, untabled = Notes(), set(classes.untabled)
+        try:
+            return build_component(Instance(classes, text, Given()), notes), notes
+        except RecursionError:
+            raise ModelicaTextError(
+                "Classes, functions or formulas are nested too deeply.", where=text.place(text.line)
+            ) from None
+        except ModelicaLikeError:
+            classes.untabled |= {part for part, path in classes.lacking.items() if classes.text_of(path) is not None}
+            if classes.untabled == untabled or classes.spent:
+                raise

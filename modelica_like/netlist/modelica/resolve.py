@@ -251,6 +251,10 @@ class Resolver:
             if self.numeric:
                 return members.value_of_known(owner, member, part, below, self.text, line)
             fields = declarations(part.type).fields
+            if not part.has(below):
+                owner.classes.lack(f"{owner.path}.{name}", part.path)
+                if owner.classes.text_of(part.path) is not None:
+                    raise members.unknown_name(f"{part.path} has no '{below}' here.", self.text, line)
             for name in table()["rates"].get(below, "").split() if below not in fields else ():
                 if name in fields:
                     return Expr("call", ("der", (Expr("name", ((f"{path}.{name}", ()),), line),), ()), line)
