@@ -137,6 +137,7 @@ class Document:
         return cls.draft(path, trust=trust)
 
     @classmethod
+    @checked
     def draft(cls, path: str | Path, text: str = "", *, trust: bool = False) -> Self:
         """Begin with a text that is being written: it need not be TOML, and no file is read.
 
@@ -172,6 +173,7 @@ class Document:
         with self._trusting():
             return self._keep(apply(state.text, request, file=self.path, files=self.pending))
 
+    @checked
     def together(self, requests: Sequence[Mapping[str, Any]]) -> Document:
         """Do several operations by their names as one, which is undone as one; see `modelica_like.edit.apply`."""
         state, notes = Edited(self.text, (), self.pending), list[str]()
@@ -181,6 +183,7 @@ class Document:
                 notes += state.notes
         return self._keep(Edited(state.text, tuple(notes), state.files))
 
+    @checked
     def write(self, text: str) -> Document:
         """Replace the whole text by one that was typed; it need not be TOML."""
         return self._keep(Edited(text, (), self.pending))

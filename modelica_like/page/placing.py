@@ -162,9 +162,11 @@ def pasted(sheet: Sheet, text: str) -> list[Request]:
 
 
 def unused(name: str, taken: Collection[str]) -> str:
-    """Return a name that is not in use, with a number behind it if it must be."""
-    stem, number = re.sub(r"_?\d+$", "", name) or name, 1
+    """Return a name that is not in use: J2 after J1, shaft_2 after shaft."""
+    stem, mark, digits = re.fullmatch(r"(.*?)(_?)(\d*)", name, re.S).groups()  # type: ignore[union-attr]
+    number, mark = (int(digits), mark) if stem and digits else (1, "_")
+    stem = stem or name
     while name in taken:
         number += 1
-        name = f"{stem}_{number}"
+        name = f"{stem}{mark}{str(number).zfill(len(digits))}"
     return name

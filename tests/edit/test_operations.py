@@ -275,6 +275,42 @@ def test_a_document_is_edited_undone_and_done_again(tmp_path: Path) -> None:
     assert (document.path.name, document.path.read_text()) == ("other.toml", document.text)
 
 
+def test_an_editor_types_and_does_several_operations_as_one(tmp_path: Path) -> None:
+    """Text that is being written need not be TOML; several operations are one step, of which all or none are done."""
+    document = Document.draft(tmp_path / "drive.toml", "[parts")
+    assert (document.text, document.steps) == ("[parts", (0, 0))
+    assert document.problems() != []
+    document.write('[parts]\na = { is = "Inertia", J = 1 }\n')
+    steps = [
+        {"op": "duplicate", "name": "a", "new": "b"},
+        {"op": "connect", "first": "a.flange_b", "second": "b.flange_a"},
+    ]
+    joined = document.together(steps).text
+    assert document.problems() == []
+    assert document.steps == (2, 0)
+    assert document.undo().text == '[parts]\na = { is = "Inertia", J = 1 }\n'
+    assert document.steps == (1, 1)
+    assert document.redo().text == joined
+    with pytest.raises(NetlistError):
+        document.together([{"op": "remove", "name": "a"}, {"op": "rename", "old": "b", "new": "1"}])
+    assert (document.text, document.steps) == (joined, (2, 0))
+    notes = document.together([{"op": "set", "path": "k", "value": 2}, {"op": "set", "path": "a.J", "value": "k"},
+                               {"op": "unset", "path": "k"}, {"op": "remove", "name": "b"}]).notes  # fmt: skip
+    assert notes == ("a.J still uses k.",)
+    assert not (tmp_path / "drive.toml").exists()
+
+
+def test_netlists_of_groups_are_pending_until_they_are_saved(tmp_path: Path) -> None:
+    document = Document.draft(tmp_path / "drive.toml", TEXT).group(["rotor", "shaft"], "line")
+    (file,) = document.pending
+    assert (file, "[expose]" in document.pending[file]) == (tmp_path.resolve() / "line.toml", True)
+    assert document.undo().pending == {}
+    document.redo().save()
+    assert document.pending == {}
+    assert (tmp_path / "line.toml").is_file()
+    assert document.rename("load", "table").pending == {}
+
+
 def test_paths_in_a_sizing_file_are_told(tmp_path: Path) -> None:
     (tmp_path / "checks.toml").write_text('[checks.x]\ntorque = { from = "drive.toml", peak = "shaft.tau" }\n')
     text = 'sizing = "checks.toml"\n' + TEXT

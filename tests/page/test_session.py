@@ -8,6 +8,7 @@ import pytest
 
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.page import Session
+from modelica_like.page.placing import unused
 
 TWO = """[parts]
 a = { is = "Inertia", J = 1, w = 1, phi = 0 }
@@ -94,6 +95,16 @@ def test_parts_are_copied_and_pasted_as_text(session: Session) -> None:
     assert refused(session, "apply", request={"op": "paste", "text": "name = 'x'"}).startswith(
         "What is pasted has no parts."
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "taken", "new"),
+    [("m007", "m007", "m008"), ("J1", "J1", "J2"), ("J1", "J1 J2 J3", "J4"), ("J1", "J2", "J1"),
+     ("shaft", "shaft", "shaft_2"), ("shaft_2", "shaft shaft_2", "shaft_3"), ("J09", "J09", "J10"),
+     ("J09", "J09 J10 J11", "J12"), ("J", "J J1", "J_2")],
+)  # fmt: skip
+def test_the_next_name_is_the_one_that_a_user_expects(name: str, taken: str, new: str) -> None:
+    assert unused(name, taken.split()) == new
 
 
 def test_only_ends_that_fit_are_offered(session: Session) -> None:
