@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import threading
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -19,7 +20,8 @@ from modelica_like.arguments import takes
 from modelica_like.edit.document import OPERATIONS
 from modelica_like.errors import DEFECTS, ModelicaLikeError
 from modelica_like.mcp import answers
-from modelica_like.mcp.tools import ARGUMENTS, OWN, Tools, use
+from modelica_like.mcp.tools import ARGUMENTS, OWN, SECONDS, Tools, too_long, use
+from modelica_like.mcp.turns import Call, Turns
 from modelica_like.trust import confined
 
 _READING = {"netlists", "text", "library", "check", "simulate", "values", "sensitivities", "steady"}
@@ -63,13 +65,22 @@ def answer(tools: Tools, root: Path, name: str, arguments: dict[str, Any]) -> Ca
         with confined(root):
             data, failed = use(tools, name, arguments), False
     except ModelicaLikeError as error:
-        data = {"problems": answers.problems(root, [problem.as_json() for problem in error.problems()])}
-        failed = True
+        return refused(root, error)
     except OSError as error:
         what = f"{Path(error.filename or 'A temporary file').name}: {error.strerror or error}."
         data, failed = {"problems": [{"what": what}]}, True
     except DEFECTS as error:
         data, failed = {"problems": [{"what": f"Internal error: {type(error).__name__}: {error}"}]}, True
+    return _result(data, failed=failed)
+
+
+def refused(root: Path, error: ModelicaLikeError) -> CallToolResult:
+    """Return the answer to what is refused."""
+    problems = answers.problems(root, [problem.as_json() for problem in error.problems()])
+    return _result({"problems": problems}, failed=True)
+
+
+def _result(data: dict[str, Any], *, failed: bool) -> CallToolResult:
     return CallToolResult(content=[TextContent(text=answers.written(data))], is_error=failed)
 
 
@@ -83,14 +94,26 @@ def serve(version: str, folder: Path) -> None:
     Raises:
         NetlistError: there is no such folder.
     """
-    tools, in_turn = Tools(folder), anyio.CapacityLimiter(1)  # a netlist is read, changed and written
+    # One at a time: a netlist is read, changed and written.
+    tools, root, turns, in_turn = Tools(folder), folder.resolve(), Turns[CallToolResult](), anyio.Semaphore(1)
 
     async def on_list_tools(context: Any, params: Any) -> ListToolsResult:
         return ListToolsResult(tools=listed())
 
     async def on_call_tool(context: Any, params: CallToolRequestParams) -> CallToolResult:
-        call = partial(answer, tools, folder.resolve(), params.name, dict(params.arguments or {}))
-        return await run_sync(call, limiter=in_turn)
+        name, arguments = params.name, dict(params.arguments or {})
+        call = Call(
+            partial(answer, tools, root, name, arguments), lambda stop: refused(root, too_long(name, SECONDS, stop))
+        )
+        async with in_turn:
+            turns.add(call)
+            try:
+                with anyio.move_on_after(SECONDS):
+                    return await run_sync(call.answer.result, abandon_on_cancel=True)
+                turns.stop(call)
+                return await run_sync(call.answer.result)
+            finally:
+                turns.stop(call)  # nobody waits for it any more
 
     handlers = {"on_list_tools": on_list_tools, "on_call_tool": on_call_tool}
     server = Server("modelica-like", version=version, instructions=_ABOUT, **handlers)
@@ -100,4 +123,11 @@ def serve(version: str, folder: Path) -> None:
         async with stdio_server() as (read, write):
             await server.run(read, write, server.create_initialization_options())
 
-    anyio.run(main)
+    def speak() -> None:
+        try:
+            anyio.run(main)
+        finally:
+            turns.add(None)
+
+    threading.Thread(target=speak, daemon=True).start()
+    turns.work()

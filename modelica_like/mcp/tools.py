@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -45,7 +44,7 @@ Answer = dict[str, Any]
 _FILES, _TYPES, _TOLD = 200, 40, 3
 """Netlists and types that are listed; problems that an operation tells besides: `check` has all."""
 SECONDS = 120.0
-"""Of a run, after which it is stopped: nobody waits longer for an answer."""
+"""Of a call, after which it is stopped: nobody waits longer for an answer."""
 ARGUMENTS = {
     "file": "path of the netlist in the folder, ending in .toml",
     "suggestion": "of a problem, as check has it",
@@ -109,7 +108,7 @@ class Tools:
         change(*args)
         try:
             document.save()
-        except (ModelicaLikeError, OSError):
+        except (KeyboardInterrupt, ModelicaLikeError, OSError):
             del self._documents[document.path]
             raise
         left = [problem["what"] for problem in netlist_problems(document.path, document.text)]
@@ -181,19 +180,9 @@ class Tools:
     ) -> Answer:  # fmt: skip
         """Simulate a netlist: mode changes, readings, energy balance, what looks like a slip."""
         path = self._path(file, ".toml")
-        text, drive, begin = read_text(path), load(path), time.monotonic()
+        text, drive = read_text(path), load(path)
         how: dict[str, Any] = {"parameters": parameters, "start": start, "readings": readings}
-
-        def watch(reached: float) -> None:
-            if time.monotonic() - begin > SECONDS:
-                raise KeyboardInterrupt
-
-        try:
-            run = simulate(drive, until, progress=watch, **how)
-        except Interrupted as stopped:
-            reached = f" at t = {stopped.run.time[-1]:g} s" if stopped.run else ""
-            what = f"The run took more than {SECONDS:g} s, and was stopped{reached}."
-            raise SolveError(what, advice="Give an earlier end as `until`.") from None
+        run = simulate(drive, until, **how)
         self._runs[path] = text, run
         said = notes(drive, run)
         answer = {**answers.report(run_report(run, show=show)), "readings": _numbers(run, readings)}
@@ -235,6 +224,20 @@ class Tools:
         target = self._path(output, ".svg", ".png", ".pdf")
         save_schematic(load(self._path(file, ".toml")), target)
         return {"written": self._name(target)}
+
+
+def too_long(name: str, seconds: float, interrupt: KeyboardInterrupt) -> SolveError:
+    """Return the error of a tool that was stopped.
+
+    Args:
+        name: of the tool.
+        seconds: that it had.
+        interrupt: by which it was stopped.
+    """
+    run = interrupt.run if isinstance(interrupt, Interrupted) else None
+    reached = f" at t = {run.time[-1]:g} s" if run else ""
+    advice = "Give an earlier end as `until`." if name in ("simulate", "sensitivities") else ""
+    return SolveError(f"{name} took more than {seconds:g} s, and was stopped{reached}.", advice=advice)
 
 
 def _numbers(run: Solution, names: Sequence[str]) -> Answer:

@@ -3,8 +3,11 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import threading
+import time
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,13 +17,13 @@ from typing import Any
 import pytest
 from anyio.from_thread import start_blocking_portal
 from jsonschema import Draft202012Validator
-from mcp import Client, StdioServerParameters, stdio_client
+from mcp import Client, MCPError, StdioServerParameters, stdio_client
 from mcp_types import CallToolResult, Tool
 
-from modelica_like import load, simulate
+from modelica_like import load
 from modelica_like.edit.document import OPERATIONS
-from modelica_like.errors import SolveError
 from modelica_like.mcp import tools
+from modelica_like.mcp.turns import Call, Turns
 from modelica_like.show.report.problems import netlist_problems
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -60,14 +63,23 @@ class Program:
 
 
 @contextmanager
-def program(folder: Path, *words: str) -> Iterator[Program]:
+def program(folder: Path, *words: str, before: str = "", patience: float | None = None) -> Iterator[Program]:
+    """Begin a server, and a client of it.
+
+    Args:
+        folder: of the netlists.
+        words: further arguments of the command.
+        before: Python that the server's process does first.
+        patience: seconds after which the client cancels a call.
+    """
     variables = {"MODELICA_LIKE_CONFIG": os.environ["MODELICA_LIKE_CONFIG"]}
+    code = f"{before}\nfrom modelica_like.cli import main\nmain()"
     command = StdioServerParameters(
-        command=sys.executable, args=["-m", "modelica_like", "mcp", str(folder), *words], env=variables
+        command=sys.executable, args=["-c", code, "mcp", str(folder), *words], env=variables
     )
     with start_blocking_portal() as portal, portal.wrap_async_context_manager(Client(stdio_client(command))) as client:
         listed = portal.call(client.list_tools).tools
-        yield Program(lambda name, arguments: portal.call(client.call_tool, name, arguments), listed)
+        yield Program(lambda name, arguments: portal.call(client.call_tool, name, arguments, patience), listed)
 
 
 @pytest.fixture(scope="module")
@@ -306,13 +318,103 @@ def test_answers_about_examples_are_short(ask: Program, name: str) -> None:
         assert len(json.dumps(answer, ensure_ascii=False)) < LONGEST, tool
 
 
-def test_a_run_that_takes_too_long_is_stopped(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tools, "SECONDS", 0.0)
-    with pytest.raises(SolveError) as caught:
-        tools.Tools(folder).simulate("drive.toml", "1 s")
-    assert caught.value.what.startswith("The run took more than 0 s, and was stopped")
-    assert caught.value.advice == "Give an earlier end as `until`."
-    assert simulate(load(folder / "drive.toml"), "1 s")["J.w"][-1] > 0
+ENDLESS = """[parts]
+wall = { is = "Fixed" }
+shaft = { is = "Spring", c = "1 MN.m/rad", phi_rel = 0 }
+J = { is = "Inertia", J = "1 kg.m2", w = 1 }
+[series]
+x = ["wall", "shaft", "J"]
+"""
+"""Minutes of work, if its end is at 2000 s: 300,000 periods."""
+LONG: dict[str, dict[str, Any]] = {
+    "simulate": {"until": "2000 s"}, "sensitivities": {"until": "2000 s", "readings": ["J.w"]},
+}  # fmt: skip
+
+
+def test_a_call_that_takes_too_long_is_stopped(tmp_path: Path) -> None:
+    (tmp_path / "endless.toml").write_text(ENDLESS, encoding="utf-8")
+    with program(tmp_path, before="from modelica_like.mcp import server; server.SECONDS = 1.5") as ask:
+        ask("library", kind="Inertia")  # what is read at first takes a second
+        for tool, more in LONG.items():
+            said = ask.refused(tool, file="endless.toml", **more)
+            assert said.startswith(f"{tool} took more than 1.5 s, and was stopped")
+        assert " at t = " in ask.refused("simulate", file="endless.toml", until="2000 s")
+        run = ask("simulate", file="endless.toml", until="1 ms", readings=["J.w"])
+        assert run["readings"]["J.w"]["unit"] == "rad/s"
+
+
+def test_a_call_that_is_cancelled_is_stopped(tmp_path: Path) -> None:
+    """Otherwise the next one would wait for it, as one works at a time."""
+    (tmp_path / "endless.toml").write_text(ENDLESS, encoding="utf-8")
+    with program(tmp_path, patience=4.0) as ask:
+        ask("library", kind="Inertia")
+        for tool, more in LONG.items():
+            with pytest.raises(MCPError, match=r"[Tt]imed out"):
+                ask(tool, file="endless.toml", **more)
+        assert ask("set", file="endless.toml", path="J.J", value=3)["changed"]
+
+
+def test_a_run_ends_with_the_program_that_asked_for_it(tmp_path: Path) -> None:
+    (tmp_path / "endless.toml").write_text(ENDLESS, encoding="utf-8")
+    command = [sys.executable, "-m", "modelica_like", "mcp", str(tmp_path)]
+    about = {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "program", "version": "1"}}
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        for message in (
+            {"id": 1, "method": "initialize", "params": about},
+            {"method": "notifications/initialized"},
+            {"id": 2, "method": "tools/call", "params": {"name": "text", "arguments": {"file": "endless.toml"}}},
+            {"id": 3, "method": "tools/call",
+             "params": {"name": "simulate", "arguments": {"file": "endless.toml", "until": "2000 s"}}},
+        ):  # fmt: skip
+            process.stdin.write(json.dumps({"jsonrpc": "2.0", **message}) + "\n")
+            process.stdin.flush()
+        assert [json.loads(process.stdout.readline())["id"] for _ in range(2)] == [1, 2]
+        time.sleep(2.0)  # the run has begun
+        process.stdin.close()
+        assert process.wait(60) == 0
+
+
+def test_only_the_call_that_is_meant_is_stopped() -> None:
+    """An interrupt that comes late meets no other call, and a call that waits is not begun."""
+    turns, begun, done = Turns[int](), threading.Event(), list[int]()
+
+    def endless() -> int:
+        begun.set()
+        while True:
+            time.sleep(0.001)
+
+    def work(number: int) -> Callable[[], int]:
+        return lambda: done.append(number) or number
+
+    def other() -> None:
+        begun.wait()
+        for call in (waits, long, long, waits):
+            turns.stop(call)
+        assert long.answer.result() == -1
+        turns.stop(long)
+        for k in range(200):
+            turns.add(call := Call(work(k), lambda interrupt: -1))
+            if k % 2:
+                call.answer.result()
+            turns.stop(call)  # perhaps while it works
+            assert call.answer.result() in (k, -1)
+        turns.add(None)
+
+    long, waits, last = (Call(what, lambda interrupt: -1) for what in (endless, work(1000), work(2000)))
+    for call in (long, waits, last):
+        turns.add(call)
+    before, thread = signal.getsignal(signal.SIGINT), threading.Thread(target=other)
+    thread.start()
+    try:
+        turns.work()
+    finally:
+        signal.signal(signal.SIGINT, before)
+        thread.join()
+    assert (waits.answer.result(), last.answer.result()) == (-1, 2000)
+    assert 1000 not in done
+    assert {*range(1, 200, 2)} <= {*done}
 
 
 def test_without_the_extra(tmp_path: Path) -> None:

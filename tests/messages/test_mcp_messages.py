@@ -5,8 +5,16 @@ from typing import Any
 
 import pytest
 
-from modelica_like.errors import MissingValue, ModelicaLikeError, NetlistError, UnknownName, ValueOutOfRange
-from modelica_like.mcp.tools import Tools, use
+from modelica_like import simulate
+from modelica_like.errors import (
+    Interrupted,
+    MissingValue,
+    ModelicaLikeError,
+    NetlistError,
+    UnknownName,
+    ValueOutOfRange,
+)
+from modelica_like.mcp.tools import Tools, too_long, use
 from modelica_like.trust import confined
 
 CASES: dict[str, tuple[type[ModelicaLikeError], str, dict[str, Any], str]] = {
@@ -51,3 +59,12 @@ def test_no_folder(tmp_path: Path) -> None:
     with pytest.raises(NetlistError) as caught:
         Tools(tmp_path / "nowhere")
     assert str(caught.value) == f"'{tmp_path / 'nowhere'}' is not a folder."
+
+
+def test_a_call_that_was_stopped(tmp_path: Path) -> None:
+    (tmp_path / "drive.toml").write_text('[parts]\nJ = { is = "Inertia", J = 1, phi = 0, w = 0 }\n', encoding="utf-8")
+    run = simulate(tmp_path / "drive.toml", "0.5 s")
+    assert str(too_long("simulate", 120.0, Interrupted.after(run))) == (
+        "simulate took more than 120 s, and was stopped at t = 0.5 s.\nGive an earlier end as `until`."
+    )
+    assert str(too_long("steady", 120.0, KeyboardInterrupt())) == "steady took more than 120 s, and was stopped."
