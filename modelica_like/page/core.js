@@ -88,9 +88,9 @@ function placeOf(problem) {
 
 /* A small dialog with a form; resolves to its values, or null. */
 function question(title, fields, action = "OK", about = "") {
-  const inputs = fields.map(({ name, label, value = "", choices }) => {
+  const inputs = fields.map(({ name, label, value = "", choices, hint = "" }) => {
     const input = choices ? element("select", { name }, ...choices.map((one) => element("option", { value: one }, one)))
-      : element("input", { name, autocomplete: "off", spellcheck: false });
+      : element("input", { name, autocomplete: "off", spellcheck: false, placeholder: hint });
     input.value = value || input.value;
     return element("label", {}, label, input);
   });

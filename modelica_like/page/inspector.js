@@ -83,10 +83,10 @@ function slider(path) {
   range.value = positionOf(known, results.given.get(path) ?? known.value);
   const number = () => Number(valueAt(known, range.valueAsNumber).toPrecision(4));
   range.oninput = () => { const field = range.parentNode.querySelector("input:not([type])");
-  if (field) field.value = `${number()} ${known.written === "1" ? "" : known.written}`.trim();
+  if (field) field.value = inUnit(known, number());
   tryValue(path, number()); };
   range.onchange = async () => {
-    const value = number(), why = await put(path, known.written === "1" ? String(value) : `${value} ${known.written}`);
+    const why = await put(path, inUnit(known, number()));
     if (why) tell(new Error(why));
   };
   return [range];

@@ -9,7 +9,7 @@ let running = null, modelling = 0;
 /* ---- the model of the present text ---- */
 
 async function model() {
-  const mine = ++modelling, { revision } = page;
+  const mine = ++modelling, { revision, text } = page;
   running?.abort();
   if (!page.valid || !Object.keys(parts()).length) return noRun(page.valid ? "" : "The last run stays until the text is valid again.");
   const answer = await ask("model", { revision, shown: results.shown }).catch((error) => ({ problems: [],
@@ -20,7 +20,7 @@ async function model() {
   mark();
   paint();
   if (!answer.content) { inspect(); return noRun(answer.failed ?? ""); }
-  Object.assign(results, { content: answer.content, revision, given: new Map() });
+  Object.assign(results, { content: answer.content, revision, text, given: new Map() });
   results.shown = answer.content.variables.filter((one) => one.shown).map((one) => one.name);
   at("until").value = short(endTime().value);
   at("names").replaceChildren(...answer.content.variables.map((one) => element("option", { value: one.name })));

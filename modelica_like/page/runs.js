@@ -26,16 +26,26 @@ function minus(run, variable) {
   return answer;
 }
 
+/* What was changed in a kept run: values of sliders, or lines that the present netlist does not have. */
+function changesOf(one) {
+  const now = new Set(page.text.split("\n"));
+  const lines = (one.text ?? page.text).split("\n").filter((line) => line.trim() && !now.has(line));
+  return [...[...one.change ?? []].map(([path, text]) => `${path} = ${text}`), ...lines].join("; ");
+}
+
 function listRuns() {
   const rows = kept.map((one) => {
     const box = element("input", { type: "checkbox", checked: one.on, ariaLabel: `draw ${one.name}` });
     box.onchange = () => { one.on = box.checked; drawCurves(); };
-    const remove = element("button", { className: "quiet", ariaLabel: `Remove ${one.name}` }, "×");
-    remove.onclick = () => { kept.splice(kept.indexOf(one), 1); listRuns(); drawCurves(); };
-    const more = one.columns ? [element("button", { className: "quiet" }, "Columns …")] : [];
-    if (more.length) more[0].onclick = () => columnsOf(one);
-    return element("span", { className: "kept", title: one.about }, element("label", {}, box, one.name), ...more,
-      remove);
+    const button = (text, action, about = "") => { const made = element("button", { className: "quiet",
+      title: about }, text); made.onclick = () => action(one); return made; };
+    const remove = () => { kept.splice(kept.indexOf(one), 1); listRuns(); drawCurves(); }, changes = changesOf(one);
+    const more = one.columns ? [button("Columns …", columnsOf), button("Calibrate …", calibrateWith)]
+      : changes ? [button("Take over", takeOver, "The netlist becomes that of this run")] : [];
+    const off = button("×", remove);
+    off.ariaLabel = `Remove ${one.name}`;
+    return element("span", { className: "kept", title: [one.about, changes].filter(Boolean).join("\n") },
+      element("label", {}, box, one.name), element("small", {}, changes), ...more, off);
   });
   if (kept.length) {
     const box = element("input", { type: "checkbox", checked: difference });
@@ -47,11 +57,12 @@ function listRuns() {
 
 async function keepRun() {
   if (!results.run) return;
-  const about = [...results.given].map(([path, value]) => `${path} = ${short(value)}`).join(", ");
-  const answer = await question("Keep this run", [{ name: "name", label: "Name", value: about ||
-    `run ${kept.length + 1}` }], "Keep");
+  const { run, text } = results, change = new Map([...results.given].map(([path, value]) => [path,
+    inUnit(results.content.sliders.find((known) => known.name === path), value)]));
+  const answer = await question("Keep this run", [{ name: "name", label: "Name", value: `run ${kept.length + 1}` }],
+    "Keep");
   if (!answer?.name) return;
-  kept.push({ name: answer.name, run: results.run, on: true, about: about || `revision ${page.revision}` });
+  kept.push({ name: answer.name, run, text, change, on: true, about: "" });
   listRuns();
   drawCurves();
 }
@@ -71,52 +82,70 @@ function readCsv(text) {
     unit: /\[(.*)\]/.exec(title)?.[1] ?? "", values: body.map((row) => number(row[k])) }));
 }
 
+/* The text of a file: UTF-16 or UTF-8 by its mark, or else UTF-8, or what Windows writes. */
+async function textOf(file) {
+  const bytes = new Uint8Array(await file.arrayBuffer()), mark = bytes[0] * 256 + bytes[1];
+  const coding = { 0xfffe: "utf-16le", 0xfeff: "utf-16be" }[mark];
+  if (coding) return new TextDecoder(coding).decode(bytes);
+  try { return new TextDecoder("utf-8", { fatal: true }).decode(bytes); } catch {
+    return new TextDecoder("windows-1252").decode(bytes);
+  }
+}
+
 async function measured(file) {
-  let columns;
-  try { columns = readCsv(await file.text()); } catch (error) { return tell(error); }
-  const first = columns.find((one) => /^(t|time|zeit)$/i.test(one.name)) ?? columns[0];
-  const one = { name: file.name, on: true, about: "measured values", columns, time: first, shift: 0, factor: 1,
-    pairs: new Map() };
-  for (const column of columns) if (results.content?.variables.some((known) =>
-    known.name === column.name)) one.pairs.set(column.name, { column, factor: 1 });
-  arranged(one);
-  kept.push(one);
-  listRuns();
-  drawCurves();
-  if (!one.pairs.size) columnsOf(one);
-  else for (const name of one.pairs.keys()) if (!results.shown.includes(name)) toggleCurve(name);
+  if (results.revision < 0) return say("It must be possible to run the drive before curves are laid over it.", "refused");
+  try {
+    const columns = readCsv(await textOf(file));
+    const time = columns.find((one) => /^(t|time|zeit)$/i.test(one.name)) ?? columns[0];
+    const known = columns.filter((one) => one !== time && results.content.variables.some((two) => two.name === one.name));
+    const one = { name: file.name, on: true, about: "measured values", columns, time, timeUnit: time.unit, shift: 0,
+      pairs: new Map(known.map((column) => [column.name, { column, unit: column.unit }])) };
+    await arranged(one);
+    kept.push(one);
+    listRuns();
+    drawCurves();
+    if (!one.pairs.size) return await columnsOf(one);
+    for (const name of one.pairs.keys()) if (!results.shown.includes(name)) await toggleCurve(name);
+  } catch (error) { tell(error); }
 }
 
-function arranged(one) {
-  const times = one.time.values.map((value) => value * one.factor + one.shift), order = times.map((_, k) =>
-    k).filter((k) => Number.isFinite(times[k])).sort((a, b) => times[a] - times[b]);
-  one.run = { times: Float64Array.from(order, (k) => times[k]), own: new Map([...one.pairs].map(([name, { column,
-    factor }]) => [name, Float64Array.from(order, (k) => column.values[k] * factor)])) };
+/* Sorts rows by time; has the values in SI units, and as they are drawn: in the shown unit, with its sign. */
+async function arranged(one) {
+  const names = [...one.pairs.keys()], units = [["time", one.timeUnit], ...[...one.pairs].map(([name, { unit }]) => [name,
+    unit])];
+  const [[second, zero], ...scales] = await ask("scale", { revision: results.revision, units });
+  const times = one.time.values.map((value) => value * second + zero + one.shift);
+  const order = times.map((_, k) => k).filter((k) => Number.isFinite(times[k])).sort((a, b) => times[a] - times[b]);
+  const column = (name, k) => order.map((n) => one.pairs.get(name).column.values[n] * scales[k][0] + scales[k][1]);
+  one.measured = new Map(names.map((name, k) => [name, column(name, k)]));
+  const drawn = names.map((name) => {
+    const known = results.content.variables.find((two) => two.name === name), unit = results.content.units[known.unit];
+    return [name, Float64Array.from(one.measured.get(name), (si) => known.driving * (si - unit.offset) / unit.factor)];
+  });
+  one.run = { times: Float64Array.from(order, (k) => times[k]), own: new Map(drawn) };
 }
 
-/* Which column is which variable, in what unit, and how time is shifted; handed to calibrate as Python. */
+/* Which column is which variable, in what unit, and how time is shifted. */
 async function columnsOf(one) {
-  const titles = one.columns.map((column) => column.title), shownNames = results.shown, none = "—";
-  const pair = [...one.pairs], fields = [{ name: "time", label: "Time", choices: titles, value: one.time.title },
-    { name: "factor", label: "Seconds per unit of time", value: String(one.factor) },
+  const titles = one.columns.map((column) => column.title), none = "—", column = (title) => one.columns.find((two) =>
+    two.title === title);
+  const fields = [{ name: "time", label: "Time", choices: titles, value: one.time.title },
+    { name: "unit", label: "Unit of time", value: one.timeUnit, hint: "s" },
     { name: "shift", label: "Shift in s", value: String(one.shift) },
-    ...shownNames.flatMap((name) => {
-      const mine = pair.find(([key]) => key === name)?.[1],
-        unit = results.content.units[results.content.variables.find((v) => v.name === name)?.unit]?.text || "1";
+    ...wanted().flatMap(({ name, unit }) => {
+      const mine = one.pairs.get(name), text = results.content.units[unit]?.text;
       return [{ name: `c:${name}`, label: name, choices: [none, ...titles], value: mine?.column.title ?? none },
-        { name: `f:${name}`, label: `${name}: ${unit} per unit of the column`, value: String(mine?.factor ?? 1) }];
+        { name: `u:${name}`, label: `Unit of that column (shown in ${text || "1"})`, value: mine?.unit ?? "",
+          hint: "that of its title, or SI" }];
     })];
-  const names = [...one.pairs.values()].map(({ column }) => column.title).join(", ") || "…";
-  const about = `For calibrate: Trajectories("${one.name}") with the columns ${names}, in calibrate("${page.file}", [measured], {"part.value": (low, high)}).`;
-  const answer = await question(`Columns of ${one.name}`, fields, "Draw", about);
+  const answer = await question(`Columns of ${one.name}`, fields, "Draw",
+    "More variables: draw their curves first. Calibrate … in the list of runs finds values that fit.");
   if (!answer) return;
-  Object.assign(one, { time: one.columns.find((column) => column.title === answer.time),
-    factor: Number(answer.factor) || 1, shift: Number(answer.shift) || 0 });
-  one.pairs = new Map(shownNames.filter((name) => answer[`c:${name}`] !== none).map((name) => [name,
-    { column: one.columns.find((column) => column.title === answer[`c:${name}`]),
-      factor: Number(answer[`f:${name}`]) || 1 }]));
-  arranged(one);
-  drawCurves();
+  const chosen = wanted().filter(({ name }) => answer[`c:${name}`] !== none).map(({ name }) => [name,
+    { column: column(answer[`c:${name}`]), unit: answer[`u:${name}`] || column(answer[`c:${name}`]).unit }]);
+  const next = { ...one, time: column(answer.time), timeUnit: answer.unit, shift: Number(answer.shift.replace(",", ".")) ||
+    0, pairs: new Map(chosen) };
+  await arranged(next).then(() => { Object.assign(one, next); listRuns(); drawCurves(); }, tell);
 }
 
 function listenToRuns() {
@@ -142,3 +171,5 @@ function listenToRuns() {
   new ResizeObserver(() => results.picture && results.picture.width !== at("curves").clientWidth &&
     drawCurves()).observe(at("curves"));
 }
+
+listeners.push(() => listRuns());

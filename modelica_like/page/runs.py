@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.analyse.calibration.calibrate import calibrate
+from modelica_like.analyse.calibration.measurements import Measurement, Residuals, Trajectories
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import ModelicaLikeError
+from modelica_like.errors import Interrupted, ModelicaLikeError
 from modelica_like.language import Assembly
+from modelica_like.language.units import parse_unit, to_si
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.library import OK
 from modelica_like.native.model import Instance
@@ -202,10 +205,71 @@ class Runs:
         except ModelicaLikeError:
             return []  # its part has gone
 
+    def scales(self, units: Sequence[tuple[str, str]]) -> list[tuple[float, float]]:
+        """Return the factor and the offset from each unit to the SI unit of a variable, a formula or `time`.
+
+        Raises:
+            UnitError, UnknownName: it does not fit, or there is no such variable.
+        """
+        rows: list[tuple[float, float]] = []
+        for name, text in units:
+            unit = parse_unit("s" if name == "time" else read_signals(self._model, [name])[0].unit)
+            zero, one = (to_si(f"{k} {text}" if text else float(k), unit, name) for k in (0, 1))
+            rows.append((one - zero, zero))
+        return rows
+
+    def calibrated(
+        self, values: Sequence[tuple[int, float]], time: Sequence[float], columns: Mapping[str, Sequence[float]],
+        free: Mapping[str, tuple[float, float]], wanted: Callable[[], bool],
+    ) -> dict[str, Any] | None:  # fmt: skip
+        """Find the parameters with which the drive fits measured curves best.
+
+        Args:
+            values: value references of parameters and inputs, with what they are, in SI units.
+            time: in s; what was measured before 0 s is left out.
+            columns: measured variables in SI units, shape (len(time),); nan is a gap.
+            free: lower and upper bound of each parameter in SI units.
+            wanted: tells whether the answer is still wanted.
+
+        Returns:
+            `values`, names with numbers in SI units, and `text`, which says how well they are known. None: not wanted.
+
+        Raises:
+            ModelicaLikeError: they cannot be found.
+        """
+        times, tables = np.array(time), dict[bytes, dict[str, Vector]]()
+        for name, column in columns.items():
+            there = np.isfinite(column) & (times >= 0.0)
+            if there.any():  # one run for all columns with the same gaps
+                tables.setdefault(there.tobytes(), {"time": times[there]})[name] = np.array(column)[there]
+        data = [_Watched(Trajectories(table), wanted) for table in tables.values()]
+        try:
+            with self._analysing:
+                fit = calibrate(self.changed(values), data, free)
+        except Interrupted:
+            return None
+        return {"values": [(name, float(value)) for name, value in zip(fit.names, fit.values, strict=True)],
+                "text": str(fit)}  # fmt: skip
+
     def starts(self) -> list[dict[str, Any]]:
         """Return start values in SI units, with their origins."""
         rows = start_values(self._drive, self._model, self._model.settings.get("start", "given"))
         return [{"path": r.path, "value": float(r.value), "unit": r.unit, "origin": r.origin} for r in rows]
+
+
+class _Watched(Measurement):
+    """A measurement of a calibration that ends when nobody waits for it any more."""
+
+    def __init__(self, measured: Measurement, wanted: Callable[[], bool]) -> None:
+        self._measured, self._wanted = measured, wanted
+
+    def check(self, names: Sequence[str]) -> None:
+        self._measured.check(names)
+
+    def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
+        if not self._wanted():
+            raise Interrupted
+        return self._measured.residuals(model, names)
 
 
 def number(value: Any) -> float:

@@ -42,7 +42,20 @@ _PLACES = 16
 _WRONG = (ArithmeticError, AttributeError, KeyError, RecursionError, TypeError, ValueError)
 """What a request that is no JSON, or has other content than expected, ends in."""
 _HERE = Path(__file__).parent
-_SCRIPTS = ("core", "picture", "hand", "palette", "inspector", "table", "text", "results", "runs", "files", "start")
+_SCRIPTS = (
+    "core",
+    "picture",
+    "hand",
+    "palette",
+    "inspector",
+    "table",
+    "text",
+    "results",
+    "runs",
+    "fitting",
+    "files",
+    "start",
+)
 """The scripts of the page, in their order."""
 
 
@@ -159,7 +172,7 @@ class _Handler(BaseHTTPRequestHandler):
     disable_nagle_algorithm = True
     _asked: ClassVar = frozenset((
         "state", "apply", "text", "undo", "redo", "model", "ranking", "starts", "instant", "palette", "kind", "fits",
-        "copy", "complete", "explain", "save", "export", "watch", "take", "trust", "open", "back",
+        "copy", "complete", "explain", "scale", "save", "export", "watch", "take", "trust", "open", "back",
     ))  # fmt: skip
     """Methods of `Session` that a page may call."""
 
@@ -182,7 +195,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not self._known(self.headers.get("X-Token", "")):
             return
         what = self.path[1:]
-        if what not in (*self._asked, "run") or not size.isdecimal() or int(size) > _LARGEST:
+        if what not in (*self._asked, "run", "calibrate") or not size.isdecimal() or int(size) > _LARGEST:
             self._answer(HTTPStatus.NOT_FOUND, b"There is nothing here.")
             return
         body = self.rfile.read(int(size))
@@ -191,9 +204,10 @@ class _Handler(BaseHTTPRequestHandler):
             request = json.loads(body)
             if what == "run":
                 self._run(request)
-            else:
-                answer = getattr(self.server.session, what)(request)
-                self._answer(HTTPStatus.OK, json.dumps(answer, default=str).encode(), "application/json")
+                return
+            awaited = (self._waits,) if what == "calibrate" else ()
+            answer = getattr(self.server.session, what)(request, *awaited)
+            self._answer(HTTPStatus.OK, json.dumps(answer, default=str).encode(), "application/json")
         except ModelicaLikeError as error:
             # Told in the page, with an answer that browsers do not report as a failure.
             message = " ".join(filter(None, (error.what, error.why, error.advice)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -157,6 +158,18 @@ class Session:
         time = min(max(number(request["time"]), float(run.time[0])), float(run.time[-1]))
         shown = running(drawn, run, at=time, flow=True)
         return {"picture": svg(drawn, self.desk.path.stem, background=False, handles=True, run=shown)}
+
+    def scale(self, request: Request) -> list[tuple[float, float]]:
+        """Return by which factors and offsets numbers in other units are numbers in SI units."""
+        return self.runs(request).scales([(str(name), str(unit)) for name, unit in request["units"]])
+
+    def calibrate(self, request: Request, wanted: Callable[[], bool]) -> dict[str, Any] | None:
+        """Return the values that fit measured curves best; None if they are not wanted any more."""
+        runs, free = self.runs(request), {str(name): (number(low), number(high)) for name, low, high in request["free"]}
+        time = [number(one) for one in request["time"]]
+        columns = {str(name): [math.nan if one is None else number(one) for one in column]
+                   for name, column in request["columns"]}  # fmt: skip
+        return runs.calibrated(runs.values(request), time, columns, free, wanted)
 
     # -- what can be put there ---------------------------------------------------------------------------------------
 

@@ -2,7 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
+
+READY = "() => document.querySelector('#trail h1')"
+"""The page has its netlist."""
+
+
+@contextmanager
+def using(browser: Any, server: Any) -> Iterator[Hand]:
+    """Open the page of a server; nothing must be written to the console, and nothing asked for elsewhere."""
+    browser.open(server.address, 1400, 900, ready=READY)
+    hand = Hand(browser)
+    hand.wait()
+    yield hand
+    assert [one for one in browser.complaints if not one.startswith(server.address[:20])] == []
 
 
 class Hand:
@@ -99,6 +114,12 @@ class Hand:
             self.page.mouse.click(*self.browser.run(place))
         else:
             self.page.locator("#sheet").click(position={"x": 8, "y": 8})
+        self.wait()
+
+    def write(self, text: str) -> None:
+        """Type another text."""
+        self.page.fill("#text", text)
+        self.page.locator("#text").blur()
         self.wait()
 
     def rename(self, name: str) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hand import Hand
+from hand import READY, Hand
 from pages import serving
 
 from modelica_like import load
@@ -15,7 +15,6 @@ from modelica_like.language import Assembly
 from modelica_like.page import Session
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-READY = "() => document.querySelector('#trail h1')"
 
 
 def flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:

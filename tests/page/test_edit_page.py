@@ -6,14 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hand import Hand
+from hand import READY, Hand, using
 from pages import serving
 
 from modelica_like import simulate
 from modelica_like.page import PageServer, Session
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-READY = "() => document.querySelector('#trail h1')"
 TEXT = (EXAMPLES / "machine_tool_startup.toml").read_text()
 FIELDS = [
     ("J1.J", "-1"), ("J1.J", "three"), ("J1.J", "1 N.m"), ("J1.J", "1 furlong"), ("J1.J", "1/"), ("J1.J", "1e999"),
@@ -46,17 +45,8 @@ def server(tmp_path: Path) -> Iterator[PageServer]:
 
 @pytest.fixture
 def hand(browser: Any, server: PageServer) -> Iterator[Hand]:
-    browser.open(server.address, 1400, 900, ready=READY)
-    made = Hand(browser)
-    made.wait()
-    yield made
-    assert [one for one in browser.complaints if not one.startswith(server.address[:20])] == []
-
-
-def write(hand: Hand, text: str) -> None:
-    hand.page.fill("#text", text)
-    hand.page.locator("#text").blur()
-    hand.wait()
+    with using(browser, server) as made:
+        yield made
 
 
 @pytest.mark.browser
@@ -75,7 +65,7 @@ def test_thirty_mistakes_are_told_and_taken_back(hand: Hand) -> None:
     parts = hand.page.locator("#sheet .part").count()
     for old, new in TEXTS:
         assert old in TEXT
-        write(hand, TEXT.replace(old, new, 1))
+        hand.write(TEXT.replace(old, new, 1))
         assert hand.page.locator("#problems li").count() > 0, new
         assert hand.page.locator("#sheet .part").count() >= parts
         valid = hand.browser.run("page.valid")
@@ -101,7 +91,7 @@ def test_a_part_is_clicked_or_dragged_onto_a_line(hand: Hand) -> None:
 
 @pytest.mark.browser
 def test_a_suggestion_is_applied_by_one_click(hand: Hand) -> None:
-    write(hand, TEXT.replace('is = "Inertia"', 'is = "Inertai"', 1))
+    hand.write(TEXT.replace('is = "Inertia"', 'is = "Inertai"', 1))
     assert hand.page.locator(".marked").inner_text() == "Inertai"
     hand.page.get_by_role("button", name="Write 'Inertia'").click()
     assert hand.text == TEXT
@@ -137,7 +127,7 @@ x = ["m", "a"]
 @pytest.mark.parametrize("button", SUGGESTED)
 def test_every_kind_of_suggestion_is_a_button(hand: Hand, button: str) -> None:
     text, reached = SUGGESTED[button]
-    write(hand, text)
+    hand.write(text)
     hand.page.get_by_role("button", name=button, exact=True).click()
     hand.wait()
     hand.until(reached)
@@ -254,16 +244,14 @@ def test_payloads_are_text_in_every_field(browser: Any, hand: Hand) -> None:
         hand.page.locator("#inspector .name").fill(payload)
         hand.page.locator("#inspector .name").press("Enter")
         hand.wait()
-        write(
-            hand, TEXT.replace("[parts]", f"# {payload}\n[parts]\n'{payload}' = {{ is = '''{payload}''', J = 1 }}", 1)
-        )
+        hand.write(TEXT.replace("[parts]", f"# {payload}\n[parts]\n'{payload}' = {{ is = '''{payload}''', J = 1 }}", 1))
         table = f"time,{payload}\n0,1\n1,2\n"
         hand.page.set_input_files(
             "#csv", {"name": f"{payload[:20].replace('/', '')}.csv", "mimeType": "text/csv", "buffer": table.encode()}
         )
         hand.page.locator("#dialog button").first.wait_for()
         hand.page.keyboard.press("Escape")
-        write(hand, TEXT)
+        hand.write(TEXT)
         hand.wait()
         assert browser.run("window.hacked === undefined")
         assert browser.run("document.querySelectorAll('script:not([type])').length") == 1

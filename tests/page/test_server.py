@@ -193,6 +193,13 @@ def test_sensitivities_follow_the_values(page: PageServer) -> None:
     assert len(found) > 3
 
 
+def test_a_calibration_that_nobody_waits_for_ends(page: PageServer) -> None:
+    asked = request(page, []) | {"time": [0.5, 1.0], "columns": [["J1.w", [1.0, None]]], "free": [["J1.J", 0.1, 2.0]]}
+    looks = iter([True, True, False])
+    assert page.session.calibrate(asked, lambda: next(looks)) is None
+    assert next(looks, "all were taken") == "all were taken"
+
+
 def test_what_is_saved_is_the_changed_drive(page: PageServer, tmp_path: Path) -> None:
     asked = request(page, [], J1__J=2.0)
     endings = {"netlist": "toml", "FMU": "fmu", "report": "html", "picture": "svg"}
