@@ -10,7 +10,14 @@ from functools import partial
 from typing import Any, ClassVar
 
 from modelica_like.arguments import checked
-from modelica_like.errors import DuplicateName, ModelicaLikeError, Source, WrongConnection, raise_together_or_one
+from modelica_like.errors import (
+    DuplicateName,
+    LanguageError,
+    ModelicaLikeError,
+    Source,
+    WrongConnection,
+    raise_together_or_one,
+)
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, unknown
 from modelica_like.language.equation import Equations, connect, free, series
@@ -60,11 +67,15 @@ class Assembly(Component):
         """Declare a parameter of the assembly; its unit is that of its value.
 
         Raises:
+            LanguageError: no formula could name it.
             DuplicateName: the name is in use, also as that of a constant in formulas.
         """
+        refused = f"{self.label}: a parameter cannot be called '{name}'."
+        if name.startswith("_") or not name.isidentifier():
+            raise LanguageError(refused, advice="A name is a letter, then letters, digits and _.")
         if name in CONSTANTS:
             raise DuplicateName(
-                f"{self.label}: a parameter cannot be called '{name}'.",
+                refused,
                 why=f"In a formula, {name} is always {CONSTANTS[name]:.7g}….", advice="Choose another name.",
             )  # fmt: skip
         field: Parameter = param("*", default=value)

@@ -149,6 +149,11 @@ An FMU is run by run_fmu(…) in Python, and by `compare` and `report` on the co
         "Brackets or keys are nested too deeply for a netlist.\n  in bad.toml:1",
     ),
     "too large": ("[" * 10_000_000, "'bad.toml' is larger than 2 MB, the limit for netlists.\n  in bad.toml"),
+    "a parameter that no formula could name": (
+        '[parameters]\n"J[1]" = 3\n[parts]\na = { is = "Inertia", J = 1 }\n',
+        "bad: a parameter cannot be called 'J[1]'.\n  in bad.toml:2 `\"J[1]\" = 3`\n"
+        "A name is a letter, then letters, digits and _.",
+    ),
     "a parameter with the name of a constant": (
         '[parameters]\npi = 3\nval = "pi"\n[parts]\na = { is = "Inertia", J = "val" }\n',
         "bad: a parameter cannot be called 'pi'.\n"
