@@ -1,4 +1,4 @@
-"""The page in a browser: mistakes, curves, keys, other editors, hostile names, and clicks without a meaning."""
+"""The page in a browser: mistakes, curves, keys, other editors, and clicks without a meaning."""
 
 import random
 from collections.abc import Iterator
@@ -29,11 +29,6 @@ TEXTS = [
     ("[parts]", '[parts]\nnew = { is = "Clutch" }'), ("[parts]", '[parts]\nnew = { is = "Inertia", J = 1, K = 2 }'),
     ("[parts]", '[start]\n"J1.x" = 1\n[parts]'), ("[parts]", '[parts]\nnew = { is = "Inertia", count = -1, J = 1 }'),
 ]  # fmt: skip
-PAYLOADS = (
-    "<script>window.hacked=1</script>", "<img src=x onerror=window.hacked=1>", "\"><svg onload=window.hacked=1>",
-    "</textarea></style></pre><script>window.hacked=1</script>", "'-window.hacked=1-'", "{{content}}{{script}}",
-    "]]><script>window.hacked=1</script>", "javascript:window.hacked=1",
-)  # fmt: skip
 
 
 @pytest.fixture
@@ -227,36 +222,6 @@ def test_completion_and_explanation(hand: Hand) -> None:
     assert "Inertia" in hand.page.locator("#words li b").all_inner_texts()
     hand.page.keyboard.press("Escape")
     assert hand.page.locator("#words li:visible").count() == 0
-
-
-@pytest.mark.browser
-def test_payloads_are_text_in_every_field(browser: Any, hand: Hand) -> None:
-    for payload in PAYLOADS:
-        hand.select("")
-        hand.type("description", payload)
-        hand.page.fill("#search", payload)
-        hand.page.fill("#add", payload)
-        hand.page.locator("#add").press("Enter")
-        hand.page.fill("#until", payload)
-        hand.page.locator("#until").press("Enter")
-        hand.select("J1")
-        hand.type("J1.J", payload)
-        hand.page.locator("#inspector .name").fill(payload)
-        hand.page.locator("#inspector .name").press("Enter")
-        hand.wait()
-        hand.write(TEXT.replace("[parts]", f"# {payload}\n[parts]\n'{payload}' = {{ is = '''{payload}''', J = 1 }}", 1))
-        table = f"time,{payload}\n0,1\n1,2\n"
-        hand.page.set_input_files(
-            "#csv", {"name": f"{payload[:20].replace('/', '')}.csv", "mimeType": "text/csv", "buffer": table.encode()}
-        )
-        hand.page.locator("#dialog button").first.wait_for()
-        hand.page.keyboard.press("Escape")
-        hand.write(TEXT)
-        hand.wait()
-        assert browser.run("window.hacked === undefined")
-        assert browser.run("document.querySelectorAll('script:not([type])').length") == 1
-        assert browser.run("document.querySelector('img, [onload], [onerror]')") is None
-    browser.complaints.clear()
 
 
 def clicks(hand: Hand, number: int, seed: int) -> None:
