@@ -55,7 +55,7 @@ class Browser:
         self.page.screenshot(path=path)
 
 
-def _program() -> str:
+def program() -> str:
     named = os.environ.get("BROWSER_FOR_TESTS")
     return named or next((found for name in _NAMES if (found := shutil.which(name))), "")
 
@@ -63,11 +63,11 @@ def _program() -> str:
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Any]:
     """The program. Without one, tests are skipped; but not in continuous integration, which must have one."""
-    program = _program()
-    if not program:
+    path = program()
+    if not path:
         (pytest.fail if os.environ.get("CI") else pytest.skip)(_MISSING)
     with sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=program, args=[*_FLAGS])
+        launched = playwright.chromium.launch(executable_path=path, args=[*_FLAGS])
         yield launched
         launched.close()
 

@@ -30,7 +30,7 @@ LONG = ("cosimulate", "fmu_in_importers")
 def command(line: str) -> None:
     words = shlex.split(line, comments=True)[1:]
     if words[0] in ("explore", "edit"):  # would wait for a browser
-        with PageServer(Session(load(words[1]))) as server:
+        with PageServer(Session(load(words[1]) if words[0] == "explore" else Path(words[1]))) as server:
             assert server.address.startswith("http://127.0.0.1")
         return
     result = called(words)
