@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any
 
 from modelica_like.errors import ModelicaLikeError
-from modelica_like.language import Assembly, Component, Input, Output
+from modelica_like.language import Assembly, Component, Input, Output, Parameter
 from modelica_like.language.declared import Connector
 from modelica_like.language.fields import Field
 from modelica_like.language.inside import declarations, inside
@@ -65,10 +65,18 @@ def owner_of(part: type[Component] | Component) -> Owner:
     kind = part if isinstance(part, type) else type(part)
     if isinstance(part, Assembly):
         about = f"{inside(part).name}\n\n{inside(part).description}"
-        values = {name: {"description": field.description} for name, field in part.fields.items()}
+        values = {name: {"description": field.description, "default": _written(field)} for name, field in
+                  part.fields.items()}  # fmt: skip
         return Owner(kind, about.strip(), part.fields, part.connectors, part.parts, values)
     known = declarations(kind)
     return Owner(kind, about_type(kind), known.fields, known.connectors, known.parts, properties_of(kind))
+
+
+def _written(field: Field) -> Any:
+    """Return what a netlist gives a parameter, which is its default where the netlist is used as a part."""
+    return (
+        field.default if isinstance(field, Parameter) and isinstance(field.default, bool | float | int | str) else None
+    )
 
 
 def about_type(kind: type[Component]) -> str:

@@ -273,8 +273,9 @@ function startsOf(name, table, known) {
 let startsOpen = false;
 async function loadStarts() {
   if (startRows.revision === page.revision || !results.content) return;
-  startRows.revision = page.revision;
-  const rows = await ask("starts", { revision: page.revision }).catch(() => []);
+  const revision = startRows.revision = page.revision;
+  const rows = await ask("starts", { revision }).catch(() => []); // why is told where the drive does not run
+  if (!rows.length && startRows.revision === revision) startRows.revision = -1; // it was asked too early
   startRows.rows = new Map(rows.map((one) => [one.path, one]));
   if (rows.length) inspect();
 }

@@ -100,6 +100,7 @@ function drawCurves() {
 }
 
 async function toggleCurve(name) {
+  if (!results.content) return;
   const known = results.shown.includes(name);
   results.shown = known ? results.shown.filter((one) => one !== name) : [...results.shown, name];
   if (!known && !results.content.variables.some((one) => one.name === name)) return model(); // a formula

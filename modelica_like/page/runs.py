@@ -24,7 +24,7 @@ from modelica_like.runs.signals import Signal, read_signals
 from modelica_like.runs.solution import Solution
 from modelica_like.show.browser.page import page_content
 from modelica_like.show.plot import for_page
-from modelica_like.show.report.start import start_values
+from modelica_like.show.report.start import other_values, start_values
 from modelica_like.simulation import build, plan, simulate
 
 _MOST_BARS = 12
@@ -253,7 +253,8 @@ class Runs:
 
     def starts(self) -> list[dict[str, Any]]:
         """Return start values in SI units, with their origins."""
-        rows = start_values(self._drive, self._model, self._model.settings.get("start", "given"))
+        asked = self._drive, self._model, self._model.settings.get("start", "given")
+        rows = [*start_values(*asked), *other_values(*asked)]
         return [{"path": r.path, "value": float(r.value), "unit": r.unit, "origin": r.origin} for r in rows]
 
 

@@ -82,6 +82,14 @@ def start_values(drive: Component, model: CompiledDae, kind: StartKind = "given"
     return [StartValueRow(path, *_value(model, point, variables, path), origin) for path, origin in origins.items()]
 
 
+def other_values(drive: Component, model: CompiledDae, kind: StartKind = "given") -> list[StartValueRow]:
+    """Return what all other variables are at the start, which follows from `start_values`."""
+    named, point = {row.path for row in start_values(drive, model, kind)}, initialize(model, start=kind)
+    values = zip(model.flat_variables, call(model, model.equations.variables, point), strict=True)
+    others = ((variable, value) for variable, value in values if variable.path not in named)
+    return [StartValueRow(v.path, float(value), str(v.unit), "follows from the others") for v, value in others]
+
+
 def _value(model: CompiledDae, point: Point, variables: np.ndarray, path: str) -> tuple[float, str]:
     if path in model.position:
         node = model.position[path]
