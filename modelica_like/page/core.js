@@ -62,7 +62,11 @@ const tableOf = (name) => {
 /* What a part of a type can be given; null while that is not known. */
 async function kindOf(kind, inner = []) {
   const key = [kind, ...inner].join("\n");
-  if (!kinds.has(key)) kinds.set(key, await ask("kind", { kind, inner }).catch(() => null));
+  if (!kinds.has(key)) {
+    const known = await ask("kind", { kind, inner }).catch(() => undefined);
+    if (known === undefined) return null; // it was refused, which need not last
+    kinds.set(key, known);
+  }
   return kinds.get(key);
 }
 

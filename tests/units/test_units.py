@@ -292,3 +292,23 @@ def test_digits_of_other_scripts_are_digits(text: str) -> None:
     """Full-width ones, as Japanese keyboards write them; they ended in a TypeError."""
     assert to_si(text, parse_unit("rad/s"), "x") == 12.0
     assert str(parse_formula(f"{text} + 1 rad/s")) == "12 rad/s + 1 rad/s"
+
+
+TOGETHER = """
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from modelica_like.language.units.atoms import find_atom
+begin = threading.Barrier(6)
+def ask(name):
+    begin.wait()
+    return find_atom(name).factor
+with ThreadPoolExecutor(6) as pool:
+    print(*pool.map(ask, ["S", "hp", "inch", "bar", "ft", "gallon"]))
+"""
+
+
+def test_threads_ask_for_the_first_unit_together() -> None:
+    """pint creates its registry at the first unit; a page asks in several threads."""
+    done = subprocess.run([sys.executable, "-c", TOGETHER], capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.split()) == 6

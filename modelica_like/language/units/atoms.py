@@ -7,6 +7,7 @@ pint's registry, which is created on first use.
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -97,7 +98,12 @@ def find_atom(name: str) -> Atom:
         return ATOMS[name]
     if _meant(name):
         raise _unknown(name)
-    return _ask_pint(name)
+    with _ONE_AT_A_TIME:
+        return _ask_pint(name)
+
+
+_ONE_AT_A_TIME = threading.RLock()
+"""pint creates its registry at the first unit; a second thread would find one that does not have all units yet."""
 
 
 @lru_cache(maxsize=1)
@@ -105,8 +111,10 @@ def pint_registry() -> Any:
     """Return pint's registry of units; the first call creates it, in about half a second."""
     import pint
 
-    registry: Any = pint.get_application_registry
-    return registry().get()
+    with _ONE_AT_A_TIME:
+        registry: Any = pint.get_application_registry
+        registry().Unit("meter")
+        return registry().get()
 
 
 def _ask_pint(name: str) -> Atom:
