@@ -23,7 +23,7 @@ from modelica_like.netlist.document import read_text
 from modelica_like.netlist.read import load_thoroughly
 from modelica_like.netlist.registry import library_types
 from modelica_like.netlist.write import dumps
-from modelica_like.page.palette import described, described_type
+from modelica_like.page.palette import class_page, described, described_type
 from modelica_like.page.placing import copied, pasted, placed
 from modelica_like.show.draw.diagram import diagram
 from modelica_like.show.draw.sheet import Sheet as Drawn
@@ -209,6 +209,12 @@ class Desk:
         for name in inner:
             owner = owner.inner(name) if owner else None
         return described(owner) if owner else None
+
+    def page(self, kind: str) -> dict[str, str] | None:
+        """Return the page of a component class; None if there is none of that name."""
+        with self.trusting():
+            owner = Names(Text(self.path, self.document.text)).type(kind)
+            return class_page(owner.kind) if owner and not issubclass(owner.kind, Assembly) else None
 
     def complete(self, text: str, offset: int) -> list[dict[str, Any]]:
         """Return the words that can stand at a place of a text, as `lsp` answers them."""

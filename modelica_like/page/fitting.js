@@ -7,7 +7,7 @@ function calibrateWith(one) {
   const rows = results.content.sliders.filter((known) => known.reference !== null).map((known) => {
     const bound = (word) => element("input", { value: short(known[word]), ariaLabel: `${known.name}: ${word}` });
     const box = element("input", { type: "checkbox", ariaLabel: `find ${known.name}` });
-    const [low, high] = [bound("low"), bound("high")], unit = known.written === "1" ? "" : known.written;
+    const [low, high] = [bound("low"), bound("high")], unit = unitOf(known);
     const line = element("tr", {}, ...[element("label", {}, box, known.name), low, high, unit].map((cell) =>
       element("td", {}, cell)));
     return { known, box, low, high, line };
@@ -60,7 +60,8 @@ async function fitted(one, free, signal) {
 }
 
 /* A value of a slider, as it is written into the netlist. */
-const inUnit = (known, value) => `${Number(value.toPrecision(6))} ${known.written === "1" ? "" : known.written}`.trim();
+const unitOf = (known) => ["1", "*"].includes(known.written) ? "" : known.written; // * is that of what it drives
+const inUnit = (known, value) => `${Number(value.toPrecision(6))} ${unitOf(known)}`.trim();
 
 function showFit(fit) {
   const take = element("button", { className: "main" }, "Take into the netlist"), close = element("button", {}, "Close");

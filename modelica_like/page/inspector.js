@@ -155,9 +155,34 @@ function titleOf(name, kind, known) {
     : element("p", { className: "about" }, first)] : [];
   return [title, element("div", { className: "row" }, element("span", { className: "kind" }, kind), button("Replace …",
     () => replacing(head(name)), "Another type"),
+    ...(known && !openable(name) ? [button("Page", () => showPage(kind), "All about the type, with its equations")] : []),
     button("Duplicate", duplicateChosen, "Ctrl+D"), ...(openable(name) ? [button("Open", () => openPart(name),
       "Enter")] : []),
     button("Remove", removeChosen, "Del")), ...about];
+}
+
+/* The page of a class: its tables, and its equations as they are written. */
+async function showPage(kind) {
+  const answer = await ask("page", { kind }).catch(tell), known = await kindOf(kind);
+  if (!answer) return;
+  const plain = (text) => text.replace(/\$[^$]*\$( in )?/g, "").replace(/[`]|\\(?=\|)/g, "").replace(/\[([^\]]*)\]\([^)]*\)/g,
+    "$1").trim(), blocks = [];
+  for (const line of answer.text.split("\n")) {
+    const cells = /^\|/.test(line) && line.split(/(?<!\\)\|/).slice(1, -1).filter((cell) =>
+      !/^ (symbol|\$[^$]*\$) $/.test(cell)).map(plain); // what stands only in formulas
+    if (cells && cells.every((cell) => /^-*$/.test(cell))) continue;
+    const table = blocks.at(-1)?.matches("table") ? blocks.at(-1) : null;
+    if (cells && table) table.append(element("tr", {}, ...cells.map((cell) => element("td", {}, cell))));
+    else if (cells) blocks.push(element("table", {}, element("tr", {}, ...cells.map((cell) => element("th", {}, cell)))));
+    else if (line.startsWith("## ")) blocks.push(element("h3", {}, line.slice(3)));
+    else if (line.trim()) blocks.push(element("p", {}, plain(line)));
+  }
+  at("dialog").onclose = null;
+  at("dialog").replaceChildren(element("h2", {}, kind), element("div", { className: "scroll page" }, element("pre", {},
+    known?.about.split("\n").slice(1).join("\n").trim() ?? ""), ...blocks, element("h3", {}, "Equations"),
+    element("pre", {}, answer.source)), element("form", { method: "dialog" }, element("div", { className: "row" },
+    element("button", { className: "main" }, "Close"))));
+  at("dialog").showModal();
 }
 
 /* Missing values of a part, as the problems tell them. */

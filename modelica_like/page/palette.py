@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import ast
+import inspect
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
+from modelica_like.language import Component
 from modelica_like.language.inside import declarations
 from modelica_like.lsp.names import Owner, owner_of, units_like
 from modelica_like.netlist.registry import GROUP, library_types
 from modelica_like.parsing import parse
 from modelica_like.show.draw.symbol import symbol
+from modelica_like.show.report.component_pages.page import page as component_page
 from modelica_like.show.report.types import summary
 
 _MOST = 60
@@ -115,6 +119,16 @@ def described(owner: Owner) -> dict[str, Any]:
         })  # fmt: skip
     inner = [name for name in owner.parts if known.parts or not name.endswith("]")]
     return {"about": owner.about, "values": values, "ends": owner.ends(), "parts": inner}
+
+
+def class_page(kind: type[Component]) -> dict[str, str]:
+    """Return the page of a component class as Markdown up to its equations (`text`), and their source (`source`)."""
+    with suppress(OSError, TypeError):  # its file is not there
+        text = component_page(kind, Path("page.md"), ())
+        tables = text.partition("\n## ")
+        return {"text": "".join(tables[1:]).partition("<details")[0],
+                "source": inspect.cleandoc("\n" + inspect.getsource(kind.equations))}  # fmt: skip
+    return {"text": "", "source": ""}
 
 
 _SORTS = {"Variable": "start", "Output": "start", "Discrete": "start", "Input": "input"}

@@ -171,8 +171,8 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = _PATIENCE
     disable_nagle_algorithm = True
     _asked: ClassVar = frozenset((
-        "state", "apply", "text", "undo", "redo", "model", "ranking", "starts", "instant", "palette", "kind", "fits",
-        "copy", "complete", "explain", "scale", "save", "export", "watch", "take", "trust", "open", "back",
+        "state", "apply", "text", "undo", "redo", "model", "ranking", "starts", "instant", "palette", "kind", "page",
+        "fits", "copy", "complete", "explain", "scale", "save", "export", "watch", "take", "trust", "open", "back",
     ))  # fmt: skip
     """Methods of `Session` that a page may call."""
 

@@ -181,6 +181,10 @@ class Session:
         """Return what a part of a type, or a part inside it, can be given."""
         return self.desk.describe(str(request["kind"]), [str(name) for name in request.get("inner", ())])
 
+    def page(self, request: Request) -> dict[str, str] | None:
+        """Return the page of a component class."""
+        return self.desk.page(str(request["kind"]))
+
     def fits(self, request: Request) -> dict[str, str]:
         """Return which ends can be joined to one."""
         return self.desk.fits(str(request["end"]))

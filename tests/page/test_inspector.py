@@ -93,6 +93,21 @@ def test_a_field_says_unit_limits_and_default(hand: Hand) -> None:
 
 
 @pytest.mark.browser
+def test_a_slider_writes_a_number_where_the_unit_is_that_of_what_it_drives(hand: Hand) -> None:
+    hand.put("Ramp")
+    hand.type("ramp.duration", "1 s")
+    hand.type("ramp.height", "2")
+    hand.until("results.revision === page.revision")
+    hand.page.get_by_label("ramp.height").locator("xpath=../input[@type='range']").evaluate(
+        "(one) => { one.value = 0.9; one.dispatchEvent(new Event('change')); }"
+    )
+    hand.wait()
+    assert isinstance(hand.browser.run("page.data.parts.ramp.height"), float | int)
+    assert hand.browser.run("page.data.parts.ramp.height") != 2
+    assert hand.browser.run("page.valid")
+
+
+@pytest.mark.browser
 def test_a_missing_value_is_a_marked_field_and_all_problems_are_told(hand: Hand) -> None:
     hand.write(TEXT.replace(', tau = "5 N.m"', "").replace('c = "100 N.m/rad", ', ""))
     told = hand.page.locator("#problems li").all_inner_texts()
@@ -122,6 +137,20 @@ def test_a_netlist_of_the_folder_is_a_part(hand: Hand) -> None:
     assert 'tail = { is = "./tail.toml", damping = "3 N.m.s/rad" }' in hand.text
     hand.until("results.revision === page.revision && results.content")
     assert hand.browser.run("results.content.variables.some((one) => one.name === 'tail.oil.tau')")
+
+
+@pytest.mark.browser
+def test_the_page_of_a_class_is_one_click_away(hand: Hand) -> None:
+    hand.select("shaft")
+    hand.page.get_by_role("button", name="Page", exact=True).click()
+    page = hand.page.locator("#dialog .page")
+    page.wait_for()
+    assert page.locator("h3").all_inner_texts()[0] == "Parameters"
+    assert page.locator("td", has_text="N.m/rad").count() > 0
+    assert "yield" in page.locator("pre").last.inner_text()
+    assert "$" not in page.inner_text()
+    assert page.locator("tr").nth(1).locator("td").all_inner_texts()[:2] == ["c", "N.m/rad"]
+    hand.page.keyboard.press("Escape")
 
 
 PASTE = """(text) => { const data = new DataTransfer(); data.setData("text/plain", text);
