@@ -204,3 +204,43 @@ def test_what_is_valid_is_saved_by_itself(browser: Any, tmp_path: Path) -> None:
         hand.page.get_by_role("button", name="Keep mine").click()
         hand.wait()
         assert "5 kg.m2" in hand.text
+
+
+OWN = """from pathlib import Path
+Path(__file__).with_name("has_run").touch()
+from components import Inertia
+
+class Hub(Inertia):
+    'A hub.'
+"""
+
+
+@pytest.mark.browser
+def test_the_page_asks_before_a_module_runs(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "own_hub_of_page.py").write_text(OWN)
+    (tmp_path / "drive.toml").write_text(TEXT.replace('"Inertia", J = "1', '"own_hub_of_page:Hub", J = "1'))
+    with serving(Session(tmp_path / "drive.toml")) as server, using(browser, server) as hand:
+        button = hand.page.get_by_role("button", name="Run the modules of this folder")
+        button.click()
+        hand.page.get_by_role("button", name="Cancel").click()
+        hand.wait()
+        assert not (tmp_path / "has_run").exists()
+        assert hand.page.locator("#sheet .part").count() == 0
+        button.click()
+        hand.page.get_by_role("button", name="Run them").click()
+        hand.wait()
+        assert (tmp_path / "has_run").exists()
+        assert hand.page.locator('#sheet .part[data-part="J2"]').count() == 1
+
+
+@pytest.mark.browser
+def test_ends_that_fit_light_up_and_the_others_say_why(hand: Hand) -> None:
+    hand.put("Resistor")
+    hand.page.mouse.click(*hand.end("J2.flange_b"))
+    hand.until("joining && Object.keys(joining.fits).length")
+    fits = hand.browser.run("[...document.querySelectorAll('#sheet .end.fit')].map((one) => one.dataset.end)")
+    assert {end.partition(".")[0] for end in fits} == {"motor", "J1", "shaft", "J2"}
+    hand.page.mouse.move(*hand.end("resistor.p"))
+    assert "a Flange (rad, N.m) cannot join a Pin (V, A)" in hand.page.inner_text("#hint")
+    hand.page.keyboard.press("Escape")
+    assert hand.page.locator("#sheet .end.fit").count() == 0
