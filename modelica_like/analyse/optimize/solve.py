@@ -133,6 +133,8 @@ class Search:
             if least.excess > FEASIBLE:
                 return least
             outcome = self._ipopt(least.x, elastic=False)
+        if not outcome.optimal and not self.runs.certain(x):
+            return self._from(x)
         return outcome if outcome.optimal else self._polished(outcome)
 
     def _ipopt(self, x: Vector, *, elastic: bool) -> Outcome:

@@ -81,7 +81,7 @@ def sensitivities(
         solution = quick_run(freed.model, until, **settings, readings=[name for name in of if not is_series(name)])
     model = solution.model
     outputs = [read_output(model, name) for name in of]
-    chosen = _chosen(model, to)
+    chosen = chosen_parameters(model, to)
     column, name = quadratures(model, outputs)
     moments = [output.moment for output in outputs if output.kind == "at"]
     stops = [*moments, *solution.time] if any(output.kind == "series" for output in outputs) else moments
@@ -89,8 +89,13 @@ def sensitivities(
     return _differentiate(solution, chain, outputs, chosen, method, freed, named=bool(to))
 
 
-def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantity]]:
-    """Positions in (p, u) of parameters and inputs."""
+def chosen_parameters(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantity]]:
+    """Return positions in (p, u) of parameters and inputs, and what they are.
+
+    Raises:
+        UnknownName: there is no such parameter.
+        LanguageError: it follows from others, or cannot change.
+    """
     values = np.concatenate([model.p, model.u])
     position = model.fixed_position
     fixed = {parameter.path for parameter in model.flat_parameters if not parameter.tunable}

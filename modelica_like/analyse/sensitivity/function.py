@@ -12,8 +12,9 @@ import numpy as np
 
 from modelica_like.analyse.sensitivity.by_run_time import differentiated_run
 from modelica_like.analyse.sensitivity.callback import NamedCallback
-from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
+from modelica_like.analyse.sensitivity.derivatives import Sensitivities, chosen_parameters, sensitivities
 from modelica_like.analyse.sensitivity.formulas import free_formulas
+from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.arguments import checked
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient
@@ -40,10 +41,10 @@ _FINER = 1e-2
 class SimulationFunction(NamedCallback):
     """y = f(p): simulates with all events; its Jacobian is exact through the events.
 
-    It is that of the replay. `steering` takes the adjoint of the run-time instead, several times as fast, where both
-    agree at the start values; `certain` compares them where a search has ended. Second derivatives are extrapolated
-    differences of the exact Jacobian. The object must live as long as anything built from it. CasADi rewrites an error
-    of the simulation; `refusal` has the original.
+    It is that of the replay. `steering` takes the adjoint of the run-time instead, several times as fast; `certain`
+    compares both where a search has ended. Second derivatives are extrapolated differences of the exact Jacobian. The
+    object must live as long as anything built from it. CasADi rewrites an error of the simulation; `refusal` has the
+    original.
 
     Attributes:
         inputs: paths of the parameters p.
@@ -70,7 +71,6 @@ class SimulationFunction(NamedCallback):
         self._precision = precision
         self._nan_where_refused = nan_where_refused
         self._agrees = steering
-        self._last: tuple[bytes, Sensitivities] | None = None
         self._simulated: tuple[bytes, Solution] | None = None
         self._sequence: list[tuple[str, str, str]] | None = None
         self._read = [read_output(self._model, name) for name in outputs]
@@ -78,13 +78,15 @@ class SimulationFunction(NamedCallback):
         rtol = min(chosen.rtol, precision * _FINER)
         self._tight = {"until": end, "rtol": rtol, "atol": min(chosen.atol, rtol / 100)}
         self._options = replace(chosen, rtol=rtol, atol=self._tight["atol"])
-        solution = quick_run(self._model, **{**self._run, **self._tight}, readings=outputs)
-        self._first = self._differentiate(solution)
-        self._names = [parameter.name for parameter in self._first.parameters]
-        self.start_values = np.array([parameter.value for parameter in self._first.parameters])
-        self._sequence = None if any_sequence else mode_sequence(solution.events)
-        check = self._by_run_time(self.start_values)
-        self._agrees = check is not None and _agree(check, self._first)
+        self._chosen = chosen_parameters(self._model, inputs)
+        self.start_values = np.array([parameter.value for _, parameter in self._chosen])
+        result = self._by_run_time(self.start_values)
+        if result is None:
+            self._agrees = False
+            solution = quick_run(self._model, **{**self._run, **self._tight}, readings=outputs)
+            self._sequence = None if any_sequence else mode_sequence(solution.events)
+            result = self._differentiate(solution)
+        self._last = self.start_values.tobytes(), result
         self.runs = 0
         self._jacobian = _Jacobian(self)
         dense = ca.Sparsity.dense
@@ -95,15 +97,13 @@ class SimulationFunction(NamedCallback):
         return sensitivities(solution, self.outputs, self.inputs, start=start, precision=self._precision)
 
     def _by_run_time(self, values: Vector) -> Sensitivities | None:
-        """Simulate at parameter values with derivatives by the run-time; None where the replay has to tell.
-
-        What refuses derivatives for all values, as a motion that begins at rest, it has told at the start values.
-        """
+        """Simulate at parameter values with derivatives by the run-time; None where the replay has to tell."""
         if not self._agrees:
             return None
         model = self._model.with_parameters(self._given(values))
         kind = self._run["start"] or model.settings.get("start", "given")
-        result = differentiated_run(model, self._tight["until"], self._options, kind, self._read, self._names)
+        names = [parameter.name for _, parameter in self._chosen]
+        result = differentiated_run(model, self._tight["until"], self._options, kind, self._read, names)
         if result is None or self._sequence not in (None, mode_sequence(result.solution.events)):
             return None
         numbers = result.values
@@ -111,14 +111,13 @@ class SimulationFunction(NamedCallback):
             numbers = self._simulated[1].read(*self.outputs)  # the same name has the same number everywhere
         else:
             self.runs += 1
-        fixed = np.concatenate([model.p, model.u])[[model.fixed_position[name] for name in self._names]]
-        outputs, parameters = (
-            tuple(replace(quantity, value=float(value)) for quantity, value in zip(quantities, given, strict=True))
-            for quantities, given in ((self._first.outputs, numbers), (self._first.parameters, fixed))
-        )
-        return replace(
-            self._first, outputs=outputs, parameters=parameters, derivatives=result.derivatives, method="adjoint"
-        )
+        fixed = np.concatenate([model.p, model.u])
+        return Sensitivities(
+            model.name,
+            tuple(Quantity(read.name, float(v), read.unit) for read, v in zip(self._read, numbers, strict=True)),
+            tuple(replace(parameter, value=float(fixed[k])) for k, parameter in self._chosen),
+            result.derivatives, "adjoint",
+        )  # fmt: skip
 
     def _given(self, values: Vector) -> dict[str, Any]:
         return {**self._run["parameters"], **dict(zip(self.inputs, map(float, values), strict=True))}
@@ -131,7 +130,7 @@ class SimulationFunction(NamedCallback):
             ModelicaLikeError: the simulation fails.
         """
         values = np.asarray(p, float).ravel()
-        if self._last is None or self._last[0] != values.tobytes():
+        if self._last[0] != values.tobytes():
             result = self._by_run_time(values)
             self._last = values.tobytes(), result or self._differentiate(self._simulate(values))
         return self._last[1]
@@ -147,7 +146,7 @@ class SimulationFunction(NamedCallback):
         try:
             known, replayed = self.at(values), self._differentiate(self._simulate(values))
         except ModelicaLikeError:
-            self._agrees, self._last = False, None
+            self._agrees, self._last = False, (b"", self._last[1])
             return False
         self._agrees = _agree(known, replayed)
         self._last = values.tobytes(), replayed
@@ -162,7 +161,7 @@ class SimulationFunction(NamedCallback):
             ModelicaLikeError: the simulation fails.
         """
         key = np.asarray(p, float).ravel()
-        if self._last is not None and self._last[0] == key.tobytes():
+        if self._last[0] == key.tobytes():
             return [output.value for output in self._last[1].outputs]
         values = self._simulate(key).read(*self.outputs)
         for name, value in zip(self.outputs, values, strict=True):

@@ -33,11 +33,14 @@ def kinks_at(model: CompiledDae, path: str, node: Point) -> list[tuple[float, Ve
     kinks, of_value = model.once((Cached.KINKS_OF, path), lambda: _kinks_of(model, path))
     rates, size = call(model, model.equations.ode, node), max(1.0, abs(node.t))
 
-    def both(time: float) -> Vector:
-        """Value and rate a moment from the node."""
+    def along(time: float) -> Point:
         point = Point(node.t + time, node.x + time * rates, node.z.copy(), node.d)
         solve_implicit(model, point)
-        part = slopes_of(model, path, point)
+        return point
+
+    def both(time: float) -> Vector:
+        """Value and rate a moment from the node."""
+        part = slopes_of(model, path, along(time))
         return np.array([part.value[0], part.rate[0]])
 
     def jumps(late: float) -> bool:
@@ -47,8 +50,10 @@ def kinks_at(model: CompiledDae, path: str, node: Point) -> list[tuple[float, Ve
         sizes = np.sum(np.abs(sides[0]), axis=0)
         return bool(np.any((near > _STAYS * far) & (near > _FELT * sizes)))
 
+    sides = (kinks.at(along(sign * _AT_IT * size)).copy() for sign in (1, -1))
+    near = np.abs(kinks.at(node)) <= np.abs(np.subtract(*sides))  # by half their change between them, and by its error
     for numbers in (range(kinks.count - of_value, kinks.count), range(kinks.count - of_value)):
-        every = (kinks.slopes(node, number) for number in numbers)
+        every = (kinks.slopes(node, number) for number in numbers if near[number])
         # Without a division: a rate may be so small that a time has no number.
         there = [kink for kink in every if kink.rate[0] and abs(kink.value[0]) <= _AT_IT * size * abs(kink.rate[0])]
         times = [-float(kink.value[0] / kink.rate[0]) for kink in there]
