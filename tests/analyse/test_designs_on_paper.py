@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like import linearize, load, optimize, save_report
+from modelica_like import linearize, load, optimize, save_report, tolerance
 from modelica_like.analyse.optimize.result import Optimum
 from modelica_like.netlist import loads
 
@@ -163,6 +163,22 @@ def test_a_design_check_limits_a_design(tmp_path: Path) -> None:
     least = optimum(load(tmp_path / "brake.toml"), maximize="shaft.safety", subject_to="brake.lock_time <= 10 s")
     assert least["brake.capacity"] == pytest.approx(10.0, rel=1e-6)
     assert least["shaft.safety"] == pytest.approx(2.5 * most / 10.0, rel=1e-6)
+
+
+def test_a_design_check_scatters(tmp_path: Path) -> None:
+    """The safety is K/M, and M anywhere within 10 %: its mean is K/M ln(1.1/0.9)/0.2, 1 % of all are above 1.098 M."""
+    (tmp_path / "checks.toml").write_text(CHECKS)
+    (tmp_path / "brake.toml").write_text(BRAKE)
+    drive, scatter = load(tmp_path / "brake.toml"), {"brake.capacity": "±10 %"}
+    yields = 275e6 / math.sqrt(3.0) * math.pi * 0.01**3 / 16.0
+    result = tolerance(drive, "shaft.safety", scatter, subject_to="shaft.safety >= 1.5", precision=0.005)
+    spread, (limit,) = result["shaft.safety"], result.limits
+    assert spread.linear_sigma == pytest.approx(yields / 20.0 * 0.2 / math.sqrt(12.0), rel=1e-6)
+    assert spread.mean == pytest.approx(yields / 20.0 * math.log(1.1 / 0.9) / 0.2, rel=1e-4)
+    assert (spread.low, spread.high) == pytest.approx((yields / 22.0, yields / 18.0), rel=1e-6)
+    assert limit.value == pytest.approx((22.0 - yields / 1.5) / 4.0, abs=0.005)
+    best = optimum(drive, subject_to="P(shaft.safety >= 2.5) >= 99 %", tolerances=scatter)
+    assert best["brake.capacity"] == pytest.approx(yields / 2.5 / 1.098, rel=1e-3)
 
 
 def test_checks_that_nobody_asks_for_do_not_count(tmp_path: Path) -> None:

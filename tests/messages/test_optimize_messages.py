@@ -268,6 +268,12 @@ Write "P(clutch.lock_time <= 0.4 s) >= 99.9 %".""",
         """'P(clutch.lock_time <= 0.3 s) >= 99 %' asks for a probability, but nothing scatters.
 Say how parameters scatter: [tolerances] in the netlist, or tolerances={"clutch.mu": "±10 %"}.""",
     ),
+    "a mode with a probability": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, subject_to="P(mode(1).damping >= 0.1) >= 99 %", **M),
+        """'P(mode(1).damping >= 0.1) >= 99 %': a mode has no probability, as it needs no run.
+Ask for a probability of outputs of the run or of lines of design checks.""",
+    ),
     "a front with a probability": (
         ValueOutOfRange,
         lambda: optimize(

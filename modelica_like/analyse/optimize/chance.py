@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from modelica_like.analyse.optimize.problem import Problem
+from modelica_like.analyse.optimize.sized import Outputs
 from modelica_like.analyse.optimize.solve import Outcome
 from modelica_like.analyse.optimize.terms import Limit
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
@@ -41,6 +42,7 @@ class Chances:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.places = [k for k, limit in enumerate(problem.limits) if limit.probability < 1.0]
+        self.outputs = Outputs([problem.limits[k].name for k in self.places], problem.sized)
         normal = extra_module("scipy.stats", "analyse").norm
         self.factors = np.array([float(normal.ppf(problem.limits[k].probability)) for k in self.places])
         self.results: tuple[Probability, ...] = ()
@@ -73,14 +75,15 @@ class Chances:
     def _margins(self, x: Vector) -> Vector:
         """Return the distances at a design, the largest of all load cases."""
         problem, question = self.problem, self.problem.question
-        names = [problem.limits[k].name for k in self.places]
         rows: list[Vector] = []
         for case in problem.cases:
             model = problem.model.with_parameters({**case.values, **self._values(x)})
             # What is free can scatter, too: about the value of the design.
             population = read_population(model, question.tolerances or {}, question.correlated, question.folder)
             to = [scatter.name for scatter in population.scatters]
-            slopes = sensitivities(model, names, to, until=question.until, start=question.start).derivatives
+            of_runs = sensitivities(model, self.outputs.read, to, until=question.until, start=question.start)
+            values = np.array([output.value for output in of_runs.outputs])
+            slopes = self.outputs.slopes(values, of_runs.derivatives)
             rows.append(np.sqrt(np.einsum("ki,ij,kj->k", slopes, population.covariance, slopes)))
         return self.factors * np.max(rows, axis=0)
 
@@ -96,13 +99,14 @@ class Chances:
             population = read_population(model, question.tolerances or {}, question.correlated, question.folder)
             plain = [replace(limit, text=limit.inner, probability=1.0) for limit in limits]
             run = {"until": question.until, "start": question.start}
-            found = spread(model, population, (), plain, run, _PRECISION * least)
+            found = spread(model, population, (), plain, run, problem.sized, _PRECISION * least)
             names = [spread.name for spread in found.outputs]
-            nominal = quick_run(model, question.until, start=question.start).read(*names)
+            of_run = np.array(quick_run(model, **run).read(*self.outputs.read), float)
+            nominal = self.outputs.values(of_run[None, :])[0]
             results += [replace(limit, within=case.suffix) for limit in found.limits]
             distances.append(np.array([
-                _distance(limit, found.samples[:, names.index(limit.name)], float(nominal[names.index(limit.name)]))
-                for limit in limits
+                _distance(limit, found.samples[:, names.index(limit.name)], float(value))
+                for limit, value in zip(limits, nominal, strict=True)
             ]))  # fmt: skip
         self.results = tuple(results)
         return np.max(distances, axis=0)

@@ -173,7 +173,11 @@ def _check_chances(
     chances = [limit for limit in limits if limit.probability < 1.0]
     for limit in chances:
         with placed("subject_to"):
-            read_number(model, limit.name)  # no mode and no design check
+            if is_modal(limit.name):
+                raise ValueOutOfRange(
+                    f"'{limit.text}': a mode has no probability, as it needs no run.",
+                    advice="Ask for a probability of outputs of the run or of lines of design checks.",
+                )
     if chances and not question.tolerances:
         with placed("subject_to"):
             raise ValueOutOfRange(

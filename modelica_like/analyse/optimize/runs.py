@@ -9,6 +9,7 @@ import numpy as np
 
 from modelica_like.analyse.optimize.modal import is_modal, modal_slopes, modal_values
 from modelica_like.analyse.optimize.problem import Problem
+from modelica_like.analyse.optimize.sized import Outputs
 from modelica_like.analyse.sensitivity.function import SimulationFunction
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import ModelicaLikeError
@@ -51,12 +52,10 @@ class Runs:
         question, names = problem.question, [parameter.name for parameter in problem.free]
         self.functions: list[SimulationFunction] = []
         self.modal = [name for name in problem.outputs if is_modal(name)]
-        self.sized = [name for name in problem.outputs if problem.sized.has(name)]
-        loads = problem.sized.loads
-        runs = [name for name in problem.outputs if name not in self.modal and name not in self.sized]
-        self.read = list(dict.fromkeys([*runs, *loads]))
-        self._loads = [self.read.index(name) for name in loads]
-        order = [*self.read, *self.modal, *self.sized]
+        runs = [name for name in problem.outputs if name not in self.modal]
+        self._of_runs = Outputs(runs, problem.sized)
+        self.read = self._of_runs.read
+        order = [*runs, *self.modal]
         self._places = [order.index(name) for name in problem.outputs]
         for case in problem.cases if self.read else ():
             run = {"until": question.until, "start": question.start, "parameters": dict(case.values), "options": None}
@@ -92,7 +91,8 @@ class Runs:
                 results = [function.at(x) for function in self.functions]
                 values = np.array([[output.value for output in result.outputs] for result in results])
                 slopes = np.array([result.derivatives for result in results])
-                parts = [(values, slopes), *parts, (self._lines(values), self._slopes_of_lines(values, slopes))]
+                of_runs = [self._of_runs.slopes(*pair) for pair in zip(values, slopes, strict=True)]
+                parts = [(self._of_runs.values(values), np.array(of_runs)), *parts]
         except ModelicaLikeError as error:
             self.refusals.append((x.copy(), error))
             return error
@@ -118,24 +118,11 @@ class Runs:
             parts = [self._modes(x, slopes=False)[0]]
             if self.read:
                 values = np.array([function.values_at(x) for function in self.functions])
-                parts = [values, *parts, self._lines(values)]
+                parts = [self._of_runs.values(values), *parts]
             return np.concatenate(parts, axis=1)[:, self._places]
         except ModelicaLikeError as error:
             self.refusals.append((x.copy(), error))
             return None
-
-    def _lines(self, values: Vector) -> Vector:
-        """Return lines of design checks, shape (cases, lines), from what was read off the runs."""
-        sized, names = self.problem.sized, self.sized
-        lines = [sized.values(names, row[self._loads]) for row in values] if names else []
-        return np.array(lines).reshape(len(values), len(names))
-
-    def _slopes_of_lines(self, values: Vector, slopes: Vector) -> Vector:
-        """Return their derivatives by x, shape (cases, lines, free), through the loads."""
-        sized = self.problem.sized
-        by_loads = [sized.slopes(self.sized, row[self._loads]) for row in values if self.sized]
-        rows = [lines @ inner[self._loads] for lines, inner in zip(by_loads, slopes, strict=False)]
-        return np.array(rows).reshape(len(values), len(self.sized), slopes.shape[2])
 
     def _modes(self, x: Vector, *, slopes: bool) -> tuple[Vector, Vector]:
         """Return outputs of modes, shape (cases, outputs), and their derivatives by x."""
@@ -154,16 +141,13 @@ class Runs:
 
     def by_idas(self, parameters: Mapping[str, float]) -> Vector:
         """Return the outputs of a run by IDAS, shape (outputs,)."""
-        question, values = self.problem.question, dict[str, float]()
+        question, problem = self.problem.question, self.problem
+        values = np.zeros((1, 0))
         if self.read:
             run = simulate(
-                self.problem.model, question.until, parameters=dict(parameters), start=question.start, solver="idas"
+                problem.model, question.until, parameters=dict(parameters), start=question.start, solver="idas"
             )
-            numbers = np.array(run.read(*self.read), float).reshape(1, -1)
-            values |= dict(
-                zip([*self.read, *self.sized], map(float, [*numbers[0], *self._lines(numbers)[0]]), strict=True)
-            )
-        if self.modal:
-            model = self.problem.model.with_parameters(dict(parameters))
-            values |= dict(zip(self.modal, map(float, modal_values(model, self.modal, question.start)), strict=True))
-        return np.array([values[name] for name in self.problem.outputs])
+            values = self._of_runs.values(np.array(run.read(*self.read), float).reshape(1, -1))
+        model = problem.model.with_parameters(dict(parameters))
+        modes = modal_values(model, self.modal, question.start) if self.modal else []
+        return np.array([*values[0], *modes], float)[self._places]

@@ -114,6 +114,41 @@ class Sized:
         return Checks(self._document, self._simulations)
 
 
+class Outputs:
+    """Outputs of runs, of which some are lines of design checks.
+
+    Args:
+        names: of the outputs; the units of lines were asked for.
+        sized: the design checks.
+
+    Attributes:
+        read: what is read off a run, each once: outputs, and loads of lines.
+    """
+
+    def __init__(self, names: Sequence[str], sized: Sized) -> None:
+        self._sized = sized
+        self._lines = [name for name in names if sized.has(name)]
+        self.read = list(dict.fromkeys([*(name for name in names if name not in self._lines), *sized.loads]))
+        self._loads = [self.read.index(name) for name in sized.loads]
+        every = [*self.read, *self._lines]
+        self._places = [every.index(name) for name in names]
+
+    def values(self, numbers: Vector) -> Vector:
+        """Return outputs, shape (runs, outputs), from what was read, shape (runs, read); nan where loads are."""
+        lines = np.full((len(numbers), len(self._lines)), np.nan)
+        for k, loads in enumerate(numbers[:, self._loads] if self._lines else ()):
+            if np.all(np.isfinite(loads)):
+                lines[k] = self._sized.values(self._lines, loads)
+        return np.hstack([numbers, lines])[:, self._places]
+
+    def slopes(self, numbers: Vector, derivatives: Vector) -> Vector:
+        """Return derivatives, shape (outputs, parameters), from those of what was read; `numbers` has its values."""
+        if self._lines:
+            by_loads = self._sized.slopes(self._lines, numbers[self._loads])
+            derivatives = np.vstack([derivatives, by_loads @ derivatives[self._loads]])
+        return derivatives[self._places]
+
+
 class _Known(Simulations):
     """Loads of one netlist that are known; those of others are simulated, once."""
 

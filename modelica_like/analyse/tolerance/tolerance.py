@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from modelica_like.analyse.optimize.sized import Outputs, Sized
 from modelica_like.analyse.optimize.terms import Limit, read_limits
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
 from modelica_like.analyse.sensitivity.function import mode_sequence
+from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.analyse.sweeps.plan import Samples, Sobol
 from modelica_like.analyse.sweeps.sweep import sweep
 from modelica_like.analyse.tolerance.result import Probability, Spread, Tolerances
@@ -22,6 +25,7 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient, ValueOutOfRange, extra_module
 from modelica_like.language import Assembly, Component
 from modelica_like.language.inside import inside
+from modelica_like.language.units import Unit
 from modelica_like.runs.readings import listed, read_number
 from modelica_like.simulation import Model, build, loaded, quick_run
 from modelica_like.solve.initialize import StartKind
@@ -51,7 +55,8 @@ def tolerance(
 
     Args:
         drive: a component, a netlist file or a compiled model.
-        of: outputs, named as for `sensitivities`; those of `subject_to` are added.
+        of: outputs, named as for `sensitivities`, or lines of design checks, `shaft.safety`; those of `subject_to` are
+            added.
         tolerances: text by path: `±10 %`, `±0.5 N.m` (anywhere in the range), `normal(20 N.m, 1 N.m)`, `normal(5 %)`,
             `uniform(18 N.m, 22 N.m)`, or a CSV file of measured values beside the netlist. By default the section
             [tolerances] of the netlist.
@@ -76,10 +81,17 @@ def tolerance(
     with placed(drive, "tolerances"):
         population = read_population(model, given, pairs, folder)
     texts = [subject_to] if isinstance(subject_to, str) else list(subject_to)
-    limits = read_limits(lambda name: read_number(model, name).unit, texts)
-    names = [of] if isinstance(of, str) else list(of)
     run = {"until": until, "start": start}
-    return spread(model, population, names, limits, run, precision, most, shares=shares, seed=seed, processes=processes)
+    sized = Sized(drive, model, lambda: quick_run(model, until, start=start))
+    limits = read_limits(lambda name: _unit(model, sized, name), texts)
+    names = [of] if isinstance(of, str) else list(of)
+    return spread(
+        model, population, names, limits, run, sized, precision, most, shares=shares, seed=seed, processes=processes
+    )
+
+
+def _unit(model: CompiledDae, sized: Sized, name: str) -> Unit:
+    return sized.unit(name) if sized.has(name) else read_number(model, name).unit
 
 
 def scatter_of(
@@ -97,31 +109,33 @@ def scatter_of(
 
 def spread(
     model: CompiledDae, population: Population, of: Sequence[str], limits: Sequence[Limit], run: Mapping[str, Any],
-    precision: float, most: int = _MOST, *, shares: bool = False, seed: int = 0, processes: int | None = None,
+    sized: Sized, precision: float, most: int = _MOST, *, shares: bool = False, seed: int = 0,
+    processes: int | None = None,
 ) -> Tolerances:  # fmt: skip
-    """Return what a population of parameters does; see `tolerance`."""
+    """Return what a population of parameters does; see `tolerance`. `sized` knows the lines of design checks."""
     chance = next((limit.text for limit in limits if limit.probability < 1.0), None)
     if chance is not None:
         raise ValueOutOfRange(
             f"'{chance}' asks for a probability, which is the answer here.", advice="Write the limit alone."
         )
     names = list(dict.fromkeys([*of, *(limit.name for limit in limits)]))
-    for name in listed(names, "output"):
-        read_number(model, name)
+    units = [_unit(model, sized, name) for name in listed(names, "output")]
     if not 0.0 < precision < 1.0 or most < _BATCH * _BATCHES:
         raise ValueOutOfRange(
             f"The precision must be between 0 and 1, and the runs at least {_BATCH * _BATCHES}: they are {precision:g} "
             f"and {most}."
         )
-    return _Study(model, population, names, limits, run, seed, processes).result(precision, most, shares)
+    study = _Study(model, population, names, units, limits, run, Outputs(names, sized), seed, processes)
+    return study.result(precision, most, shares)
 
 
 class _Study:
     def __init__(
-        self, model: CompiledDae, population: Population, names: Sequence[str], limits: Sequence[Limit],
-        run: Mapping[str, Any], seed: int, processes: int | None,
+        self, model: CompiledDae, population: Population, names: Sequence[str], units: Sequence[Unit],
+        limits: Sequence[Limit], run: Mapping[str, Any], outputs: Outputs, seed: int, processes: int | None,
     ) -> None:  # fmt: skip
         self.model, self.population, self.names, self.limits = model, population, list(names), limits
+        self.units, self.outputs = units, outputs
         self.run, self.seed, self.processes = run, seed, processes
         self.notices: dict[str, None] = {}
 
@@ -145,9 +159,13 @@ class _Study:
         model = self.model.with_parameters(middle)
         to = [scatter.name for scatter in self.population.scatters]
         try:
-            return sensitivities(model, self.names, to, **self.run), []
+            of_runs = sensitivities(model, self.outputs.read, to, **self.run)
         except NoGradient as error:
             return None, [f"There is no first-order answer. {error.what}"]
+        numbers = np.array([output.value for output in of_runs.outputs])
+        values = map(float, self.outputs.values(numbers[None, :])[0])
+        outputs = tuple(map(Quantity, self.names, values, self.units))
+        return replace(of_runs, outputs=outputs, derivatives=self.outputs.slopes(numbers, of_runs.derivatives)), []
 
     def _sampled(self, precision: float, most: int) -> tuple[Vector, Vector]:
         """Return points and outputs of batches; shapes (runs, parameters) and (batches, points, outputs)."""
@@ -175,12 +193,12 @@ class _Study:
         ranges = {name: (float(a), float(b)) for name, a, b in zip(names, low, high, strict=True)}
         settings = {key: value for key, value in self.run.items() if value is not None}
         found = sweep(
-            self.model, ranges, self.names, sampling=Samples((points - low) / (high - low)),
+            self.model, ranges, self.outputs.read, sampling=Samples((points - low) / (high - low)),
             processes=self.processes, **settings,
         )  # fmt: skip
         if found.attrs["notice"]:
             self.notices[str(found.attrs["notice"])] = None
-        return np.column_stack([found[name].to_numpy() for name in self.names])
+        return self.outputs.values(np.column_stack([found[name].to_numpy() for name in self.outputs.read]))
 
     def _precise(self, values: Vector, precision: float) -> bool:
         """Whether means and probabilities are known to the precision."""
@@ -210,7 +228,7 @@ class _Study:
         low, high = self._corners(k, row)
         quantiles = np.nanquantile(column, Spread.LEVELS)
         return Spread(
-            self.names[k], read_number(self.model, self.names[k]).unit,
+            self.names[k], self.units[k],
             float(linear.outputs[k].value) if linear is not None else np.nan, float(np.sqrt(variance)),
             float(np.nanmean(column)), _half_width(np.nanmean(column, axis=1)), float(np.nanstd(column)),
             tuple(map(float, quantiles)), parts / variance if variance > 0.0 else np.zeros(len(row)), low, high,
