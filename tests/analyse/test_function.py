@@ -83,6 +83,28 @@ def test_second_derivatives_of_the_friction_work() -> None:
     assert function.second_error < 1e-4
 
 
+def test_hessian_products_of_document_000() -> None:
+    """The clutch locks after J w/(M - L), with the friction work M J w²/(2 (M - L))."""
+    function = table()
+    direction = np.array([1.0, -0.5])
+    products = function.hessian_products([M, L], direction)
+    times = 2 * J * w / (M - L) ** 3 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    cross = -J * w**2 / 2 * (M + L) / (M - L) ** 3
+    work = np.array([[J * w**2 * L / (M - L) ** 3, cross], [cross, J * w**2 * M / (M - L) ** 3]])
+    assert products == pytest.approx(np.array([times @ direction, work @ direction]), rel=1e-6)
+    assert function.second_error < 1e-4
+
+
+def test_what_is_linear_has_no_second_derivative() -> None:
+    """The friction work is linear in J, on which the time does not depend: the clutch is sized for it."""
+    function = simulation_function(
+        EXAMPLES / "machine_table_direct.toml", ["hub_inertia"], ["clutch.lock_time", "clutch.loss_energy"]
+    )
+    products = function.hessian_products(function.start_values, [1.0])
+    assert np.all(np.abs(products * function.start_values**2).ravel() < 1e-5 * np.array([0.2, 5453.0]))
+    assert function.second_error < 1e-2
+
+
 def test_another_mode_sequence_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
     function = table()
     with pytest.raises(NoGradient, match=r"'clutch\.mode: backward → stuck' is missing"):

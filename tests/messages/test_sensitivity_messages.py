@@ -248,6 +248,10 @@ There is no output 'table.v' in these sensitivities; did you mean 'table.s'?""")
 The precision of a replay, 1e-20, is out of range: it must be between 1e-13 and 0.001."""),
     "an output that is infinite": (NoGradient, lambda: table("table.s/0"), """\
 table.s/0 is inf: what is not finite has no derivative."""),
+    "a direction of another length": (ValueOutOfRange, lambda: simulation_function(
+        DIRECT, ["load_torque"], ["clutch.lock_time"]
+    ).hessian_products([15.0], [1.0, 2.0]), """\
+The direction needs a number for each parameter, 1 in all, of which one is not zero."""),
     "second derivatives beside another sequence": (NoGradient, lambda: doubtful_hessian(), """\
 The second derivatives of table.v by clutch_torque are not certain: steps of 0.001 and 0.002 of its value differ by 0.14 of the largest one.
 Within these steps the mode sequence changes, or the gradient bends sharply.

@@ -15,9 +15,10 @@ from modelica_like.analyse.sensitivity.callback import NamedCallback
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, chosen_parameters, sensitivities
 from modelica_like.analyse.sensitivity.formulas import free_formulas
 from modelica_like.analyse.sensitivity.result import Quantity
+from modelica_like.analyse.sensitivity.second import SecondDerivatives
 from modelica_like.arguments import checked
 from modelica_like.compile.buffers import Vector
-from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient
+from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient, ValueOutOfRange
 from modelica_like.options import Options
 from modelica_like.runs.readings import does_not_happen, is_series, listed, read_output
 from modelica_like.runs.solution import Solution
@@ -28,10 +29,6 @@ from modelica_like.solve.recorder import Event
 Found = TypeVar("Found")
 
 _TOGETHER = 1e-9
-_CHANGE = 1e-3
-"""Relative change of a parameter for second derivatives, and twice it: gradients known to 1e-8 give about 1e-5."""
-_UNCERTAIN = 1e-2
-"""Error of second derivatives over the largest one, each by relative changes, from which on they are refused."""
 _AGREE = 1e-5
 """Difference of the derivatives of run-time and replay, beyond which one of them has gone over something."""
 _FINER = 1e-2
@@ -50,6 +47,7 @@ class SimulationFunction(NamedCallback):
         inputs: paths of the parameters p.
         outputs: names of the outputs y, as in `sensitivities`.
         start_values: values of the parameters in the model, a starting point.
+        precision: relative, of the derivatives.
         runs: number of simulations so far.
         refusal: why the last evaluation failed, if it did.
         second_error: bound of the error of the last second derivatives, over the largest one.
@@ -68,7 +66,7 @@ class SimulationFunction(NamedCallback):
         freed = free_formulas(drive, inputs, run["parameters"])
         self._model = freed.model
         self._run = {**run, "parameters": freed.values}
-        self._precision = precision
+        self.precision = precision
         self._nan_where_refused = nan_where_refused
         self._agrees = steering
         self._simulated: tuple[bytes, Solution] | None = None
@@ -88,13 +86,14 @@ class SimulationFunction(NamedCallback):
             result = self._differentiate(solution)
         self._last = self.start_values.tobytes(), result
         self.runs = 0
-        self._jacobian = _Jacobian(self)
+        self._second = SecondDerivatives(self, (len(self.outputs), len(self.inputs)))
+        self._jacobian = _Jacobian(self, self._second)
         dense = ca.Sparsity.dense
         self.declare("simulation", {"p": dense(len(self.inputs))}, {"y": dense(len(self.outputs))})
 
     def _differentiate(self, solution: Solution) -> Sensitivities:
         start = self._run.get("start")
-        return sensitivities(solution, self.outputs, self.inputs, start=start, precision=self._precision)
+        return sensitivities(solution, self.outputs, self.inputs, start=start, precision=self.precision)
 
     def _by_run_time(self, values: Vector) -> Sensitivities | None:
         """Simulate at parameter values with derivatives by the run-time; None where the replay has to tell."""
@@ -182,6 +181,28 @@ class SimulationFunction(NamedCallback):
             self._simulated = key, solution
         return self._simulated[1]
 
+    def hessian_products(self, p: Vector | Sequence[float], direction: Vector | Sequence[float]) -> Vector:
+        """Return the second derivatives of each output times a direction: four gradients for any number of parameters.
+
+        Args:
+            p: values of the parameters.
+            direction: in which they change, shape (parameters,).
+
+        Returns:
+            Shape (outputs, parameters); `second_error` bounds their error.
+
+        Raises:
+            ValueOutOfRange: the direction has another number of entries, or is zero.
+            NoGradient: they are not certain, as where the mode sequence changes nearby.
+            ModelicaLikeError: the simulation fails.
+        """
+        along = np.asarray(direction, float).ravel()
+        if len(along) != len(self.inputs) or not np.any(along):
+            raise ValueOutOfRange(
+                f"The direction needs a number for each parameter, {len(self.inputs)} in all, of which one is not zero."
+            )
+        return self._second.products(np.asarray(p, float).ravel(), along)
+
     def attempt(self, what: Callable[[Vector], Found], p: Any) -> Found | None:
         """Simulate for CasADi; an error is kept in `refusal`, and raised unless nan is wanted."""
         self.refusal = None
@@ -210,12 +231,11 @@ class SimulationFunction(NamedCallback):
 class _Jacobian(NamedCallback):
     """dy/dp of a simulation."""
 
-    def __init__(self, simulation: SimulationFunction) -> None:
+    def __init__(self, simulation: SimulationFunction, second: SecondDerivatives) -> None:
         super().__init__()
-        self._simulation = simulation
+        self._simulation, self._second = simulation, second
         self._size = len(simulation.outputs), len(simulation.inputs)
         arguments = {"p": ca.Sparsity.dense(self._size[1]), "out_y": ca.Sparsity(self._size[0], 1)}
-        self._second = _Second(simulation, self._size)
         self.declare("jacobian", arguments, {"jac_y_p": ca.Sparsity.dense(*self._size)})
 
     def has_jacobian(self) -> bool:
@@ -229,62 +249,6 @@ class _Jacobian(NamedCallback):
     def eval(self, arg: Any) -> list[Any]:
         values = self._simulation.attempt(self._simulation.at, arg[0])
         return [ca.DM(np.full(self._size, np.nan) if values is None else values.derivatives)]
-
-
-class _Second(NamedCallback):
-    """d²y/dp² of a simulation: CasADi's own differences have a step of 1e-8, in which a parameter of 1e4 drowns.
-
-    Central differences of the exact Jacobian with two steps, extrapolated (L. F. Richardson, 1911). What both differ by
-    bounds the error: where it is not small, a mode sequence changes within the steps, or the gradient bends sharply.
-    """
-
-    def __init__(self, simulation: SimulationFunction, size: tuple[int, int]) -> None:
-        super().__init__()
-        self._simulation, self._size, dense = simulation, size, ca.Sparsity.dense
-        count = size[0] * size[1]
-        arguments = {"p": dense(size[1]), "out_y": ca.Sparsity(size[0], 1), "out_jac_y_p": ca.Sparsity(*size)}
-        results = {"jac_jac_y_p_p": dense(count, size[1]), "jac_jac_y_p_out_y": ca.Sparsity(count, size[0])}
-        self.declare("second", arguments, results)
-
-    def eval(self, arg: Any) -> list[Any]:
-        p = np.array(arg[0], float).ravel()
-        derivatives = self._simulation.attempt(self._derivatives, p)
-        if derivatives is None:
-            derivatives = np.full((*self._size, self._size[1]), np.nan)
-        flat = derivatives.reshape(self._size[0] * self._size[1], -1, order="F")
-        return [ca.DM(flat), ca.DM(self._size[0] * self._size[1], self._size[0])]
-
-    def _derivatives(self, p: Vector) -> Vector:
-        """Return second derivatives, shape (outputs, parameters, parameters).
-
-        Raises:
-            NoGradient: they are not certain.
-        """
-        sizes = np.where(p == 0.0, 1.0, np.abs(p))
-        derivatives, errors = (np.zeros((*self._size, self._size[1])) for _ in range(2))
-        for k in range(len(p)):
-            near, far = (self._difference(p, k, change * sizes[k]) for change in (_CHANGE, 2.0 * _CHANGE))
-            derivatives[:, :, k] = (4.0 * near - far) / 3.0
-            errors[:, :, k] = np.abs(near - far) / 3.0
-        scale = sizes[:, None] * sizes
-        largest = (np.abs(derivatives) * scale).max(axis=(1, 2))
-        relative = (errors * scale).max(axis=1) / np.where(largest > 0.0, largest, 1.0)[:, None]
-        self._simulation.second_error = float(relative.max())
-        row, column = np.unravel_index(np.argmax(relative), relative.shape)
-        if relative[row, column] > _UNCERTAIN:
-            of, by = self._simulation.outputs[row], self._simulation.inputs[column]
-            raise NoGradient(
-                f"The second derivatives of {of} by {by} are not certain: steps of {_CHANGE:g} and {2 * _CHANGE:g} of "
-                f"its value differ by {relative[row, column]:.2g} of the largest one.",
-                why="Within these steps the mode sequence changes, or the gradient bends sharply.",
-                advice="Use the gradient alone: hessian_approximation = limited-memory in IPOPT.",
-            )
-        return derivatives
-
-    def _difference(self, p: Vector, k: int, step: float) -> Vector:
-        unit = step * (np.arange(len(p)) == k)
-        above, below = (self._simulation.at(p + sign * unit).derivatives for sign in (1.0, -1.0))
-        return (above - below) / (2.0 * step)
 
 
 @checked
