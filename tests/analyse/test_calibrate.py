@@ -74,6 +74,7 @@ def test_both_lines_as_an_independent_solver_fits_them(identified):
     slopes = fitted.jac / [0.05, 0.8, 0.05]
     covariance = np.linalg.inv(slopes.T @ slopes) * (2 * fitted.cost / (52 - 3))
     np.testing.assert_allclose(both.covariance, covariance, rtol=1e-4)
+    np.testing.assert_allclose(both.fisher, slopes.T @ slopes, rtol=1e-4)
     assert both.identifiable
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from modelica_like.analyse.calibration.measurements import Measurement, Numbers, OperatingPoints, Trajectories
 from modelica_like.analyse.calibration.pictures import ellipses
+from modelica_like.analyse.optimize.terms import read_free, starts_of
 from modelica_like.analyse.written import with_values
 from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae
@@ -25,7 +26,6 @@ from modelica_like.errors import (
     extra_module,
 )
 from modelica_like.language import Assembly, Component
-from modelica_like.language.units import to_si
 from modelica_like.simulation import Model, build, loaded
 
 if TYPE_CHECKING:
@@ -54,6 +54,8 @@ class Calibration:
         labels: what each residual belongs to.
         covariance: of the values, shape (parameters, parameters), scaled to the scatter of the residuals (with no more
             numbers than parameters, by the stated uncertainties); nan for undetermined parameters.
+        fisher: the Fisher information of the data about the values, by the stated uncertainties, shape (parameters,
+            parameters), in SI units: what they do not determine is in its null space.
         rank: number of combinations of parameters that the data determine.
         undetermined: combinations that the data do not determine, as weights of relative changes, by parameter (near
             zero, of changes relative to 1e-4 of the distance of the bounds).
@@ -69,6 +71,7 @@ class Calibration:
     residuals: Matrix = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     covariance: Matrix = field(repr=False)
+    fisher: Matrix = field(repr=False)
     rank: int
     undetermined: tuple[dict[str, float], ...]
     at_bounds: tuple[str, ...]
@@ -173,8 +176,8 @@ def calibrate(
     drive = loaded(drive)
     model = build(drive, free=parameters)
     measured = _measurements(data, parameters, starts)
-    problem = _Problem(model, measured, parameters)
-    begins = problem.starts(guess or {}, starts, seed)
+    problem = _Problem(model, measured, parameters, guess or {})
+    begins = problem.starts(starts, seed)
     results: list[Any] = []
     failures: list[InitializationError | SolveError] = []
     for begin in begins:
@@ -218,32 +221,20 @@ class _Problem:
     """Residuals and their Jacobian in values scaled by the bounds."""
 
     def __init__(
-        self, model: CompiledDae, data: Sequence[Measurement], parameters: Mapping[str, tuple[Any, Any]]
-    ) -> None:
+        self, model: CompiledDae, data: Sequence[Measurement], parameters: Mapping[str, tuple[Any, Any]],
+        guess: Mapping[str, Any],
+    ) -> None:  # fmt: skip
         self.model, self.data, self.names = model, data, tuple(parameters)
-        for name in self.names:
-            # Raises an error for a wrong name.
-            model.with_parameters({name: parameters[name][0]})
-        self.units = tuple(str(model.units[name]) for name in self.names)
-        bounds = np.array([[to_si(v, model.units[name], name) for v in parameters[name]] for name in self.names])
-        self.low, self.high = bounds.T
-        for name, low, high in zip(self.names, self.low, self.high, strict=True):
-            if not low < high:
-                raise ValueOutOfRange(f"{name}: the lower bound {low:g} is not below the upper bound {high:g}.")
-        self.span = self.high - self.low
+        self.free = read_free(model.with_parameters(dict(guess)), parameters, moved=True)
+        self.units = tuple(str(parameter.unit) for parameter in self.free)
+        self.low = np.array([parameter.low for parameter in self.free])
+        self.span = np.array([parameter.span for parameter in self.free])
         self.labels: tuple[str, ...] = ()
         self._at: tuple[bytes, Matrix, Matrix] | None = None
 
-    def starts(self, guess: Mapping[str, Any], count: int, seed: int) -> list[Matrix]:
+    def starts(self, count: int, seed: int) -> list[Matrix]:
         """Return starts in [0, 1]."""
-        model = self.model.with_parameters(dict(guess))
-        first = np.array([model.p[model.parameter_position[name]] for name in self.names])
-        begins = [np.clip((first - self.low) / self.span, 0.0, 1.0)]
-        if count > 1:
-            from modelica_like.analyse.sweeps.plan import LatinHypercube
-
-            begins += list(LatinHypercube(count - 1, seed).unit_cube(len(self.names)))
-        return begins
+        return [(x - self.low) / self.span for x in starts_of(self.free, count, seed)]
 
     def solve(self, begin: Matrix) -> Any:
         """Run the least-squares solver from one start."""
@@ -273,7 +264,8 @@ class _Problem:
         residuals, slopes = self.evaluate(fit.x)
         values = self.low + self.span * fit.x
         sizes = np.maximum(np.abs(values), _SMALL * self.span)
-        relative = slopes / self.span * sizes
+        by_values = slopes / self.span
+        relative = by_values * sizes
         _, singular, right = np.linalg.svd(relative, full_matrices=True)
         padded = np.concatenate([singular, np.zeros(len(self.names) - len(singular))])
         determined = padded > _RANK * padded.max(initial=1e-300)
@@ -285,7 +277,7 @@ class _Problem:
         edges = tuple(name for name, q in zip(self.names, fit.x, strict=True) if q <= 1e-9 or q >= 1 - 1e-9)
         return Calibration(
             self.at(fit.x), self.names, values, self.units, residuals, self.labels, covariance,
-            int(determined.sum()), lost, edges, costs,
+            by_values.T @ by_values, int(determined.sum()), lost, edges, costs,
         )  # fmt: skip
 
     def _covariance(self, right: Matrix, singular: Matrix, determined: Any, residuals: Matrix, sizes: Matrix) -> Matrix:

@@ -16,7 +16,7 @@ from modelica_like.analyse.optimize.problem import Question, make_problem
 from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optimum
 from modelica_like.analyse.optimize.runs import Runs
 from modelica_like.analyse.optimize.solve import FEASIBLE, MOST_STEPS, Outcome, Search
-from modelica_like.analyse.optimize.terms import Row
+from modelica_like.analyse.optimize.terms import Row, starts_of
 from modelica_like.analyse.tolerance.tolerance import scatter_of
 from modelica_like.analyse.written import placed
 from modelica_like.arguments import checked
@@ -159,13 +159,7 @@ class _Study:
         return replace(result, notes=(*result.notes, *map(str, chances.results)))
 
     def _search(self, search: Search, starts: int) -> Outcome:
-        begins = [self.problem.begin]
-        if starts > 1:
-            from modelica_like.analyse.sweeps.plan import LatinHypercube
-
-            cube = LatinHypercube(starts - 1, self.seed).unit_cube(len(self.problem.free))
-            begins += [self.problem.low + self.problem.span * q for q in cube]
-        usable = [x for x in begins if self.runs.at(x) is not None]
+        usable = [x for x in starts_of(self.problem.free, starts, self.seed) if self.runs.at(x) is not None]
         return _better([search.from_design(x) for x in usable])
 
     def _front(self, starts: int, points: int) -> Front:

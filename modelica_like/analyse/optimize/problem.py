@@ -102,7 +102,7 @@ class Problem:
     @property
     def span(self) -> Vector:
         """Distances of the bounds, shape (free,)."""
-        return np.array([parameter.high - parameter.low for parameter in self.free])
+        return np.array([parameter.span for parameter in self.free])
 
     @property
     def begin(self) -> Vector:

@@ -9,6 +9,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnitError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.units import ONE, Unit, read_quantity, same_dimension, to_si
@@ -31,6 +32,11 @@ class Free:
     low: float
     high: float
     value: float
+
+    @property
+    def span(self) -> float:
+        """Distance of the bounds."""
+        return self.high - self.low
 
 
 @dataclass(frozen=True)
@@ -111,12 +117,22 @@ class Case:
         return f" in the load case '{self.name}'" if self.name else ""
 
 
-def read_free(model: CompiledDae, given: Mapping[str, Any]) -> tuple[Free, ...]:
+def starts_of(free: Sequence[Free], number: int, seed: int) -> list[Vector]:
+    """Return starts of a search in SI units: the values of what is free, then a Latin hypercube between the bounds."""
+    from modelica_like.analyse.sweeps.plan import LatinHypercube
+
+    low, span = np.array([parameter.low for parameter in free]), np.array([parameter.span for parameter in free])
+    cube = LatinHypercube(number - 1, seed).unit_cube(len(free)) if number > 1 else []
+    return [np.array([parameter.value for parameter in free]), *(low + span * q for q in cube)]
+
+
+def read_free(model: CompiledDae, given: Mapping[str, Any], *, moved: bool = False) -> tuple[Free, ...]:
     """Return the free parameters with their bounds.
 
     Args:
         model: compiled, with these parameters decoupled from formulas.
         given: lower and upper bound by path, numbers in SI units or quantities.
+        moved: whether a value of the drive that is not between its bounds moves to the next one.
 
     Raises:
         UnknownName: there is no such parameter.
@@ -128,10 +144,10 @@ def read_free(model: CompiledDae, given: Mapping[str, Any]) -> tuple[Free, ...]:
             "An optimisation needs something that is free.",
             advice='Give a parameter and its bounds: free = { "clutch.capacity" = ["20 N.m", "120 N.m"] }.',
         )
-    return tuple(_free(model, name, bounds) for name, bounds in given.items())
+    return tuple(_free(model, name, bounds, moved=moved) for name, bounds in given.items())
 
 
-def _free(model: CompiledDae, name: str, bounds: Any) -> Free:
+def _free(model: CompiledDae, name: str, bounds: Any, *, moved: bool) -> Free:
     if isinstance(bounds, str) or not isinstance(bounds, Sequence) or len(bounds) != 2:
         raise ValueOutOfRange(
             f"{name}: the bounds must be two values, not {bounds!r}.", advice='Write ["20 N.m", "120 N.m"].'
@@ -145,6 +161,8 @@ def _free(model: CompiledDae, name: str, bounds: Any) -> Free:
     low, high = (to_si(bound, unit, name) for bound in bounds)
     if not low < high:
         raise ValueOutOfRange(f"{name}: the lower bound {low:g} is not below the upper bound {high:g}.")
+    if moved:
+        value = min(max(value, low), high)
     if not low <= value <= high:
         raise ValueOutOfRange(
             f"{name} = {value:g} {_text(unit)}".rstrip() + f" is not between its bounds {low:g} and {high:g}.",
