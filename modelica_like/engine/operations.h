@@ -1,6 +1,7 @@
 /* Elementary operations of tapes: name, value of a and b, its slopes by a and by b, in which f is the value.
- * Comparisons and roundings are constant between jumps. The order is that of OPERATIONS in tape.py; whoever includes
- * this says what OPERATION is to be. */
+ * Comparisons and roundings are constant between jumps. Of equal operands, minimum and maximum have the mean of both
+ * slopes, as the tapes of Jacobians have: what stays on the border of two branches must not mix them. The order is that
+ * of OPERATIONS in tape.py; whoever includes this says what OPERATION is to be. */
 /* clang-format off */
 OPERATION(ADD, a + b, 1, 1)
 OPERATION(SUB, a - b, 1, -1)
@@ -36,8 +37,8 @@ OPERATION(SIGN, sign(a), 0, 0)
 OPERATION(COPYSIGN, copysign(a, b), copysign(1, a) == copysign(1, b) ? 1 : -1, 0)
 OPERATION(IF_ELSE_ZERO, if_else_zero(a, b), 0, a != 0)
 OPERATION(ERF, erf(a), 1.1283791670955126 * exp(-a * a), 0)
-OPERATION(FMIN, min_of(a, b), a <= b, !(a <= b))
-OPERATION(FMAX, max_of(a, b), a >= b, !(a >= b))
+OPERATION(FMIN, min_of(a, b), a == b ? 0.5 : a < b, a == b ? 0.5 : !(a < b))
+OPERATION(FMAX, max_of(a, b), a == b ? 0.5 : a > b, a == b ? 0.5 : !(a > b))
 OPERATION(INV, 1 / a, -f * f, 0)
 OPERATION(SINH, sinh(a), cosh(a), 0)
 OPERATION(COSH, cosh(a), sinh(a), 0)

@@ -136,3 +136,16 @@ def test_a_state_that_rests_at_a_limit_has_two_derivatives(limit):
     handle.step(1.0)
     lag = 1 - np.exp(-10.0)
     np.testing.assert_allclose(handle.gradient().ravel(), [1 - 0.1 * lag, lag], rtol=1e-7)
+
+
+def test_a_run_that_stays_on_the_border_of_two_branches():
+    """Both loss lines of the gear meet at 1 N.m, also with another size of them: it brakes 0.002 kg.m2 from 10 rad/s.
+
+    The angle is 0.1 rad / size. What leads off the border, as one of the masses, has no derivative.
+    """
+    drive = ROOT / "examples" / "msl" / "rotational" / "LossyGearDemo3.toml"
+    found = handle_at(drive, 0.4, ["torque1.phi"], ["gear.tau_scale"]).gradient()
+    assert found[0, 0] == pytest.approx(-0.1, rel=1e-12)
+    found = handle_at(drive, 0.4, ["torque1.phi"], ["gear.tau_scale", "Inertia1.J"]).gradient()
+    assert found[0, 0] == pytest.approx(-0.1, rel=1e-12)
+    assert np.isnan(found[0, 1])
