@@ -3,14 +3,9 @@
  * follows from those at the nodes of its stages. */
 #include "adjoint.h"
 
-#define RESTS 1e-3       /* of a run: a step from which on what is zero at both its ends rests */
-#define NEARBY_KINK 3e-6 /* of sizes: how far slopes beside a kink are looked at */
-#define FELT_SLOPE 1e-9  /* of slopes, by which states change in the time of a run */
-#define FELT_KINK 1e-3   /* of a slope: curvature changes it by about NEARBY_KINK */
-#define CLOSER 0.01      /* the part of that where a kink differs as much */
-#define MOST_EDGES 100   /* in a step: more are noise */
-#define MOST_ERROR 10    /* tolerances, as estimated, beside the largest effects on an output: results have less */
-#define MOST_HALVINGS 8  /* of a step: what begins on a kink is wrong in its first part only, of 4e-3 */
+#define MOST_EDGES 100  /* in a step: more are noise */
+#define MOST_ERROR 10   /* tolerances, as estimated, beside the largest effects on an output: results have less */
+#define MOST_HALVINGS 8 /* of a step: what begins on a kink is wrong in its first part only, of 4e-3 */
 
 /* Adds bars of states, parameters, inputs and d, which lie in `dots`, and of the time. */
 void add_bars(Instance *c, double *vector) {
@@ -193,97 +188,6 @@ static void smoothly_back(Instance *c, double begin, double end, int halvings) {
         memset(states, 0, n * sizeof(double));
         adjoint_of_implicit(c, 1);
         add_bars(c, vector_of(c, v));
-    }
-}
-
-/* Slopes along a direction at the present point. */
-static void slopes_along(Instance *c, const double *direction, double *slopes) {
-    const Model *m = c->model;
-    double *dots = c->dots;
-    c->variables_valid = c->state.z_valid = 0;
-    memset(slopes, 0, (size_t)m->n_x * sizeof(double));
-    if (!factor_implicit(c)) return;
-    memset(dots, 0, (size_t)m->slot_results * sizeof(double));
-    memcpy(dots + m->slot_x, direction + (c->x - c->numbers), (size_t)m->n_x * sizeof(double));
-    memcpy(dots + m->slot_p, direction + (c->p - c->numbers), (size_t)m->n_p * sizeof(double));
-    memcpy(dots + m->slot_u, direction + (c->u - c->numbers), (size_t)m->n_u * sizeof(double));
-    memcpy(dots + m->slot_d, direction + (c->d - c->numbers), (size_t)m->n_d * sizeof(double));
-    tangent_of_implicit(c);
-    tangent_now(c, &m->tapes.rates, slopes);
-}
-
-/* By how much slopes along a direction differ that can be felt in the time of a run. */
-static double felt(const Instance *c, const double *direction, const double *some, const double *others) {
-    const double *x = direction + (c->x - c->numbers), *nominals = c->model->nominals;
-    double largest = 0, most = 0, span = span_of(c);
-    for (int k = 0; k < c->model->n_x; k++) largest = max_of(largest, fabs(x[k]) / nominals[k]);
-    for (int k = 0; k < c->model->n_x; k++) {
-        double change = fabs(some[k] - others[k]), least = FELT_SLOPE * largest * nominals[k] / span;
-        int any = change > least && change > FELT_KINK * max_of(fabs(some[k]), fabs(others[k]));
-        if (any) most = max_of(most, change / nominals[k]);
-    }
-    return most;
-}
-
-/* By how much slopes along a direction differ a little to its two sides, or in a mode (-1: none) and another one. */
-static double felt_beside(Instance *c, const double *direction, double part, int mode, int target) {
-    Gradient *g = c->gradient;
-    size_t size = c->n_smooth * sizeof(double);
-    double *kept = g->sides, *slopes = g->rates;
-    memcpy(kept, c->numbers, size);
-    for (int side = 0; side < 2; side++) {
-        for (size_t k = 0; k < c->n_smooth && mode < 0; k++) c->numbers[k] += (side ? part : -part) * direction[k];
-        if (mode >= 0 && side) c->d[mode] = target;
-        slopes_along(c, direction, slopes + side * c->model->n_unknowns);
-        memcpy(c->numbers, kept, size);
-    }
-    c->variables_valid = c->state.z_valid = 0;
-    return felt(c, direction, slopes, slopes + c->model->n_unknowns);
-}
-
-/* A direction that leads off an edge or guard of which `slope` is the derivative: along it numbers change by up to
- * their sizes. Of parameters and inputs, only those asked for. */
-static int direction_off(Instance *c, double *slope, double *direction) {
-    const Gradient *g = c->gradient;
-    double largest = 0;
-    memset(direction, 0, c->n_smooth * sizeof(double));
-    for (size_t k = 0; k < c->n_smooth; k++) {
-        ptrdiff_t state = (ptrdiff_t)k - (c->x - c->numbers), entry = (ptrdiff_t)k - (c->d - c->numbers);
-        int is_state = state >= 0 && state < c->model->n_x, is_entry = entry >= 0 && entry < c->model->n_d;
-        double size = fabs(c->numbers[k]) + (is_state ? c->model->nominals[state] : 1);
-        direction[k] = is_state || is_entry || g->asked[k] ? slope[k] * size : 0;
-        largest = max_of(largest, fabs(direction[k]));
-        direction[k] *= size;
-    }
-    for (size_t k = 0; k < c->n_smooth && largest > 0; k++) direction[k] /= largest;
-    return largest > 0;
-}
-
-/* What rests at a limit, an end of play or a row of a table has two derivatives by what leads off it. Behind an event
- * something may be zero for a short step because it begins there. */
-static void check_kinks(Instance *c) {
-    Gradient *g = c->gradient;
-    const Model *m = c->model;
-    int n = m->tapes.edges.n_outputs, n_kinks = m->settings->n_kinks;
-    double *here = c->edges_middle, *slope = g->slope, *direction = g->work;
-    if (c->piece->end - c->piece->begin < RESTS * span_of(c) || !stands_on_edge(c, c->positive) || !factor_implicit(c))
-        return;
-    for (int k = 0; k < n_kinks; k++) {
-        if (fabs(here[k]) > AT_EDGE || fabs(here[n + k]) > AT_EDGE) continue;
-        slope_of_output(c, &m->tapes.edges, k, here + 2 * n, slope);
-        if (!direction_off(c, slope, direction)) continue;
-        double most = felt_beside(c, direction, NEARBY_KINK, -1, 0);
-        if (most > 0 && felt_beside(c, direction, CLOSER * NEARBY_KINK, -1, 0) > 0.5 * most)
-            add_doubt(c, FAILURE_LOST_AT_KINK, slope);
-        if (!factor_implicit(c)) return;
-    }
-    for (int k = 0; k < m->n_guards; k++) {
-        const Transition *to = &m->transitions[m->guard_transition[k]];
-        if (!c->positive[k]) continue;
-        slope_of_output(c, &m->tapes.guards, k, c->edge_guards, slope);
-        if (!direction_off(c, slope, direction)) continue;
-        if (felt_beside(c, direction, NEARBY_KINK, to->mode, to->target) > 0) add_doubt(c, FAILURE_LOST_AT_KINK, slope);
-        if (!factor_implicit(c)) return;
     }
 }
 

@@ -69,8 +69,9 @@ struct Gradient {
     double *points, *matrices, *stages, *node_bars; /* of a step */
     double *integrand_slopes, *integrand_bars;      /* by states and implicit unknowns, and by the rest, at the nodes */
     double *later, *lanes;                          /* derivatives by the time of an instant; bars of several vectors */
-    unsigned char *still;                           /* vectors that a step leaves as they are */
-    const Along *along;                             /* or NULL */
+    double *rests; /* of operations, then of guards: since when they are at their kinks, on the way back, or nan */
+    unsigned char *still; /* vectors that a step leaves as they are */
+    const Along *along;   /* or NULL */
     int64_t next_seed, instant;
     ptrdiff_t *listed;
     unsigned char *marks; /* numbers that the last instant has felt */
@@ -111,6 +112,9 @@ double seed_behind(Instance *c, double t, int add);
 void add_bars(Instance *c, double *vector);
 void slope_of_output(Instance *c, const Tape *tape, int output, double *bars, double *slope);
 void piece_back(Instance *c, const Record *along);
+/* kinks.c */
+void check_kinks(Instance *c);
+void check_outputs(Instance *c, const uint32_t of[]);
 /* integrals.c */
 double integral_back(int of_error, double *stages, double *weights);
 double slopes_of_integrands(Instance *c, double begin, double h);

@@ -187,7 +187,6 @@ const double *rounding_of_guards(Instance *c, const Piece *piece, double t);
 double seen_length(Instance *c, double least, double *most);
 void keep_edges(Instance *c);
 int is_over_edge(Instance *c);
-int stands_on_edge(Instance *c, unsigned char *zero);
 int jumps_between(Instance *c, double before, double behind);
 double edge_ahead(Instance *c, double t, double *behind);
 /* fixed.c */

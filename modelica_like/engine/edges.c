@@ -193,23 +193,6 @@ static const double *guards_inside(Instance *c, double t) {
     return c->edge_guards;
 }
 
-/* Is a kink, or a guard, zero now and at the end of the piece? Nothing but parameters may lead off it.
- * `zero` marks the guards. */
-int stands_on_edge(Instance *c, unsigned char *zero) {
-    const Model *m = c->model;
-    int any = 0;
-    double *here = c->edges_middle, *end = here + m->tapes.edges.n_outputs;
-    for (int side = 0; side < 2; side++) {
-        double t = side == 0 ? c->state.t : c->piece->end;
-        const double *guards = guards_inside(c, t);
-        for (int k = 0; k < m->n_guards; k++)
-            zero[k] = (side == 0 || zero[k]) && fabs(guards[k]) <= AT_EDGE && guard_active(c, k);
-        if (m->settings->n_kinks > 0) edges_inside(c, t, side == 0 ? here : end);
-    }
-    for (int k = 0; k < m->settings->n_kinks; k++) any |= fabs(here[k]) <= AT_EDGE && fabs(end[k]) <= AT_EDGE;
-    return any | any_of(zero, m->n_guards);
-}
-
 /* Notes guards that are positive at an end of the piece, or cannot fire. */
 static void note_positive(Instance *c, double t) {
     const double *guards = guards_inside(c, t);

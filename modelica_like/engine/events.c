@@ -289,6 +289,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     for (int k = 0; k < m->n_transitions; k++) due |= wanting[k] && m->transitions[k].timed;
     for (int round = 0; round < rounds; round++) {
         int any = 0;
+        if (c->passing) gradient_round(c, round, wanting, 0);
         if (!changes && (round > 0 || pushed(c)) && !any_of(wanting, m->n_transitions)) {
             if (!meet(c, -1, &met)) return RESULT_ERROR;
             if (met) find_wanting(c, wanting, 1);

@@ -40,6 +40,7 @@ int gradient_round(Instance *c, int round, unsigned char *wanting, int any) {
     size_t n = (size_t)c->model->n_transitions;
     if (g == NULL || g->lost != 0) return any;
     if (c->passing && round < g->n_rounds) memcpy(wanting, g->rounds + n * (size_t)round, n);
+    else if (c->passing) memset(wanting, 0, n);
     if (c->passing) return round < g->n_rounds;
     g->n_rounds = any ? round + 1 : round;
     if (any && round >= MOST_ROUNDS) gradient_lose(c, FAILURE_LOST_IN_ROUNDS);
@@ -135,6 +136,7 @@ static double *take_room(const Instance *c, size_t n_of) {
     Gradient *g = c->gradient;
     size_t n = c->n_smooth + 1, vectors = n_of + MOST_DOUBTFUL, n_y = (size_t)c->model->n_unknowns;
     size_t nonzeros = (size_t)c->model->step.n_nonzeros, integrals = g->along != NULL ? n_of * N_NODES : 0;
+    size_t rests = (size_t)(c->model->tapes.rates.n_operations + c->model->n_guards);
     const struct {
         double **array;
         size_t size;
@@ -143,7 +145,7 @@ static double *take_room(const Instance *c, size_t n_of) {
         {&g->rates, 2 * n_y}, {&g->points, N_NODES * n_y}, {&g->matrices, N_NODES * nonzeros},
         {&g->stages, (STAGES + 3) * n_y}, {&g->node_bars, vectors * N_NODES * n_y},
         {&g->integrand_slopes, integrals * n_y}, {&g->integrand_bars, integrals * n}, {&g->later, n_of},
-        {&g->lanes, (vectors < MOST_LANES ? vectors : MOST_LANES) * c->n_bars}};
+        {&g->rests, rests}, {&g->lanes, (vectors < MOST_LANES ? vectors : MOST_LANES) * c->n_bars}};
     size_t total = 0;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) total += parts[k].size;
     double *room = c->allocate(total + 2 * n + vectors, sizeof(double));
@@ -223,6 +225,7 @@ static Result go_back(Instance *c, const uint32_t of[]) {
     double one = 1;
     if (!state_copy_out(c, &present)) return RESULT_ERROR;
     g->next_seed = g->instant = 0;
+    for (int k = 0; k < c->model->tapes.rates.n_operations + c->model->n_guards; k++) g->rests[k] = NAN;
     while (seed_behind(c, c->state.t, 1) > -INFINITY) continue;
     for (const Record *record = g->last; record != NULL; record = record->previous)
         g->instant += record->pass != NULL && !record->start;
@@ -230,6 +233,7 @@ static Result go_back(Instance *c, const uint32_t of[]) {
         seed_unknowns(c, &of[k], 1, &one);
         add_bars(c, vector_of(c, k));
     }
+    if (g->along == NULL) check_outputs(c, of);
     c->passing = 1;
     c->decided_by++; /* tapes know less now, see work_out */
     for (const Record *record = g->last; record != NULL; record = record->previous) {

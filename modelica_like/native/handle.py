@@ -134,9 +134,8 @@ class Native:
     def gradient(self) -> Vector:
         """Return the derivatives of `outputs` with respect to `by`, through all events since the start.
 
-        It costs about three runs, for any number of parameters and one output. Where the run stays at a kink that
-        changes no mode (an output limited to what it just is), they are not certain, not even those of one side:
-        `sensitivities` tells or refuses them.
+        It costs about three runs, for any number of parameters and one output. By what leads off a kink at which the
+        run stays (an output limited to what it just is) there is none: `sensitivities` tells those of both sides.
 
         Returns:
             Shape (outputs, by); nan by what has none, where others have. Alone it is refused with the reason.

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components import Clutch, Constant, FirstOrder, Inertia, Integrator, Limiter
+from components import Clutch, Constant, FirstOrder, Inertia, Integrator, Limiter, Sine
 from modelica_like import Assembly, build, sensitivities, simulate
 from modelica_like.errors import NoGradient
 from modelica_like.language import Component, Equations, Input, Output, maximum, signal_in, signal_out
@@ -136,6 +136,49 @@ def test_a_state_that_rests_at_a_limit_has_two_derivatives(limit):
     handle.step(1.0)
     lag = 1 - np.exp(-10.0)
     np.testing.assert_allclose(handle.gradient().ravel(), [1 - 0.1 * lag, lag], rtol=1e-7)
+
+
+RESTING = {
+    "a signal that never moves": ({}, ["command.y", "limit.u"], "sum.y"),
+    "an output that is read there": ({}, ["command.y", "limit.u"], "limit.y"),
+    "steps shorter than a thousandth of the run": (
+        {"lag": FirstOrder(T=0.1, y=0.0), "fast": Sine(f=2000.0), "other": Integrator(k=1.0, y=0.0)},
+        ["lag.y", "limit.u"], "sum.y",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", RESTING)
+def test_what_rests_at_a_kink_has_two_derivatives(case):
+    """The integral of max(command, 0) over 1 s: its derivative by the command is 1 above zero, and 0 below."""
+    more, link, output = RESTING[case]
+    parts = {"command": Constant(k=0.0), **more, "limit": Positive(), "sum": Integrator(k=1.0, y=0.0)}
+    connect = {"link": link, "sum": ["limit.y", "sum.u"]}
+    if more:
+        connect |= {"lag": ["command.y", "lag.u"], "other": ["fast.y", "other.u"]}
+    drive = Assembly("resting", parts=parts, connect=connect)
+    with pytest.raises(NoGradient, match=r"no derivatives with respect to command\.k .*: it is at a kink there"):
+        handle_at(drive, 1.0, [output], ["command.k"]).gradient()
+    if not more:
+        moved = Assembly("moved", parts=parts | {"command": Constant(k=0.5)}, connect=connect)
+        assert handle_at(moved, 1.0, [output], ["command.k"]).gradient()[0, 0] == pytest.approx(1.0, rel=1e-12)
+
+
+def test_switches_behind_which_another_pulse_would_begin():
+    """A pulse more, by any more periods, changes nothing at the instants of this run; differences of runs have 0.
+
+    The diodes of the bridge open after the last pulse: passed again with another number, they left their impulses.
+    """
+    drive = ROOT / "examples" / "elements" / "h_bridge_machine.toml"
+    of, by = ["machine.w", "machine.ia"], ["forward.periods", "battery.V", "forward.period"]
+    found = handle_at(drive, 0.0305, of, by, rtol=1e-9).gradient()
+    np.testing.assert_array_equal(found[:, 0], 0.0)
+    model, period, change = build(drive), 1e-3, 1e-8
+    sides = [
+        simulate(model, 0.0305, parameters={by[2]: period + side * change}, rtol=1e-12, solver="native").final[of[0]]
+        for side in (-1, 1)
+    ]
+    assert found[0, 2] == pytest.approx((sides[1] - sides[0]) / (2 * change), rel=1e-5)
 
 
 def test_a_run_that_stays_on_the_border_of_two_branches():

@@ -1,0 +1,216 @@
+/* Kinks at which a run stays, or stands when it is read: operations of its equations whose slope changes or jumps where
+ * they are, and guards that are zero. What leads off them has two derivatives. */
+#include "adjoint.h"
+
+#define RESTS 1e-3 /* of a run: for how long what is zero has to be so that it rests, and what rests is looked at */
+#define NEARBY_KINK 3e-6 /* of sizes: how far slopes beside a kink are looked at */
+#define FELT_SLOPE 1e-9  /* of slopes, by which states change in the time of a run */
+#define FELT_KINK 1e-3   /* of a slope: curvature changes it by about NEARBY_KINK */
+#define CLOSER 0.01      /* the part of that where a kink differs as much */
+
+/* Slopes along a direction at the present point. */
+static void slopes_along(Instance *c, const double *direction, double *slopes) {
+    const Model *m = c->model;
+    double *dots = c->dots;
+    c->variables_valid = c->state.z_valid = 0;
+    memset(slopes, 0, (size_t)m->n_x * sizeof(double));
+    if (!factor_implicit(c)) return;
+    memset(dots, 0, (size_t)m->slot_results * sizeof(double));
+    memcpy(dots + m->slot_x, direction + (c->x - c->numbers), (size_t)m->n_x * sizeof(double));
+    memcpy(dots + m->slot_p, direction + (c->p - c->numbers), (size_t)m->n_p * sizeof(double));
+    memcpy(dots + m->slot_u, direction + (c->u - c->numbers), (size_t)m->n_u * sizeof(double));
+    memcpy(dots + m->slot_d, direction + (c->d - c->numbers), (size_t)m->n_d * sizeof(double));
+    tangent_of_implicit(c);
+    tangent_now(c, &m->tapes.rates, slopes);
+}
+
+/* By how much slopes along a direction differ that can be felt in the time of a run. */
+static double felt(const Instance *c, const double *direction, const double *some, const double *others) {
+    const double *x = direction + (c->x - c->numbers), *nominals = c->model->nominals;
+    double largest = 0, most = 0, span = span_of(c);
+    for (int k = 0; k < c->model->n_x; k++) largest = max_of(largest, fabs(x[k]) / nominals[k]);
+    for (int k = 0; k < c->model->n_x; k++) {
+        double change = fabs(some[k] - others[k]), least = FELT_SLOPE * largest * nominals[k] / span;
+        int any = change > least && change > FELT_KINK * max_of(fabs(some[k]), fabs(others[k]));
+        if (any) most = max_of(most, change / nominals[k]);
+    }
+    return most;
+}
+
+/* By how much slopes along a direction differ a little to its two sides, or in a mode (-1: none) and another one. */
+static double felt_beside(Instance *c, const double *direction, double part, int mode, int target) {
+    Gradient *g = c->gradient;
+    size_t size = c->n_smooth * sizeof(double);
+    double *kept = g->sides, *slopes = g->rates;
+    memcpy(kept, c->numbers, size);
+    for (int side = 0; side < 2; side++) {
+        for (size_t k = 0; k < c->n_smooth && mode < 0; k++) c->numbers[k] += (side ? part : -part) * direction[k];
+        if (mode >= 0 && side) c->d[mode] = target;
+        slopes_along(c, direction, slopes + side * c->model->n_unknowns);
+        memcpy(c->numbers, kept, size);
+    }
+    c->variables_valid = c->state.z_valid = 0;
+    return felt(c, direction, slopes, slopes + c->model->n_unknowns);
+}
+
+/* A direction that leads off a kink or guard of which `slope` is the derivative: along it numbers change by up to
+ * their sizes. Of parameters and inputs, only those asked for. */
+static int direction_off(Instance *c, double *slope, double *direction) {
+    const Gradient *g = c->gradient;
+    double largest = 0;
+    memset(direction, 0, c->n_smooth * sizeof(double));
+    for (size_t k = 0; k < c->n_smooth; k++) {
+        ptrdiff_t state = (ptrdiff_t)k - (c->x - c->numbers), entry = (ptrdiff_t)k - (c->d - c->numbers);
+        int is_state = state >= 0 && state < c->model->n_x, is_entry = entry >= 0 && entry < c->model->n_d;
+        is_entry = is_entry && (entry >= c->model->n_modes || c->model->modes[entry].n_names == 0);
+        double size = fabs(c->numbers[k]) + (is_state ? c->model->nominals[state] : 1);
+        direction[k] = is_state || is_entry || g->asked[k] ? slope[k] * size : 0;
+        largest = max_of(largest, fabs(direction[k]));
+        direction[k] *= size;
+    }
+    for (size_t k = 0; k < c->n_smooth && largest > 0; k++) direction[k] /= largest;
+    return largest > 0;
+}
+
+/* What is zero at the kink of an operation, and its slopes by both operands; infinity if it has no kink. */
+static double kink_of(int operation, double a, double b, double by[2]) {
+    double ratio = operation == OPERATION_FMOD || operation == OPERATION_REMAINDER ? a / b : a;
+    by[0] = 1, by[1] = 0;
+    switch (operation) {
+        case OPERATION_LT:
+        case OPERATION_LE:
+        case OPERATION_FMIN:
+        case OPERATION_FMAX: by[1] = -1; return a - b;
+        case OPERATION_FABS:
+        case OPERATION_SIGN: return a;
+        case OPERATION_COPYSIGN: by[0] = 0, by[1] = 1; return b;
+        case OPERATION_FMOD:
+        case OPERATION_REMAINDER: by[0] = 1 / b, by[1] = -ratio / b; /* fall through */
+        case OPERATION_FLOOR:
+        case OPERATION_CEIL: return ratio - floor(ratio + 0.5);
+        case OPERATION_ATAN2: return b < 0 ? a : INFINITY;
+        default: return INFINITY;
+    }
+}
+
+/* Notes since when, on the way back, operations are at their kinks and guards are zero, at an end of the piece. */
+static void note_rests(Instance *c, double t, const double *point) {
+    const Model *m = c->model;
+    const Tape *tape = &m->tapes.rates;
+    double *rests = c->gradient->rests, by[2], zero;
+    evaluate(c, tape, t, point, c->rhs);
+    for (int r = 0, k = 0; r < tape->n_runs; r++)
+        for (int end = k + tape->runs[r].count; k < end; k++) {
+            const Operands *of = &tape->operands[k];
+            zero = kink_of(tape->runs[r].operation, c->slots[of->left], c->slots[of->right], by);
+            rests[k] = !(fabs(zero) <= AT_EDGE) ? NAN : isnan(rests[k]) ? t : rests[k];
+        }
+    rests += tape->n_operations;
+    if (m->n_guards > 0) evaluate(c, &m->tapes.guards, t, point, c->edge_guards);
+    for (int k = 0; k < m->n_guards; k++) {
+        int rest = fabs(c->edge_guards[k]) <= AT_EDGE && guard_active(c, k);
+        rests[k] = !rest ? NAN : isnan(rests[k]) ? t : rests[k];
+    }
+}
+
+/* The slope of what is zero at the kink of an operation of a tape; 0 if it is not zero at the present point. */
+static int slope_of_kink(Instance *c, const Tape *tape, int operation, int k, double *slope) {
+    const int operands[] = {tape->operands[k].left, tape->operands[k].right};
+    double values[2], by[2];
+    Tape part = *tape;
+    if (!isfinite(kink_of(operation, 1, -2, by))) return 0;
+    part.n_outputs = 2;
+    part.outputs = operands;
+    evaluate_now(c, &part, values);
+    if (!(fabs(kink_of(operation, values[0], values[1], by)) <= AT_EDGE)) return 0;
+    memset(slope, 0, (c->n_smooth + 1) * sizeof(double));
+    memset(c->dots, 0, (size_t)c->model->slot_results * sizeof(double));
+    tape_adjoint(&part, c->slots, c->dots, by);
+    adjoint_of_implicit(c, 1);
+    add_bars(c, slope);
+    return 1;
+}
+
+/* Has it rested for long? Then it is looked at, and next when that is as long ago again. */
+static int rests_long(const Instance *c, double *since) {
+    if (!(*since - c->state.t >= RESTS * span_of(c))) return 0;
+    *since = c->state.t;
+    return 1;
+}
+
+static void check_guards(Instance *c, double *rests) {
+    const Model *m = c->model;
+    double *slope = c->gradient->slope, *direction = c->gradient->work;
+    for (int k = 0; k < m->n_guards; k++) {
+        const Transition *to = &m->transitions[m->guard_transition[k]];
+        if (!rests_long(c, &rests[k]) || !factor_implicit(c)) continue;
+        slope_of_output(c, &m->tapes.guards, k, c->edge_guards, slope);
+        if (direction_off(c, slope, direction) && felt_beside(c, direction, NEARBY_KINK, to->mode, to->target) > 0)
+            add_doubt(c, FAILURE_LOST_AT_KINK, slope);
+    }
+}
+
+/* At the begin of a piece, where something may be zero for a short step because it begins there. */
+void check_kinks(Instance *c) {
+    Gradient *g = c->gradient;
+    const Tape *tape = &c->model->tapes.rates;
+    double *slope = g->slope, *direction = g->work;
+    piece_at(c->model, c->piece, c->piece->end, g->points);
+    if (!solve_implicit(c, c->piece->end, g->points, 1) || !settle(c)) return;
+    note_rests(c, c->piece->end, g->points);
+    note_rests(c, c->state.t, c->x);
+    for (int r = 0, k = 0; r < tape->n_runs; r++)
+        for (int end = k + tape->runs[r].count; k < end; k++) {
+            if (!rests_long(c, &g->rests[k]) || !factor_implicit(c)) continue;
+            if (!slope_of_kink(c, tape, tape->runs[r].operation, k, slope)) continue;
+            if (!direction_off(c, slope, direction)) continue;
+            double most = felt_beside(c, direction, NEARBY_KINK, -1, 0);
+            if (most > 0 && felt_beside(c, direction, CLOSER * NEARBY_KINK, -1, 0) > 0.5 * most)
+                add_doubt(c, FAILURE_LOST_AT_KINK, slope);
+        }
+    check_guards(c, g->rests + tape->n_operations);
+}
+
+/* What an output changes by along a direction, at the present point. */
+static double slope_along(Instance *c, uint32_t of, const double *direction) {
+    double *vector = c->gradient->moment, one = 1;
+    c->variables_valid = c->state.z_valid = 0;
+    if (!factor_implicit(c)) return NAN;
+    memset(vector, 0, (c->n_smooth + 1) * sizeof(double));
+    seed_unknowns(c, &of, 1, &one);
+    add_bars(c, vector);
+    return dot((int)c->n_smooth, vector, direction);
+}
+
+/* Does an output change otherwise to one side along a direction than to the other, also nearer to the present point? */
+static int bends(Instance *c, uint32_t of, const double *direction) {
+    double *kept = c->gradient->sides, sides[2];
+    size_t size = c->n_smooth * sizeof(double);
+    int any = 1;
+    memcpy(kept, c->numbers, size);
+    for (int nearer = 0; nearer < 2 && any; nearer++) {
+        for (int side = 0; side < 2; side++) {
+            double part = (side ? 1 : -1) * (nearer ? CLOSER : 1) * NEARBY_KINK;
+            for (size_t k = 0; k < c->n_smooth; k++) c->numbers[k] += part * direction[k];
+            sides[side] = slope_along(c, of, direction);
+            memcpy(c->numbers, kept, size);
+        }
+        any = fabs(sides[1] - sides[0]) > FELT_KINK * max_of(fabs(sides[0]), fabs(sides[1]));
+    }
+    c->variables_valid = c->state.z_valid = 0;
+    return any && factor_implicit(c);
+}
+
+/* Where outputs are read: at kinks of their own. */
+void check_outputs(Instance *c, const uint32_t of[]) {
+    Gradient *g = c->gradient;
+    const Tape *tape = &c->model->tapes.variables;
+    for (int r = 0, k = 0; r < tape->n_runs; r++)
+        for (int end = k + tape->runs[r].count; k < end; k++) {
+            if (!slope_of_kink(c, tape, tape->runs[r].operation, k, g->slope)) continue;
+            if (!direction_off(c, g->slope, g->work)) continue;
+            int any = 0;
+            for (int v = 0; v < g->n_of && !any; v++) any = bends(c, of[v], g->work);
+            if (any) add_doubt(c, FAILURE_LOST_AT_KINK, g->slope);
+        }
+}
