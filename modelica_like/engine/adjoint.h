@@ -49,7 +49,8 @@ typedef struct { /* what is read along a run */
 } Along;
 
 struct Gradient {
-    size_t n; /* by how many values */
+    const Transition *cause; /* of an event */
+    size_t n;                /* by how many values */
     Value *values;
     unsigned char *asked; /* marks them among the numbers of the state */
     Record *last;
@@ -62,7 +63,8 @@ struct Gradient {
     /* While it goes back: */
     const void *loaded; /* the copy that is in place */
     int n_of, n_vectors, n_kept, n_doubts, n_listed, n_marked, singular;
-    double singular_at, speed; /* how fast the guard of an event comes to zero, where it matters; or 0 */
+    double present, cause_speed; /* time from which it goes; of the guard of an event */
+    double singular_at, speed;   /* how fast the guard of an event comes to zero, where it matters; or 0 */
     Doubt doubts[MOST_DOUBTFUL];
     double *vectors, *behind; /* of outputs, then of doubts: derivatives by numbers of the state, and by the time */
     double *sides, *slope, *moment, *rates, *work, *sizes, *motions, *largest;
@@ -71,7 +73,8 @@ struct Gradient {
     double *later, *lanes;                          /* derivatives by the time of an instant; bars of several vectors */
     double *rests; /* of operations, then of guards: since when they are at their kinks, on the way back, or nan */
     unsigned char *still; /* vectors that a step leaves as they are */
-    const Along *along;   /* or NULL */
+    const Along *along;   /* or NULL; then outputs: */
+    const uint32_t *of;
     int64_t next_seed, instant;
     ptrdiff_t *listed;
     unsigned char *marks; /* numbers that the last instant has felt */
@@ -114,7 +117,9 @@ void slope_of_output(Instance *c, const Tape *tape, int output, double *bars, do
 void piece_back(Instance *c, const Record *along);
 /* kinks.c */
 void check_kinks(Instance *c);
-void check_outputs(Instance *c, const uint32_t of[]);
+void check_outputs(Instance *c);
+void check_meeting(Instance *c, const Record *at, const unsigned char *fired);
+void check_reading(Instance *c, const Record *at);
 /* integrals.c */
 double integral_back(int of_error, double *stages, double *weights);
 double slopes_of_integrands(Instance *c, double begin, double h);

@@ -218,22 +218,23 @@ double seed_behind(Instance *c, double t, int add) {
 }
 
 /* Goes back over all records, from derivatives of outputs at the present point, and comes back to it. */
-static Result go_back(Instance *c, const uint32_t of[]) {
+static Result go_back(Instance *c) {
     Gradient *g = c->gradient;
     void *present = NULL;
     int edges_valid = c->edges_valid, doubts = c->doubts;
     double one = 1;
     if (!state_copy_out(c, &present)) return RESULT_ERROR;
     g->next_seed = g->instant = 0;
+    g->present = c->state.t;
     for (int k = 0; k < c->model->tapes.rates.n_operations + c->model->n_guards; k++) g->rests[k] = NAN;
     while (seed_behind(c, c->state.t, 1) > -INFINITY) continue;
     for (const Record *record = g->last; record != NULL; record = record->previous)
         g->instant += record->pass != NULL && !record->start;
     for (int k = 0; k < g->n_of && g->along == NULL; k++) {
-        seed_unknowns(c, &of[k], 1, &one);
+        seed_unknowns(c, &g->of[k], 1, &one);
         add_bars(c, vector_of(c, k));
     }
-    if (g->along == NULL) check_outputs(c, of);
+    if (g->along == NULL) check_outputs(c);
     c->passing = 1;
     c->decided_by++; /* tapes know less now, see work_out */
     for (const Record *record = g->last; record != NULL; record = record->previous) {
@@ -282,6 +283,7 @@ Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along 
     if (g->lost != 0) return fail_with(c, g->lost, UINT32_MAX, g->lost_at, 0);
     if (!factor_implicit(c)) return RESULT_ERROR;
     g->along = along;
+    g->of = of;
     for (size_t row = 0; along != NULL && row < n_of; row++)
         if (along->integrands[row].variable >= 0) ask_for(c, (int)along->integrands[row].variable);
     double *room = n_of > MOST_VALUES ? NULL : take_room(c, n_of);
@@ -290,7 +292,7 @@ Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along 
     g->n_doubts = g->singular = 0;
     memset(g->doubts, 0, sizeof g->doubts);
     g->loaded = NULL;
-    Result result = go_back(c, of);
+    Result result = go_back(c);
     if (result && g->singular) result = fail_with(c, FAILURE_LOST_AT_SINGULAR, UINT32_MAX, g->singular_at, 0);
     else if (result) result = write_gradient(c, gradient);
     c->release(room);

@@ -233,7 +233,7 @@ static double find_cause(Instance *c, double *slope) {
     if (!at_located_event(&c->state)) find_wanting(c, c->wishes, 0);
     while (k < m->n_transitions && !wanting[k]) k++;
     if (k == m->n_transitions || c->state.n_steps == 0 || !factor_implicit(c)) return 0;
-    const Transition *cause = &m->transitions[k];
+    const Transition *cause = c->gradient->cause = &m->transitions[k];
     const Tape *tape = cause->timed ? &m->tapes.moments : &m->tapes.guards;
     evaluate_now(c, tape, c->outputs);
     if (!cause->timed) rate = c->outputs[m->n_guards + cause->index];
@@ -316,6 +316,10 @@ void event_back(Instance *c, const Record *at) {
     state_copy_in(c, at->before);
     read_before(c, speed);
     if (!tells) add_doubt(c, FAILURE_LOST_AT_TOUCH, slope);
+    if (!tells || speed == 0 || (g->speed == 0 && !read) || !factor_implicit(c)) return;
+    g->cause_speed = speed;
+    check_meeting(c, at, at->n_rounds > 0 ? assignment(c, at, 0).fired : nothing_wanting(c));
+    check_reading(c, at);
 }
 
 /* From behind the start to parameters, inputs and start values. */

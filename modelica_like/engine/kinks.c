@@ -1,11 +1,14 @@
-/* Kinks at which a run stays, or stands when it is read: operations of its equations whose slope changes or jumps where
- * they are, and guards that are zero. What leads off them has two derivatives. */
+/* What leads off to two sides with two derivatives: kinks at which a run stays, or stands when it is read (operations
+ * of its equations whose slope changes or jumps there, guards that are zero), events that happen together for different
+ * reasons, and those at which a run is read. */
 #include "adjoint.h"
 
 #define RESTS 1e-3 /* of a run: for how long what is zero has to be so that it rests, and what rests is looked at */
 #define NEARBY_KINK 3e-6 /* of sizes: how far slopes beside a kink are looked at */
 #define FELT_SLOPE 1e-9  /* of slopes, by which states change in the time of a run */
 #define FELT_KINK 1e-3   /* of a slope: curvature changes it by about NEARBY_KINK */
+#define SAME_TIME 1e-9   /* of the run: rounding */
+#define FELT_JUMP 1e-9   /* of outputs and their rates */
 #define CLOSER 0.01      /* the part of that where a kink differs as much */
 
 /* Slopes along a direction at the present point. */
@@ -202,7 +205,7 @@ static int bends(Instance *c, uint32_t of, const double *direction) {
 }
 
 /* Where outputs are read: at kinks of their own. */
-void check_outputs(Instance *c, const uint32_t of[]) {
+void check_outputs(Instance *c) {
     Gradient *g = c->gradient;
     const Tape *tape = &c->model->tapes.variables;
     for (int r = 0, k = 0; r < tape->n_runs; r++)
@@ -210,7 +213,113 @@ void check_outputs(Instance *c, const uint32_t of[]) {
             if (!slope_of_kink(c, tape, tape->runs[r].operation, k, g->slope)) continue;
             if (!direction_off(c, g->slope, g->work)) continue;
             int any = 0;
-            for (int v = 0; v < g->n_of && !any; v++) any = bends(c, of[v], g->work);
+            for (int v = 0; v < g->n_of && !any; v++) any = bends(c, g->of[v], g->work);
             if (any) add_doubt(c, FAILURE_LOST_AT_KINK, g->slope);
         }
+}
+
+/* An output and its rate, on a side of an event. */
+static void read_on_side(Instance *c, const void *side, uint32_t of, double result[2]) {
+    double *vector = c->gradient->slope, *rates = c->gradient->rates, one = 1;
+    state_copy_in(c, side);
+    c->variables_valid = 0;
+    if (!factor_implicit(c) || !get_value(c, find_variable(c->model, of), &result[0])) return;
+    evaluate_now(c, &c->model->tapes.rates, rates);
+    memset(vector, 0, (c->n_smooth + 1) * sizeof(double));
+    seed_unknowns(c, &of, 1, &one);
+    add_bars(c, vector);
+    result[1] = vector[c->n_smooth] + dot(c->model->n_x, vector + (c->x - c->numbers), rates);
+}
+
+/* By how much, beside times of the run, the event comes later by numbers of the state at most; `other` and `speed`:
+ * than another one, which changes `other` to the difference over that time. */
+static double comes_later(const Instance *c, double *other, double speed) {
+    const Gradient *g = c->gradient;
+    const double *cause = g->moment;
+    double time = max_of(fabs(c->state.t), c->state.t - c->state.start_time), most = 0;
+    for (int k = 0; k < c->model->n_x; k++) {
+        ptrdiff_t n = c->x - c->numbers + k;
+        time = max_of(time, fabs(other[n] / speed) * (fabs(c->x[k]) + c->model->nominals[k]));
+    }
+    for (size_t n = 0; n < c->n_smooth; n++) {
+        ptrdiff_t state = (ptrdiff_t)n - (c->x - c->numbers);
+        int is_state = state >= 0 && state < c->model->n_x;
+        double size = is_state ? fabs(c->x[state]) + c->model->nominals[state] : max_of(1, fabs(c->numbers[n]));
+        other[n] = (other[n] / speed - (other == cause ? 0 : cause[n] / g->cause_speed)) / time;
+        most = max_of(most, fabs(other[n]) * size);
+    }
+    return most;
+}
+
+static int begins_hold(const Model *m, const Transition *to) {
+    int any = 0;
+    for (int k = 0; k < m->n_holds; k++) any |= m->holds[k].mode == to->mode && m->holds[k].number == to->target;
+    return any;
+}
+
+/* Do outputs feel what an event changes, or when it is? */
+static int feels(const Instance *c, const Record *at) {
+    const Gradient *g = c->gradient;
+    const Model *m = c->model;
+    const double *before = copied(c, at->before, c->numbers), *behind = copied(c, at->behind, c->numbers);
+    const double *rates = g->rates, *later = rates + m->n_unknowns;
+    ptrdiff_t x = c->x - c->numbers, d = c->d - c->numbers;
+    for (int v = 0; v < g->n_of; v++) {
+        const double *by = g->behind + (size_t)v * (c->n_smooth + 1);
+        double jump = 0, change = 0, size = 0, speed = 0;
+        for (int k = 0; k < m->n_x; k++) {
+            jump += by[x + k] * (behind[x + k] - before[x + k]);
+            size += fabs(by[x + k]) * (fabs(behind[x + k]) + m->nominals[k]);
+            change += by[x + k] * (later[k] - rates[k]);
+            speed += fabs(by[x + k]) * (fabs(later[k]) + fabs(rates[k]));
+        }
+        if (g->later[v] != 0 || fabs(jump) > FELT_JUMP * size || fabs(change) > FELT_JUMP * speed) return 1;
+        for (int k = 0; k < m->n_d; k++)
+            if (before[d + k] != behind[d + k] && by[d + k] != 0 && !(k < m->n_modes && m->modes[k].n_names > 0))
+                return 1;
+    }
+    return 0;
+}
+
+/* What else happens in the first round must move as the cause does; but what begins to hold may do so in any order, and
+ * parts that share a load give way together. */
+void check_meeting(Instance *c, const Record *at, const unsigned char *fired) {
+    Gradient *g = c->gradient;
+    const Model *m = c->model;
+    const Transition *cause = g->cause;
+    int shared = anything_shared(c), is_felt = feels(c, at);
+    for (int k = 0; k < m->n_transitions && is_felt; k++) {
+        const Transition *to = &m->transitions[k];
+        double speed = 1;
+        if (!fired[k] || to == cause || (shared && !to->timed && !cause->timed)) continue;
+        if (begins_hold(m, to) && begins_hold(m, cause)) continue;
+        const Tape *tape = to->timed ? &m->tapes.moments : &m->tapes.guards;
+        evaluate_now(c, tape, c->outputs);
+        if (!to->timed) speed = -c->outputs[m->n_guards + to->index];
+        slope_of_output(c, tape, to->index, c->outputs, g->slope);
+        if (speed == 0) add_doubt(c, FAILURE_LOST_AT_TOUCH, g->slope);
+        else if (comes_later(c, g->slope, speed) > SAME_TIME) add_doubt(c, FAILURE_LOST_AT_MEETING, g->slope);
+    }
+}
+
+/* Are outputs read just at an event at which they, or their rates, jump? */
+static int is_read_at(Instance *c, const Record *at) {
+    const Gradient *g = c->gradient;
+    double span = span_of(c), sides[2][2] = {{0}}, t = ((const State *)at->before)->t;
+    int any = 0;
+    if (g->along != NULL || g->present - t > SAME_TIME * max_of(fabs(t), span)) return 0;
+    for (int v = 0; v < g->n_of; v++) {
+        read_on_side(c, at->behind, g->of[v], sides[1]);
+        read_on_side(c, at->before, g->of[v], sides[0]);
+        double value = fabs(sides[0][0]) + fabs(sides[1][0]), rate = fabs(sides[0][1]) + fabs(sides[1][1]);
+        any |= fabs(sides[1][0] - sides[0][0]) > FELT_JUMP * value;
+        any |= fabs(sides[1][1] - sides[0][1]) > FELT_JUMP * (rate + value / span);
+    }
+    return any;
+}
+
+void check_reading(Instance *c, const Record *at) {
+    double *slope = c->gradient->moment;
+    if (is_read_at(c, at) && comes_later(c, slope, c->gradient->cause_speed) > 0)
+        add_doubt(c, FAILURE_LOST_AT_READING, slope);
 }

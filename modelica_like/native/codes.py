@@ -77,6 +77,8 @@ class Code(IntEnum):
     LOST_AT_KINK = auto()
     LOST_AT_JUMP = auto()
     LOST_AT_TOUCH = auto()
+    LOST_AT_MEETING = auto()
+    LOST_AT_READING = auto()
     LOST_IN_ROUNDS = auto()
     LOST_AT_OTHER_MODES = auto()
     LOST_BY_DELAY = auto()

@@ -233,6 +233,20 @@ class Touching(Basis):
         yield when(floor(self.x) > 0.5, {self.n: 1})
 
 
+class Meeting(Basis):
+    """A clock ticks just when x reaches 1."""
+
+    n: Discrete = discrete("1", "mark")
+    ticks: Discrete = discrete("1", "number of ticks")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.a * (1 + self.n) + self.ticks
+
+    def events(self) -> Events:
+        yield when(self.x > 1, {self.n: 1})
+        yield when(clock(1.0, 1.0), {self.ticks: pre(self.ticks) + 1})
+
+
 def rubbing() -> Assembly:
     parts = {"torque": ConstantTorque(tau_constant=0.0), "J": Inertia(J=1.0, phi=0.0),
              "bearing": BearingFriction(tau_pos=((0, 3), (1, 3)))}  # fmt: skip

@@ -23,6 +23,7 @@ from failing import (
     Kinked,
     Late,
     Marked,
+    Meeting,
     Rebound,
     Root,
     Running,
@@ -218,6 +219,14 @@ ALONE: dict[Code, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
     Code.LOST_AT_TOUCH: (
         NoGradient, lambda: gradient(Touching(x=0.0), "x", "a", lambda one: one.step(2.0)),
         LOST.format("a", "1", "the guard of that event only touches zero"),
+    ),
+    Code.LOST_AT_MEETING: (
+        NoGradient, lambda: gradient(Meeting(x=0.0), "x", "a", lambda one: one.step(1.5)),
+        LOST.format("a", "1", "it moves apart events that happen together there"),
+    ),
+    Code.LOST_AT_READING: (
+        NoGradient, lambda: gradient(Meeting(x=0.5, a=0.25), "x", "a", lambda one: one.step(1.2)),
+        LOST.format("a", r"1\.2", "it moves the event at which the run is read"),
     ),
     Code.LOST_AT_OTHER_MODES: (
         NoGradient, lambda: gradient(clutched(), "a.w", "a.w", lambda one: one.step(0.1)),

@@ -192,3 +192,17 @@ def test_a_run_that_stays_on_the_border_of_two_branches():
     found = handle_at(drive, 0.4, ["torque1.phi"], ["gear.tau_scale", "Inertia1.J"]).gradient()
     assert found[0, 0] == pytest.approx(-0.1, rel=1e-12)
     assert np.isnan(found[0, 1])
+
+
+def test_a_sample_at_the_instant_of_another_event():
+    """Each sample takes half of the error; the second one is at 30 rad/s, at which a switch is thrown: w = 35 rad/s.
+
+    Before that, w / k_set = 0.5 * 0.1 s / 0.1 kg.m2 = 1/2. Behind it, nobody knows which came first.
+    """
+    drive = ROOT / "examples" / "components" / "sampled_control.toml"
+    before = handle_at(drive, 0.15, ["rotor.w"], ["wanted.k"]).gradient()
+    assert before[0, 0] == pytest.approx(0.5 + 0.25 / 2, rel=1e-12)
+    with pytest.raises(NoGradient, match=r"wanted\.k after t = 0\.2 s: it moves apart events that happen together"):
+        handle_at(drive, 0.35, ["rotor.w"], ["wanted.k"]).gradient()
+    free = handle_at(drive, 0.35, ["wheel[1].w"], ["wheel[1].J", "wanted.k"]).gradient()
+    assert free[0, 1] == 0.0
