@@ -61,8 +61,8 @@ struct Gradient {
     FailureCode lost;      /* why there are no derivatives, or 0 */
     double lost_at;
     /* While it goes back: */
-    const void *loaded; /* the copy that is in place */
-    int n_of, n_vectors, n_kept, n_doubts, n_listed, n_marked, singular;
+    const void *loaded;                                                         /* the copy that is in place */
+    int n_of, n_vectors, n_kept, n_doubts, n_listed, n_marked, singular, early; /* early: events at the start */
     double present, cause_speed; /* time from which it goes; of the guard of an event */
     double singular_at, speed;   /* how fast the guard of an event comes to zero, where it matters; or 0 */
     Doubt doubts[MOST_DOUBTFUL];
@@ -118,6 +118,7 @@ void piece_back(Instance *c, const Record *along);
 /* kinks.c */
 void check_kinks(Instance *c);
 void check_outputs(Instance *c);
+int begins_alike(Instance *c, const Record *at, int listed);
 void check_meeting(Instance *c, const Record *at, const unsigned char *fired);
 void check_reading(Instance *c, const Record *at);
 /* integrals.c */

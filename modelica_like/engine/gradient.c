@@ -289,7 +289,7 @@ Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along 
     double *room = n_of > MOST_VALUES ? NULL : take_room(c, n_of);
     if (room == NULL) return fail(c, NO_MEMORY, 0);
     g->n_of = g->n_vectors = (int)n_of;
-    g->n_doubts = g->singular = 0;
+    g->n_doubts = g->singular = g->early = 0;
     memset(g->doubts, 0, sizeof g->doubts);
     g->loaded = NULL;
     Result result = go_back(c);

@@ -95,6 +95,7 @@ static void feel(Instance *c, const Record *at, int begin, int end, int modes_on
         feel(c, at, (begin + end) / 2, end, modes_only);
         return;
     }
+    if (!same && at->start && modes_only && !g->early && begins_alike(c, at, begin)) return;
     state_copy_in(c, at->before);
     if (!same) {
         memset(g->slope, 0, (c->n_smooth + 1) * sizeof(double));
@@ -287,6 +288,7 @@ void event_back(Instance *c, const Record *at) {
     const Model *m = c->model;
     double *before = g->rates, *behind = before + m->n_unknowns, *slope = g->moment;
     int plain = is_plain(c, at);
+    g->early |= at->n_rounds > 0 && ((const State *)at->before)->n_steps == 0;
     keep_vectors(c);
     state_copy_in(c, at->behind);
     evaluate_now(c, &m->tapes.rates, behind);

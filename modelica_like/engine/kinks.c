@@ -9,7 +9,9 @@
 #define FELT_KINK 1e-3   /* of a slope: curvature changes it by about NEARBY_KINK */
 #define SAME_TIME 1e-9   /* of the run: rounding */
 #define FELT_JUMP 1e-9   /* of outputs and their rates */
-#define CLOSER 0.01      /* the part of that where a kink differs as much */
+#define CLOSER 0.01      /* the part of a way where a kink or jump is as large, */
+#define LESS 0.1         /* and what bends is less than this part of it */
+#define SOON 100         /* of how far a number is moved: what follows from that at once, by the clock */
 
 /* Slopes along a direction at the present point. */
 static void slopes_along(Instance *c, const double *direction, double *slopes) {
@@ -322,4 +324,64 @@ void check_reading(Instance *c, const Record *at) {
     double *slope = c->gradient->moment;
     if (is_read_at(c, at) && comes_later(c, slope, c->gradient->cause_speed) > 0)
         add_doubt(c, FAILURE_LOST_AT_READING, slope);
+}
+
+/* Do the modes at a start lead soon, by the clock, to those from which it was moved? */
+static int come_back(Instance *c, const double *d, double soon) {
+    const Model *m = c->model;
+    evaluate_now(c, &m->tapes.moments, c->outputs);
+    for (int mode = 0; mode < m->n_modes; mode++) {
+        int back = m->modes[mode].n_names == 0 || c->d[mode] == d[mode];
+        for (int k = 0; k < m->n_transitions && !back; k++) {
+            const Transition *to = &m->transitions[k];
+            back = to->timed && to->mode == mode && to->target == d[mode] && is_source(c, to) &&
+                   c->outputs[to->index] <= c->state.t + soon;
+        }
+        if (!back) return 0;
+    }
+    return 1;
+}
+
+/* The largest jump of states, rates, values of d and integrands from those behind a start, relative to their sizes. */
+static double start_change(Instance *c, const Record *at, const double *rates, const double *integrands) {
+    const Gradient *g = c->gradient;
+    const Model *m = c->model;
+    const double *x = copied(c, at->behind, c->x), *d = copied(c, at->behind, c->d), *now = variables_now(c);
+    double most = 0;
+    for (int row = 0; row < g->n_of; row++) {
+        int variable = integrand_of(g, row);
+        double size = variable < 0 ? 1 : fabs(now[variable]) + fabs(integrands[row]) + DBL_MIN;
+        if (variable >= 0) most = max_of(most, fabs(now[variable] - integrands[row]) / size);
+    }
+    evaluate_now(c, &m->tapes.rates, c->rhs);
+    for (int k = 0; k < m->n_x; k++) {
+        double size = fabs(rates[k]) + fabs(c->rhs[k]) + m->nominals[k] / span_of(c);
+        most = max_of(most, fabs(c->rhs[k] - rates[k]) / size);
+        most = max_of(most, fabs(c->x[k] - x[k]) / (fabs(x[k]) + m->nominals[k]));
+    }
+    for (int k = 0; k < m->n_d; k++)
+        if (k >= m->n_modes || m->modes[k].n_names == 0)
+            most = max_of(most, fabs(c->d[k] - d[k]) / max_of(1, fabs(d[k])));
+    return most;
+}
+
+/* Does a run begin alike where a number moves what happens by the clock just at its start to later? The nearer it is,
+ * the less differs there. */
+int begins_alike(Instance *c, const Record *at, int listed) {
+    Gradient *g = c->gradient;
+    double *rates = g->rates, changes[2] = {0};
+    int alike = 1;
+    state_copy_in(c, at->behind);
+    evaluate_now(c, &c->model->tapes.rates, rates);
+    for (int row = 0; row < g->n_of; row++)
+        if (integrand_of(g, row) >= 0) g->later[row] = variables_now(c)[integrand_of(g, row)];
+    for (int nearer = 0; nearer < 2; nearer++)
+        for (int side = -1; side <= 1 && alike; side += 2) {
+            double motion = fabs(g->motions[listed]) * (nearer ? CLOSER : 1);
+            state_copy_in(c, at->before);
+            c->numbers[g->listed[listed]] += side * motion;
+            alike = at->pass(c) && come_back(c, copied(c, at->behind, c->d), SOON * motion);
+            if (alike) changes[nearer] = max_of(changes[nearer], start_change(c, at, rates, g->later));
+        }
+    return alike && changes[1] <= max_of(LESS * changes[0], FELT_JUMP);
 }

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components import Clutch, Constant, FirstOrder, Inertia, Integrator, Limiter, Sine
+from components import Clutch, Constant, FirstOrder, Inertia, Integrator, Limiter, Pulse, Sine
 from modelica_like import Assembly, build, sensitivities, simulate
 from modelica_like.errors import NoGradient
 from modelica_like.language import Component, Equations, Input, Output, maximum, signal_in, signal_out
@@ -206,3 +206,17 @@ def test_a_sample_at_the_instant_of_another_event():
         handle_at(drive, 0.35, ["rotor.w"], ["wanted.k"]).gradient()
     free = handle_at(drive, 0.35, ["wheel[1].w"], ["wheel[1].J", "wanted.k"]).gradient()
     assert free[0, 1] == 0.0
+
+
+def test_what_begins_just_at_the_start():
+    """A wave may begin a little later: its integral loses what it has at the end. A pulse would be missed a moment."""
+    connect = {"y": ["source.y", "sum.u"]}
+
+    def integral_of(source):
+        parts = {"source": source, "sum": Integrator(k=1.0, y=0.0)}
+        return handle_at(Assembly("begins", parts=parts, connect=connect), 0.4, ["sum.y"], ["source.start_time"])
+
+    found = integral_of(Sine(f=0.5)).gradient()
+    assert found[0, 0] == pytest.approx(-np.sin(0.4 * np.pi), rel=1e-6)
+    with pytest.raises(NoGradient, match="a small change of it leads to other modes there"):
+        integral_of(Pulse(period=1.0)).gradient()
