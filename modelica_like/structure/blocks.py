@@ -14,7 +14,7 @@ import casadi as ca
 from modelica_like.errors import StructureError
 from modelica_like.flatten.steps import STEPS
 from modelica_like.structure.decided import vanishing
-from modelica_like.structure.isolate import isolate
+from modelica_like.structure.isolate import isolate, isolate_inverse
 
 SMALL = 3
 """Torn linear blocks up to this size are solved symbolically; larger ones stay implicit."""
@@ -145,6 +145,8 @@ class BlockSolver:
         """Solve one equation for one unknown that it contains linearly with a safe coefficient."""
         residual, unknown = self.residual[row], self.unknowns[column]
         expression = isolate(residual, unknown)
+        if expression is None and (row, column) not in self.safe:
+            expression = isolate_inverse(residual, unknown)
         if expression is None:
             slope = self.jacobian.nz[self.rows[row][column]]
             rest = ca.substitute(residual, unknown, ca.SX(0))
@@ -155,7 +157,7 @@ class BlockSolver:
         self, rows: tuple[int, ...], columns: tuple[int, ...]
     ) -> tuple[list[tuple[int, int]], list[int], list[int]]:
         """Return pairs (equation, unknown) to solve one after the other, the torn unknowns, and the equations left."""
-        if len(rows) == 1 and (rows[0], columns[0]) in self.safe:  # most blocks
+        if len(rows) == 1 and self._is_explicit(rows[0], columns[0]):  # most blocks
             return [(rows[0], columns[0])], [], []
         open_unknowns = {r: self.rows[r].keys() & {*columns} for r in rows}
         users: dict[int, list[int]] = {}
@@ -184,6 +186,11 @@ class BlockSolver:
                 settle(tears[-1])
         used = {row for row, _ in sequence}
         return sequence, tears, [r for r in rows if r not in used]
+
+    def _is_explicit(self, row: int, column: int) -> bool:
+        if (row, column) in self.safe:
+            return True
+        return row not in self.kept and isolate_inverse(self.residual[row], self.unknowns[column]) is not None
 
     def _solvable(self, row: int, unknowns: set[int]) -> bool:
         return len(unknowns) == 1 and (row, next(iter(unknowns))) in self.safe

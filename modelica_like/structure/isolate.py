@@ -22,14 +22,33 @@ def isolate(residual: Any, unknown: Any) -> Any | None:
     keeps the author's arithmetic. None if that is not possible.
     """
     trail = _find(residual, leaf_id(unknown))
-    if trail is None:
-        return None
+    return None if trail is None or any(_inverts(*step) for step in trail) else _undone(trail)
+
+
+def _undone(trail: list[tuple[Any, int]]) -> Any | None:
+    """Return the expression of what stands at the end of a way, where its begin is zero."""
     result: Any = _ZERO
     for node, position in trail:
         result = _undo(node, position, result)
         if result is None:
             return None
     return result
+
+
+def isolate_inverse(residual: Any, unknown: Any) -> Any | None:
+    """Return the expression of an unknown that occurs once, in a denominator under sums and signs only.
+
+    So `R == 1/G` gives G = 1/R from no guess; where R is zero, it has no solution. None for all other equations.
+    """
+    trail = _find(residual, leaf_id(unknown))
+    if trail is None or not any(_inverts(*step) for step in trail):
+        return None
+    plain = (ca.OP_ADD, ca.OP_SUB, ca.OP_NEG, ca.OP_TWICE)
+    return _undone(trail) if all(step[0].op() in plain or _inverts(*step) for step in trail) else None
+
+
+def _inverts(node: Any, position: int) -> bool:
+    return node.op() == ca.OP_INV or (node.op() == ca.OP_DIV and position == 1)
 
 
 def _find(root: Any, target: int) -> list[tuple[Any, int]] | None:
@@ -57,6 +76,8 @@ def _undo(node: Any, position: int, value: Any) -> Any | None:
         return -value
     if operation == ca.OP_TWICE:
         return value / 2
+    if operation == ca.OP_INV:
+        return 1 / value
     other = node.dep(1 - position) if node.n_dep() == 2 else None
     if operation == ca.OP_ADD:
         return _binary(ca.OP_SUB, value, other)
@@ -64,6 +85,6 @@ def _undo(node: Any, position: int, value: Any) -> Any | None:
         return _binary(ca.OP_ADD, value, other) if position == 0 else _binary(ca.OP_SUB, other, value)
     if operation == ca.OP_MUL:
         return _binary(ca.OP_DIV, value, other)
-    if operation == ca.OP_DIV and position == 0:
-        return _binary(ca.OP_MUL, value, other)
+    if operation == ca.OP_DIV:
+        return _binary(ca.OP_MUL, value, other) if position == 0 else _binary(ca.OP_DIV, other, value)
     return None

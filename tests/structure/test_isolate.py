@@ -5,7 +5,7 @@ from typing import Any
 import casadi as ca
 import pytest
 
-from modelica_like.structure.isolate import isolate
+from modelica_like.structure.isolate import isolate, isolate_inverse
 
 a, b, c, x = (ca.SX.sym(name) for name in "abcx")
 VALUES = {"a": 0.7, "b": 0.3, "c": -1.9}
@@ -40,6 +40,18 @@ def test_operations_are_undone_in_their_order(residual: Any, solved: Any) -> Non
 @pytest.mark.parametrize("residual", [x * x - a, x - a * x, ca.sin(x) - a, a / x - b, a - b, ca.fmax(x, a)], ids=str)
 def test_other_equations_are_not_solved(residual: Any) -> None:
     assert isolate(residual, x) is None
+
+
+@pytest.mark.parametrize(
+    ("residual", "solved"), [(a - 1 / x, 1 / a), (c - b / x + a, b / (c + a)), (a / (x - b) + c, b - a / c)], ids=str
+)
+def test_a_denominator_is_solved_for(residual: Any, solved: Any) -> None:
+    assert value(isolate_inverse(residual, x)) == pytest.approx(value(solved), rel=1e-15)
+
+
+@pytest.mark.parametrize("residual", [x - a, a * (1 / x) - b * x, c * (b / x) - a, a / (b * x) - c], ids=str)
+def test_other_equations_have_no_denominator_to_be_solved_for(residual: Any) -> None:
+    assert isolate_inverse(residual, x) is None
 
 
 def test_a_long_equation_is_not_searched() -> None:
