@@ -21,7 +21,10 @@
 #define NOISE 1e-30     /* a decaying signal ends by swinging around zero with such values; that is no event */
 #define INSTANT 1e-9    /* duration of an impact; finite forces cancel whatever it is */
 #define IDEAL_HEAD 3    /* numbers of an ideal element before its combination of equations, see row_of */
-#define CROWD 24        /* further instants in a short time follow each other ever faster */
+#define MAX_DAMPED 200  /* short steps follow a bend */
+#define LEAST_PART 1e-6 /* of a step of Newton's method: shorter ones mean that nothing leads nearer */
+#define SOLVED_DAMPED 1e-12 /* next step of such, in the unknowns: rounding of a condition of 1e3 */
+#define CROWD 24            /* further instants in a short time follow each other ever faster */
 
 #include "types.h"
 

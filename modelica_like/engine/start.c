@@ -68,11 +68,58 @@ static void measure_rows(Instance *c, double *sizes) {
             sizes[a->row[k]] += fabs(c->jacobian[k] * *start_unknown(c, j));
 }
 
+/* How far the start system is from its requested values. */
+static void start_errors(Instance *c, double *errors) {
+    evaluate_now(c, &c->model->tapes.start_system, c->start_residual);
+    for (int k = 0; k < c->model->n_start_unknowns; k++) {
+        int given = c->model->start_rows[k].start;
+        errors[k] = c->start_residual[c->model->start_rows[k].row] - (given == AT_REST ? 0 : c->start_values[given]);
+    }
+}
+
+/* Size of a step in the unknowns that are kept. */
+static double start_step_size(const Instance *c, const double *step) {
+    double size = 0;
+    for (int k = 0; k < c->model->n_start_unknowns; k++)
+        size = isfinite(step[k]) ? max_of(size, fabs(step[k]) / (1 + fabs(c->start_kept[k]))) : INFINITY;
+    return size;
+}
+
+/* The same as solve_damped, of the start system. Tells whether it came to rest. */
+static int damp_start(Instance *c) {
+    const Model *m = c->model;
+    double *step = c->start_unknowns, *next = c->start_next, part = 1;
+    for (int round = 0; round < MAX_DAMPED && part >= LEAST_PART; round++) {
+        start_errors(c, step);
+        memcpy(c->start_errors, step, (size_t)m->n_start_unknowns * sizeof(double));
+        tape_run(&m->tapes.start_jacobian, c->slots, c->jacobian);
+        measure_rows(c, c->start_sizes);
+        if (!qr_factor(&m->start, c->jacobian, c)) return 0;
+        qr_solve(&m->start, c, step);
+        for (int k = 0; k < m->n_start_unknowns; k++) c->start_kept[k] = *start_unknown(c, k);
+        double size = start_step_size(c, step);
+        if (size <= SOLVED_DAMPED || !(size < INFINITY)) return size < INFINITY;
+        for (part = 1; part >= LEAST_PART; part /= 2) {
+            for (int k = 0; k < m->n_start_unknowns; k++) *start_unknown(c, k) = c->start_kept[k] - part * step[k];
+            start_errors(c, next);
+            qr_solve(&m->start, c, next);
+            if (start_step_size(c, next) <= (1 - part / 4) * size) break;
+        }
+    }
+    return 0;
+}
+
+static int start_is_met(const Instance *c) {
+    for (int k = 0; k < c->model->n_start_unknowns; k++)
+        if (!(fabs(c->start_errors[k]) < CONSISTENT * (1 + c->start_sizes[k]))) return 0;
+    return 1;
+}
+
 /* Newton's method on the equations between free states, the variables that follow from them, and start values. */
 static Result solve_start_system(Instance *c) {
     const Model *m = c->model;
     int n = m->n_start_unknowns, met = 1;
-    double *residual = c->start_residual, *step = c->start_unknowns, *error = c->start_errors, *sizes = c->start_sizes;
+    double *step = c->start_unknowns, *error = c->start_errors, *sizes = c->start_sizes;
     if (n == 0) return RESULT_OK;
     memset(c->slots + m->slot_y, 0, m->n_y * sizeof(double));
     memset(sizes, 0, (size_t)n * sizeof(double));
@@ -81,11 +128,10 @@ static Result solve_start_system(Instance *c) {
     for (int round = 0; round < MAX_NEWTON; round++) {
         double change = 0;
         int rounding = 1;
-        evaluate_now(c, &m->tapes.start_system, residual);
+        start_errors(c, error);
         tape_run(&m->tapes.start_jacobian, c->slots, c->jacobian);
         for (int k = 0; k < n; k++) {
-            int given = m->start_rows[k].start;
-            step[k] = error[k] = residual[m->start_rows[k].row] - (given == AT_REST ? 0 : c->start_values[given]);
+            step[k] = error[k];
             rounding &= fabs(error[k]) <= DBL_EPSILON * sizes[k];
         }
         if (rounding) break;
@@ -100,8 +146,10 @@ static Result solve_start_system(Instance *c) {
         measure_rows(c, sizes);
         if (change <= 1e-13) break;
     }
-    for (int k = 0; k < n; k++) met = met && fabs(error[k]) < CONSISTENT * (1 + sizes[k]);
-    if (met) return RESULT_OK;
+    if (met && start_is_met(c)) return RESULT_OK;
+    memset(c->slots + m->slot_y, 0, m->n_y * sizeof(double));
+    memcpy(c->x, c->first, (size_t)m->n_unknowns * sizeof(double));
+    if (damp_start(c) && start_is_met(c)) return RESULT_OK;
     memcpy(c->x, c->first, (size_t)m->n_unknowns * sizeof(double)); /* where it began, for the message */
     return fail(c, START_NOT_FOUND, 0);
 }

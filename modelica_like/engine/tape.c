@@ -174,12 +174,53 @@ static int factor_again(Instance *c) {
     return c->implicit_kept = lu_factor(n, c->implicit_lu, c->implicit_order);
 }
 
+/* Size of a step of the implicit unknowns, in those. */
+static double relative_step(const Instance *c, const double *step, const double *z) {
+    double size = 0;
+    for (int k = 0; k < c->model->n_z; k++)
+        size = isfinite(step[k]) ? max_of(size, fabs(step[k]) / (1 + fabs(z[k]))) : INFINITY;
+    return size;
+}
+
+/* A part of a step after which the next one, with the same slopes, is shorter; 0 if there is none. */
+static int shorten_step(Instance *c, double t, double *point, double size) {
+    int n_z = c->model->n_z;
+    double *z = point + c->model->n_x, *next = c->vector;
+    for (double part = 1; part >= LEAST_PART; part /= 2) {
+        for (int k = 0; k < n_z; k++) z[k] = c->damped_z[k] - part * c->damped_step[k];
+        evaluate_special(c, &c->model->tapes.alg, t, point, next);
+        lu_solve(n_z, c->implicit_lu, c->implicit_order, next);
+        if (relative_step(c, next, c->damped_z) <= (1 - part / 4) * size) return 1;
+    }
+    return 0;
+}
+
+/* Newton's method with steps as long as they lead nearer (P. Deuflhard): whole ones go to and fro where a curve bends,
+ * as that of an amplifier at its limits. From where a solution was looked for, `damped_z`. */
+static int solve_damped(Instance *c, double t, double *point) {
+    int n_z = c->model->n_z;
+    double *z = point + c->model->n_x, *step = c->damped_step;
+    memcpy(z, c->damped_z, (size_t)n_z * sizeof(double));
+    for (int round = 0; round < MAX_DAMPED; round++) {
+        evaluate_special(c, &c->model->tapes.alg, t, point, step);
+        run_special(c, &c->model->tapes.alg_jacobian, c->dense_matrix);
+        if (!factor_again(c)) return 0;
+        lu_solve(n_z, c->implicit_lu, c->implicit_order, step);
+        memcpy(c->damped_z, z, (size_t)n_z * sizeof(double));
+        double size = relative_step(c, step, z);
+        if (size <= SOLVED_DAMPED) return 1;
+        if (!(size < INFINITY) || !shorten_step(c, t, point, size)) return 0;
+    }
+    return 0;
+}
+
 Result solve_implicit(Instance *c, double t, double *point, int quiet) {
     const Model *m = c->model;
     double *z = point + m->n_x, *step = c->vector, change = INFINITY, residual = 0;
     int linear = m->settings->implicit_linear, rounds = !c->bounded ? MAX_NEWTON : linear ? 1 : BOUNDED_NEWTON;
     double most = c->bounded ? 1e-4 : linear ? LAST_LINEAR : 1e-13;
     if (m->n_z == 0) return RESULT_OK;
+    if (!quiet) memcpy(c->damped_z, z, (size_t)m->n_z * sizeof(double));
     for (int round = 0; round < rounds; round++) {
         evaluate_special(c, &m->tapes.alg, t, point, step);
         if (c->bounded && round > 0 && largest_of(m->n_z, step) <= SOLVED * residual) return RESULT_OK;
@@ -199,7 +240,7 @@ Result solve_implicit(Instance *c, double t, double *point, int quiet) {
         /* What the largest unknown leaves of a small one when it is rounded does not get smaller. */
         if (change < most || largest_of(m->n_z, step) <= 1e-14 * largest_of(m->n_z, z)) return RESULT_OK;
     }
-    if (change <= 1e-9 || c->bounded) return RESULT_OK;
+    if (change <= 1e-9 || c->bounded || (!quiet && solve_damped(c, t, point))) return RESULT_OK;
     return !quiet && fail(c, NOT_SOLVED, 0, t);
 }
 

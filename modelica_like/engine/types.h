@@ -99,15 +99,17 @@ typedef struct {
         A(first, n), A(first_rates, n), A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards),   \
         A(looks, 3 * guards * MOST_LOOKS), A(seen_rates, n), A(seen_indicators, guards),                            \
         A(seen_derived, m->n_derived), A(outputs, outputs), A(start_unknowns, system), A(start_errors, system),     \
-        A(start_sizes, system), A(kept_starts, N_KEPT_STARTS *(n + 2 * n_d)), A(start_values, starts),              \
+        A(start_sizes, system), A(start_kept, system), A(start_next, system),                                       \
+        A(kept_starts, N_KEPT_STARTS *(n + 2 * n_d)), A(start_values, starts),                                      \
         A(start_residual, larger(m->n_start_values, resets)), A(delayed, 2 * delays),                               \
         A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(motions, holds), A(d_before, n_d), A(d_begun, n_d), \
         A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),                      \
         A(target_missing, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x),               \
         A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), \
-        A(kept_z, n_z), A(reactions, members), A(sizes, members), A(edges, 3 * edges), A(edges_middle, 4 * edges),  \
-        A(edge_slopes, n), A(edge_change, n), A(changes, n), A(step_error, n), A(edge_guards, 2 * guards),          \
-        A(trials, 2 * (n + n_d)), A(known_values, m->n_known), A(set_keys, N_SETS *(n_d + 1))
+        A(kept_z, n_z), A(damped_z, n_z), A(damped_step, n_z), A(reactions, members), A(sizes, members),            \
+        A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n), A(changes, n),       \
+        A(step_error, n), A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d)), A(known_values, m->n_known),        \
+        A(set_keys, N_SETS *(n_d + 1))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; jolted: what new
  * values of states let go; idle:
