@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from modelica_like import simulate
-from modelica_like.language import Component, Equations, Parameter, Variable, absolute, der, maximum, minimum, param, var
+from modelica_like.language import (
+    Component,
+    Equations,
+    Parameter,
+    Variable,
+    absolute,
+    der,
+    maximum,
+    minimum,
+    param,
+    var,
+)
 
 
 class Amplifier(Component):
