@@ -129,7 +129,7 @@ def _compiled(drive: Component) -> CompiledDae:
 @checked
 def simulate(
     drive: Model, until: float | str | None = None, *, parameters: Mapping[str, Any] | None = None,
-    start: StartKind | None = None, t0: float = 0.0, rtol: float | None = None, atol: float | None = None,
+    start: StartKind | None = None, t0: float | None = None, rtol: float | None = None, atol: float | None = None,
     points: int | None = None, options: Options | None = None, progress: Progress | None = None,
     solver: Solver | None = None, on_chattering: OnChattering | None = None, readings: Sequence[str] = (),
     inputs: Any = None, compiled: bool | None = None,
@@ -141,7 +141,7 @@ def simulate(
         until: end time, a number in s or a quantity; by default that of the netlist.
         parameters: other values of parameters and inputs by path, without compiling again.
         start: `given`, `rest` (variables without a start value are at rest) or `steady`.
-        t0: start time in s.
+        t0: start time in s; by default that of the netlist, or zero.
         rtol: relative tolerance.
         atol: absolute tolerance, in nominal values; if only `rtol` is given, at most a hundredth of it.
         points: number of equal intervals of the results.
@@ -164,6 +164,7 @@ def simulate(
     if parameters:
         model = model.with_parameters(dict(parameters))
     given: dict[str, Any] = {"rtol": rtol, "atol": atol, "points": points, "on_chattering": on_chattering}
+    t0 = model.begin if t0 is None else t0
     end, chosen = plan(model, until, t0=t0, options=options, compiled=compiled, **given)
     chosen.check_memory(len(model.states) + len(model.implicit))
     begin = time.perf_counter()
@@ -255,7 +256,7 @@ def quick_run(model: Model, until: float | str | None = None, **run: Any) -> Sol
 
 
 def plan(
-    model: CompiledDae, until: float | str | None = None, *, t0: float = 0.0, options: Options | None = None,
+    model: CompiledDae, until: float | str | None = None, *, t0: float | None = None, options: Options | None = None,
     **given: Any,
 ) -> tuple[float, Options]:  # fmt: skip
     """Return the end time in s and the options of a run; the arguments are those of `simulate`.
@@ -265,6 +266,7 @@ def plan(
     """
     end = seconds(until if until is not None else model.settings.get("until"))
     chosen = _options(options or Options(), model.settings, **given)
+    t0 = model.begin if t0 is None else t0
     if end <= t0:
         raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
     if end - t0 < _SHORTEST * max(1.0, abs(t0)):

@@ -24,7 +24,7 @@ from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.compile.symbolic import Symbolic, symbolic
 from modelica_like.errors import LanguageError, ModelicaLikeError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
-from modelica_like.language.units import Unit, to_si
+from modelica_like.language.units import Unit, parse_unit, to_si
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.structure.holds import HeldMotion as HeldMotion
 from modelica_like.structure.motion import Motion
@@ -207,6 +207,17 @@ class CompiledDae:
         given = self.arguments
         ode, alg = (function(*given.values()) for function in (self.equations.ode, self.equations.alg))
         return Motion(given["t"], given["x"], given["z"], ode, alg)
+
+    @property
+    def begin(self) -> float:
+        """Time in s at which runs begin, unless they are told another one."""
+        return to_si(self.settings.get("from", 0.0), parse_unit("s"), "from")
+
+    def demand_begin_at_zero(self, error: type[ModelicaLikeError], what: str) -> None:
+        """Raise an error where something begins at 0 s, and the runs of this model do not."""
+        if self.begin != 0.0:
+            advice = "Leave `from` out, or shift the time in the drive."
+            raise error(f"{what} begins at 0 s, and this drive at {self.begin:g} s.", advice=advice)
 
     def refuse_delays(self, error: type[ModelicaLikeError], what: str) -> None:
         """Raise an error where something is not possible with delays, because they need the past of a run."""

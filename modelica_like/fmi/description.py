@@ -115,7 +115,7 @@ class _Writer:
         for name, text in about.log_categories.items():
             element(categories, "Category", name=name, description=text)
         element(
-            top, "DefaultExperiment", startTime=0.0, stopTime=about.stop_time, tolerance=about.tolerance,
+            top, "DefaultExperiment", startTime=self.model.begin, stopTime=about.stop_time, tolerance=about.tolerance,
             stepSize=about.step_size,
         )  # fmt: skip
         listed, write = element(top, "ModelVariables"), self._variable2 if self.second else self._variable3

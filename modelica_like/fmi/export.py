@@ -218,7 +218,13 @@ def _about(
     settings = model.settings
     end = seconds(settings["until"]) if "until" in settings else None
     points = int(settings.get("points", Options.points))
-    step = None if end is None else communication_step(end, fixed_step, points) if fixed_step else end / points
+    step = (
+        None
+        if end is None
+        else communication_step(end, fixed_step, points)
+        if fixed_step
+        else (end - model.begin) / points
+    )
     return About(
         version=version, kinds=frozenset(kinds), token=_TOKEN, description=description, stop_time=end,
         tolerance=float(settings.get("rtol", Options.rtol)), step_size=step,

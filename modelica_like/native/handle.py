@@ -78,19 +78,21 @@ class Native:
         )
         self.reset()
 
-    def reset(self, values: Mapping[str, float] | None = None, *, t0: float = 0.0, until: float = math.inf) -> None:
+    def reset(
+        self, values: Mapping[str, float] | None = None, *, t0: float | None = None, until: float = math.inf
+    ) -> None:
         """Start again.
 
         Args:
             values: other values of parameters, inputs and start values by path.
-            t0: start time in s.
+            t0: start time in s; by default that of the netlist, or zero.
             until: end of the run, if known.
 
         Raises:
             UnknownName, ValueOutOfRange: a value cannot be set, or a time is no number.
             InitializationError, SolveError: there is no start with these values.
         """
-        given = values or {}
+        given, t0 = values or {}, self._instance.model.begin if t0 is None else t0
         for name, time in (("t0", t0), ("until", until)):
             _number(name, time)
         self._instance.reset(t0, until, *self._tolerances)

@@ -20,12 +20,12 @@ _BY_PLAN = Code.START_NOT_FOUND, Code.START_NOT_MET
 """What may have failed because start values were used in a wrong way."""
 
 
-def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") -> Point:
+def initialize(model: CompiledDae, t0: float | None = None, start: StartKind = "given") -> Point:
     """Find consistent start values.
 
     Args:
         model: the compiled model.
-        t0: start time in s.
+        t0: start time in s; by default that of the netlist, or zero.
         start: `given`: the start values of the model determine everything; `rest`: variables without a start value
             are at rest, absolute speeds before relative ones; `steady`: all derivatives are zero, except those of
             states on which nothing depends.
@@ -47,7 +47,7 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
         )
     if start == "steady":
         model.refuse_delays(InitializationError, f"{model.name} cannot start in the steady state")
-    instance, code = _found(model, t0, start)
+    instance, code = _found(model, model.begin if t0 is None else t0, start)
     instance.check(code)
     return instance.present()
 

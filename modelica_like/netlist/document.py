@@ -342,6 +342,11 @@ def duration(key: str, value: Any) -> Any:
     return value
 
 
+def _moment(key: str, value: Any) -> Any:
+    to_si(value, parse_unit("s"), key)
+    return value
+
+
 def _one_of(kind: Any) -> Check:
     """Return the check of a word."""
 
@@ -379,7 +384,7 @@ def _unit_text(key: str, value: Any) -> str:
 
 
 _OPTIONS: Mapping[str, Check] = {
-    "until": duration, "start": _one_of(StartKind), "rtol": _rtol, "points": _whole(1_000_000),
+    "from": _moment, "until": duration, "start": _one_of(StartKind), "rtol": _rtol, "points": _whole(1_000_000),
     "on_chattering": _one_of(OnChattering),
 }  # fmt: skip
 READERS: Mapping[str, Reader] = {

@@ -20,6 +20,7 @@ from modelica_like.netlist.registry import library_types
 
 _QUANTITY = {"type": ["number", "string"]}
 _TIME = {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"$ref": "#/definitions/quantity_in_s"}]}
+_MOMENT = {"anyOf": [{"type": "number"}, {"$ref": "#/definitions/quantity_in_s"}]}
 _JSON_TYPES: dict[type, str] = {bool: "boolean", int: "integer", float: "number", str: "string"}
 DRAFT = "http://json-schema.org/draft-07/schema#"
 """The draft that the language servers for TOML know."""
@@ -132,6 +133,7 @@ def _simulate() -> dict[str, Any]:
     rtol = {"type": "number", "minimum": 1e-14, "maximum": 0.1, "description": "relative tolerance", "examples": [1e-7]}
     start = "start values that are missing: none (given), zero (rest), or those of the steady state"
     properties = {
+        "from": {"description": "time at which runs begin [s]", **_MOMENT, "default": 0},
         "until": {"description": "end time [s]", **_TIME, "examples": ["0.5 s"]},
         "start": {"enum": list(get_args(StartKind)), "description": start},
         "rtol": rtol,

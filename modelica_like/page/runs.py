@@ -118,7 +118,7 @@ class Runs:
         references, numbers = (
             np.array([value[k] for value in values], kind) for k, kind in ((0, np.uint32), (1, float))
         )
-        instance.reset(0.0, until, self._options.rtol, self._options.atol)
+        instance.reset(self._model.begin, until, self._options.rtol, self._options.atol)
         place = references.ctypes.data, numbers.ctypes.data
         instance.check(instance.library.set(instance.address, len(values), *place))
         instance.check(instance.library.begin(instance.address))

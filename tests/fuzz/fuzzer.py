@@ -197,7 +197,7 @@ def _called(line: list[str]) -> None:
 
 
 GIVEN = ("drive.toml", "motor.fmu", "system.ssp")
-NOT_HERE = {"explore", "edit", "demo", "runtimes", "trust", "export", "docs"}
+NOT_HERE = {"explore", "edit", "lsp", "mcp", "demo", "runtimes", "trust", "export", "docs"}
 """Commands that serve, compile, or take long."""
 KINDS = {
     netlist: 30, part: 20, formula: 7, unit: 7, option: 2, sizing: 12, system: 7, ssp: 8, fmu: 7,

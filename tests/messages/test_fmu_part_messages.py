@@ -55,6 +55,11 @@ CASES = {
         "motor names no file.\n" + line('motor = { is = "FMU" }', 2)
         + '\nWrite { is = "FMU", file = "motor.fmu" }.',
     ),
+    "a begin": (
+        wired('a = ["k.y", "motor.u"]\n[simulate]\nfrom = "1 s"'),
+        "A netlist with FMUs is a co-simulation, which begins at 0 s: it cannot have `from`.\n"
+        + line('from = "1 s"', 9),
+    ),
     "no archive": (
         '[parts]\nmotor = { is = "FMU", file = "text.fmu" }',
         "text.fmu is not an FMU: it is not a valid zip archive.\n"

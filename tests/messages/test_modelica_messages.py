@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like import build, load, simulate
+from modelica_like import build, export_html, load, simulate
 from modelica_like.errors import (
     ComponentUnbalanced,
+    ExportError,
     ModelicaLikeError,
     ModelicaTextError,
     SingularAtStart,
@@ -178,11 +179,6 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "  in a.mo:1 `function f input Real u[:]; output Real y; algorithm y := 0; for i in 1:2 loop "
         "if u[i] > 1 then break; end if; y := y + 1; end for; end f;`",
     ),
-    "a start of a discrete variable that changes": (
-        "model A\n  Real x = time + 1;\n  discrete Real n;\ninitial equation\n  pre(n) = x;\n"
-        "equation\n  when time > 1 then\n    n = 2;\n  end when;\nend A;\n",
-        "An initial value of n that only a run knows: that is not supported here.\n  in a.mo:5 `pre(n) = x;`",
-    ),
     "a type of arrays": (
         model("Axis a;", before="type Axis = Real[3];"),
         "A short class definition of an array: that is not supported here.\n  in a.mo:1 `type Axis = Real[3];`",
@@ -343,11 +339,6 @@ MESSAGES: dict[str, tuple[str, str]] = {
             "x[1]": "x is no array and has no subscript",
         }.items()
     },
-    "a run that begins later": (
-        "model A\n  Real x = time;\n  annotation(experiment(StartTime = 1, StopTime = 3));\nend A;\n",
-        "experiment(StartTime = 1): a model that is read runs from 0 s.\n  in a.mo:1 `model A`\n"
-        "Leave StartTime out, and call simulate(…, t0=…) in Python.",
-    ),
     "a sample without an interval": (
         model("Real x;", "when sample(0, 0) then x = time; end when;"),
         "sample(…) needs an interval above 0, not 0.\n  in a.mo:5 `when sample(0, 0) then x = time; end when;`",
@@ -581,3 +572,12 @@ def test_what_python_cannot_go_down_into(tmp_path: Path, monkeypatch: pytest.Mon
     (tmp_path / "a.mo").write_text(model())
     told = "Classes, functions or formulas are nested too deeply.\n  in a.mo:2 `model A`"
     check_message(ModelicaTextError, lambda: load(tmp_path / "a.mo"), told)
+
+
+def test_what_begins_at_zero_refuses_a_drive_that_begins_later(tmp_path: Path, check_message) -> None:
+    text = "model A\n  Real x(start = 1, fixed = true);\nequation\n  der(x) = -x;\n"
+    (tmp_path / "a.mo").write_text(f"{text}  annotation(experiment(StartTime = 2, StopTime = 3));\nend A;\n")
+    check_message(
+        ExportError, lambda: export_html(load(tmp_path / "a.mo"), tmp_path / "a.html"),
+        "A page begins at 0 s, and this drive at 2 s.\nLeave `from` out, or shift the time in the drive.",
+    )  # fmt: skip

@@ -104,7 +104,7 @@ MESSAGES = {
     ),
     "unknown option": (
         '[parts]\na = { is = "Inertia", J = 1 }\n[simulate]\nstop = 2\n',
-        "[simulate] has no 'stop'. It has until, start, rtol, points, on_chattering.\n  in bad.toml:4 `stop = 2`",
+        "[simulate] has no 'stop'. It has from, until, start, rtol, points, on_chattering.\n  in bad.toml:4 `stop = 2`",
     ),
     "not a formula": (
         '[parts]\na = { is = "Inertia", J = "2 *" }\n',

@@ -1,11 +1,12 @@
 """Start values without `fixed`, with initial equations of several solutions, against those solutions."""
 
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 
-from modelica_like import export_fmu, load, run_fmu, simulate
+from modelica_like import build, export_fmu, linearize, load, run_fmu, sensitivities, simulate, sweep
 from modelica_like.simulation import Solver
 
 UPPER = np.pi - np.arcsin(1 / 9.81)
@@ -99,3 +100,81 @@ def test_an_importer_may_give_the_guess_of_an_fmu(tmp_path: Path) -> None:
     export_fmu(load(written(tmp_path, text)), tmp_path / "m.fmu")
     near = run_fmu(tmp_path / "m.fmu", stop=0.1, parameters={"x": 0.2}, outputs=["x"])
     assert near.final["x"] == pytest.approx(1, abs=1e-9)
+
+
+def test_a_run_begins_at_its_start_time(tmp_path: Path) -> None:
+    """Starts, memories, ticks, linear models, gradients, sweeps, handles and FMUs begin there, and the netlist, too."""
+    (tmp_path / "a.mo").write_text("""
+model A
+  parameter Real k = 2;
+  Real x(start = 1, fixed = true);
+  discrete Real begin; Integer n(start = 0, fixed = true);
+initial equation
+  pre(begin) = time;
+equation
+  der(x) = k*time;
+  when x > 1e9 then
+    begin = time;
+  end when;
+  when sample(0.5, 1) then
+    n = pre(n) + 1;
+  end when;
+  annotation(experiment(StartTime = -1, StopTime = 2));
+end A;
+""")
+    drive = load(tmp_path / "a.mo")
+    for solver in ("idas", "native"):
+        run = simulate(drive, solver=solver, rtol=1e-10)
+        assert (run.time[0], run.time[-1]) == (-1, 2)
+        assert run["x"] == pytest.approx(run.time**2, rel=1e-8, abs=1e-8)
+        assert (run.final["begin"], run.final["n"]) == (-1, 2)  # ticks at 0.5 and 1.5 s
+    assert simulate(drive, t0=0.0).final["begin"] == 0
+    model = build(drive)
+    assert linearize(model).point.t == -1
+    assert model.native().time == -1
+    assert sensitivities(model, "x", "k").derivatives.ravel() == pytest.approx([1.5])
+    assert sweep(model, {"k": [2.0, 4.0]}, ["x"])["x"].values == pytest.approx([4, 7])
+    netlist = '[parts]\na = { is = "./a.mo:A" }\n[simulate]\nfrom = "-1 s"\nuntil = "2 s"\nstart = "rest"\n'
+    (tmp_path / "a.toml").write_text(netlist)
+    assert simulate(load(tmp_path / "a.toml")).time[0] == -1
+    export_fmu(drive, tmp_path / "a.fmu", check=False)
+    description = ZipFile(tmp_path / "a.fmu").read("modelDescription.xml").decode()
+    assert 'startTime="-1.0"' in description
+
+
+def test_values_before_the_start_that_only_a_run_knows(tmp_path: Path) -> None:
+    """A hold whose last sample was the input of the start, a change that is none at the start, a chain of negations."""
+    (tmp_path / "a.mo").write_text("""
+model A
+  Real x(start = 3, fixed = true); Real u = 2*x + 1;
+  discrete Real held; discrete Real before; Boolean high; Boolean low; Boolean other;
+  Integer n(start = 0, fixed = true);
+  Real y = held - before;
+initial equation
+  pre(held) = u;
+  pre(before) = u + 1;
+  pre(high) = u > 0;
+  pre(low) = not pre(other);
+  pre(other) = true;
+equation
+  der(x) = 1;
+  when sample(0.25, 0.25) then
+    held = u;
+    before = pre(held);
+  end when;
+  high = u > 0;
+  low = pre(low);
+  other = pre(low);
+  when {initial(), time > 2} then
+    n = if change(high) then 5 else 6;
+  end when;
+end A;
+""")
+    run = simulate(load(tmp_path / "a.mo"), 1.0)
+    ticks = np.floor(4 * run.time)
+    inside = np.abs(4 * run.time - np.round(4 * run.time)) > 1e-9
+    inside[0] = True
+    held = np.where(ticks > 0, 7 + ticks / 2, 7.0)
+    assert run["held"][inside] == pytest.approx(held[inside])
+    assert run["before"][inside] == pytest.approx(np.where(ticks > 0, 7 + (ticks - 1) / 2, 8.0)[inside])
+    assert (run.final["low"], run.final["other"], run.final["n"]) == (0, 0, 6)

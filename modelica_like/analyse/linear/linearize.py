@@ -41,9 +41,9 @@ def point_of(drive: Drive, at: At = None) -> tuple[CompiledDae, Point]:
             return drive.model, initialize(drive.model, float(drive.time[0]), _kind(at))
         return drive.model, drive.point(float(drive.time[-1]) if at is None else float(at))
     model = build(drive)
-    if at is None or isinstance(at, str) or at == 0.0:
+    if at is None or isinstance(at, str) or at == model.begin:
         start = at if isinstance(at, str) else model.settings.get("start", "given")
-        return model, initialize(model, 0.0, _kind(start))
+        return model, initialize(model, start=_kind(start))
     run = simulate(model, float(at))
     return model, run.point(float(at))
 

@@ -95,7 +95,7 @@ def _kept(
     model: CompiledDae, extended: CompiledDae, end: float, options: Options, start: StartKind, names: Sequence[str]
 ) -> _Run | None:
     """Simulate and keep the run; None if it is not certain."""
-    begin = initialize(model, 0.0, start)
+    begin = initialize(model, start=start)
     loop = EngineLoop(extended, replace(options, points=_RESULTS), begin, end, by=names)
     if not loop.starts_there or _moves_at_start(model, begin, names):
         return None

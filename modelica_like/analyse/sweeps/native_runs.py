@@ -37,7 +37,7 @@ class NativeRuns:
     ) -> None:
         given = {name: value for name, value in settings.items() if name not in ("start", "solver", "progress")}
         end, options = plan(model, **given)
-        span = float(settings.get("t0", 0.0)), end
+        span = float(settings.get("t0", model.begin)), end
         for output in outputs:
             if output.kind == "at" and not span[0] <= output.moment <= end:
                 raise ValueOutOfRange(f"{output.name} is not within the run, {span[0]:g} s to {end:g} s.")

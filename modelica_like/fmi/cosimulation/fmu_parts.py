@@ -72,6 +72,9 @@ class _Joiner:
         self.given: dict[str, str] = {}
 
     def system(self, work: Path) -> System:
+        if "from" in self.document.simulate:
+            what = "A netlist with FMUs is a co-simulation, which begins at 0 s: it cannot have `from`."
+            raise NetlistError(what, where=self.document.lines.source("simulate", "from"))
         units = [unit for name, entry in self.fmus.items() if (unit := self._tried("parts", name, self._unit, entry))]
         self._refuse_other_mentions()
         self._stop()

@@ -10,7 +10,7 @@ from typing import Any
 
 from modelica_like import upper
 from modelica_like.arguments import checked
-from modelica_like.errors import DuplicateName, LanguageError, NetlistError
+from modelica_like.errors import DuplicateName, LanguageError, NetlistError, ValueOutOfRange
 from modelica_like.fmi.cosimulation.cut import Cut, CutNetlist, cut_netlist
 from modelica_like.fmi.cosimulation.files import write_system
 from modelica_like.fmi.cosimulation.parts import Maker, Takes, ends_of, orient
@@ -174,6 +174,7 @@ def _some(group: Sequence[str]) -> str:
 def _start_values(assembly: Assembly) -> dict[str, float]:
     """Return all variables of the whole drive at its start, in SI units."""
     whole = build(assembly)
+    whole.demand_begin_at_zero(ValueOutOfRange, "A co-simulation")
     point = upper.initialize(whole, 0.0, whole.settings.get("start", "given"))
     column = whole.equations.variables(point.t, point.x, point.z, whole.p, whole.u, point.d).full().ravel()
     return {variable.path: float(value) for variable, value in zip(whole.flat_variables, column, strict=True)}

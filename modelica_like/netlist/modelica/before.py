@@ -6,7 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 from modelica_like.errors import ModelicaTextError, Source
+from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.tree import Expr
+from modelica_like.netlist.modelica.written import Happening
 
 Equation = tuple[Expr, Expr, Source]
 Node = tuple[str, str]
@@ -20,15 +22,17 @@ class Before:
         initial: its initial equations.
         is_discrete: tells whether a side is a variable that changes at events only, and no signal.
         changes_at_events: the same, of signals too.
+        evaluated: puts the values of parameters into an expression.
 
     Attributes:
         memory: values before the start.
+        late: those that only a run knows: `pre(…)` has them where it begins.
         others: initial equations that are left.
     """
 
     def __init__(
         self, equations: list[Equation], initial: list[Equation], is_discrete: Callable[[Expr], bool],
-        changes_at_events: Callable[[Expr], bool],
+        changes_at_events: Callable[[Expr], bool], evaluated: Callable[[Expr], Expr],
     ) -> None:  # fmt: skip
         self.changes_at_events = changes_at_events
         self.memory: dict[str, Expr] = {}
@@ -56,6 +60,22 @@ class Before:
             for name in names:
                 if self.memory.setdefault(name, right) != right:
                     raise ModelicaTextError(f"Initial equations give {name} two values.", where=source)
+        for _ in self.memory:  # one may need that of another
+            self.memory = {name: self._known(value) for name, value in self.memory.items()}
+        self.memory = {name: value if _uses_time(value) else evaluated(value) for name, value in self.memory.items()}
+        self.late = {name: value for name, value in self.memory.items() if value.kind not in fold.KNOWN}
+        self.memory = {name: value for name, value in self.memory.items() if name not in self.late}
+
+    def _known(self, value: Expr) -> Expr:
+        """Return a value with those before the start that are known in place of `pre(…)`."""
+        if value.kind == "call" and value.args[0] == "pre":
+            known = self.memory.get(value.args[1][0].args[0][0], value)
+            return known if known.kind in fold.KNOWN else value
+        if value.kind in (*fold.KNOWN, "name", "condition", "call", "curve", "object"):
+            return value
+        return (
+            fold.operation(value.kind, tuple(map(self._known, value.args)), value.line) if value.kind != "if" else value
+        )
 
     def _befores(self, node: Node) -> list[str]:
         """Return the variables whose value before the start a node is."""
@@ -75,3 +95,35 @@ def _uses_time(value: Any) -> bool:
     if isinstance(value, Expr):
         return (value.kind == "name" and value.args[0][0] == "time") or _uses_time(value.args)
     return isinstance(value, tuple | list) and any(_uses_time(inner) for inner in value)
+
+
+def begun(node: Expr, late: dict[str, Expr]) -> Expr:
+    """Return an expression in which values before an event are those of `late` where a run begins."""
+    args = tuple(begun(argument, late) if isinstance(argument, Expr) else argument for argument in node.args)
+    if node.kind != "call":
+        return Expr(node.kind, args, node.line) if args != node.args else node
+    word, given, named = node.args
+    variable = given[0] if given else node
+    if word in ("pre", "edge", "change") and variable.kind in ("name", "condition") and variable.args[0][0] in late:
+        first = Expr("call", ("initial", (), ()), node.line)
+        before = Expr("if", (first, late[variable.args[0][0]], fold.call("pre", given, node.line)), node.line)
+        if word == "pre":
+            return before
+        if word == "change":
+            return Expr("<>", (variable, before), node.line)
+        return fold.operation("and", (variable, fold.operation("not", (before,), node.line)), node.line)
+    return Expr("call", (word, tuple(begun(argument, late) for argument in given), named), node.line)
+
+
+def begin_late(happening: Happening, late: dict[str, Expr]) -> Happening:
+    """Return a `when` that gives its variables their values where a run begins, if it does not happen there."""
+    branches = [
+        (tuple(begun(each, late) for each in conditions), {name: begun(new, late) for name, new in values.items()})
+        for conditions, values in happening.branches
+    ]
+    own = {
+        name: late[name] for name in dict.fromkeys(name for _, values in branches for name in values) if name in late
+    }
+    if own:
+        branches.append(((Expr("call", ("initial", (), ())),), own))
+    return Happening(tuple(branches), happening.source, happening.text)

@@ -33,7 +33,7 @@ from modelica_like.netlist.modelica.attributes import check_attributes, check_de
 from modelica_like.netlist.modelica.carried import Carried
 from modelica_like.netlist.modelica.causal import is_causal, variables
 from modelica_like.netlist.modelica.connectors import bundle, connector_of
-from modelica_like.netlist.modelica.fold import KNOWN, number, numbered
+from modelica_like.netlist.modelica.fold import numbered
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
 from modelica_like.netlist.modelica.library import Known, connector_type
@@ -310,10 +310,7 @@ class _Builder:
         fixed = known(basic.given.inner.get("fixed")) is True
         if isinstance(declared, Discrete):
             before = self.statements.memory.get(path)
-            resolver = Resolver(self.instance, self.instance.text, {"time": number(0.0)}, numeric=True)
-            value = value_of(given) if before is None else resolver(before)
-            if before is not None and (value is None or value.kind not in KNOWN):
-                raise refused(f"an initial value of {path} that only a run knows", self.instance.text, before.line)
+            value = value_of(given) if before is None else before
             start = None if value is None else numbered(value).args[0]
             first = 1.0 if basic.kind == "enumeration" else 0.0
             declared.default = float(start) if isinstance(start, bool | int | float) else first

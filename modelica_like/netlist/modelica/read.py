@@ -39,15 +39,12 @@ def read_modelica(path: Path, name: str = "", *, table: bool = True) -> tuple[Wr
     classes = Classes(path, table=table)
     text = classes.chosen(name)
     component, notes = _built(classes, text)
-    if text.experiment.get("StartTime", 0.0) != 0.0:
-        raise ModelicaTextError(
-            f"experiment(StartTime = {text.experiment['StartTime']:g}): a model that is read runs from 0 s.",
-            where=text.place(text.line), advice="Leave StartTime out, and call simulate(…, t0=…) in Python.",
-        )  # fmt: skip
     # A variable whose start value is not fixed starts at the start value of its class, which is zero.
-    settings = {"start": "rest", "on_chattering": "rest"} | (
-        {"until": f"{text.experiment['StopTime']:g} s"} if "StopTime" in text.experiment else {}
-    )
+    names = {"from": "StartTime", "until": "StopTime"}
+    times = {key: text.experiment[name] for key, name in names.items() if name in text.experiment}
+    if times.get("from") == 0.0:
+        del times["from"]
+    settings = {key: f"{time:g} s" for key, time in times.items()} | {"start": "rest", "on_chattering": "rest"}
     inside(component).simulate, inside(component).display = settings, notes.display
     if given := given_libraries():
         inside(component).libraries = {"libraries": [str(place.resolve()) for place in given]}

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
-from modelica_like.netlist.modelica.before import Before
+from modelica_like.netlist.modelica.before import Before, begin_late, begun
 from modelica_like.netlist.modelica.causal import Joints, declared_at
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known
@@ -85,8 +85,13 @@ class Statements(Whens):
             happening, text = self.instance.initial_equations[0]
             raise refused("a connection or a 'when' among initial equations", text, happening.line)
         self._orient()
-        before = Before(self.equations, start.equations, self._is_discrete, self._changes_at_events)
+        before = Before(
+            self.equations, start.equations, self._is_discrete, self._changes_at_events, resolver.known()
+        )  # fmt: skip
         self.memory, self.initial = before.memory, before.others
+        if before.late:
+            self.equations = [(left, begun(right, before.late), source) for left, right, source in self.equations]
+            self.happenings = [begin_late(happening, before.late) for happening in self.happenings]
         memories = Memories(self.instance, self.assigned)
         others = [v for h in self.happenings for conditions, new in h.branches for v in (*conditions, *new.values())]
         memories.read(self.equations, others, self.instance.text.place(self.instance.text.line))

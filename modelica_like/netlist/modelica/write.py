@@ -83,7 +83,9 @@ class _Writer:
         until = inside(assembly).simulate.get("until")
         if until is not None:
             seconds = to_si(until, parse_unit("s"), "until")
-            lines.append(f"  annotation(experiment(StopTime = {_number(seconds)}));")
+            first = to_si(inside(assembly).simulate.get("from", 0.0), parse_unit("s"), "from")
+            begin = f"StartTime = {_number(first)}, " if first else ""
+            lines.append(f"  annotation(experiment({begin}StopTime = {_number(seconds)}));")
         return "\n".join([*lines, f"end {name};"])
 
     # -- declarations ------------------------------------------------------------------------------------------------

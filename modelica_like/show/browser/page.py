@@ -17,7 +17,7 @@ from typing import Any
 
 from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import UnknownName
+from modelica_like.errors import ExportError, UnknownName
 from modelica_like.flatten.model import FlatParameter
 from modelica_like.fmi.build import BROWSER
 from modelica_like.fmi.export import Report, compiled_open, silent, tool
@@ -101,6 +101,7 @@ def export_html(
     target = target_file(path, ".html", "A page")
     report("compiling the model")
     model, description, _ = compiled_open(drive, (), "flow", ())
+    model.demand_begin_at_zero(ExportError, "A page")
     report("simulating")
     end = seconds(until if until is not None else model.settings.get("until"))
     solution = simulate(model, end)
