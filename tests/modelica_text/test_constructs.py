@@ -31,9 +31,11 @@ def run(folder: Path, text: str, until: float = 1.0) -> Any:
     return simulate(load(folder / "a.mo"), until, rtol=1e-10, atol=1e-12)
 
 
-def curve(folder: Path, table: str, smoothness: int, extrapolation: int, until: float, file: str = "") -> Any:
+def curve(
+    folder: Path, table: str, smoothness: int, extrapolation: int, until: float, file: str = "", name: str = "tab"
+) -> Any:
     """Return a run whose y is a table's value at the time."""
-    names = f'"tab", "{file}"' if file else '"NoName", "NoName"'
+    names = f'"{name}", "{file}"' if file else '"NoName", "NoName"'
     columns = f"{{2}}, {smoothness}, {extrapolation}"
     text = f"model A\n  parameter Object1D t = Object1D({names}, {table}, {columns});\n  Real y = valueOf(t, 1, time);"
     return run(folder, f"{TABLES}\n{text}\nend A;\n", until)
@@ -218,6 +220,18 @@ def test_a_table_may_stand_in_a_file(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("0,0\n1,2\n2,0\n")
     result = curve(tmp_path, "zeros(0, 2)", 1, 1, 3.0, "t.csv")
     assert result["y"] == pytest.approx(np.interp(result.time, [0, 1, 2], [0, 2, 0]), abs=1e-9)
+
+
+def test_a_table_may_stand_in_structures_of_a_file(tmp_path: Path) -> None:
+    rows = np.array([[0.0, 0.0], [1.0, 2.0], [2.0, 0.0]])
+    scipy_io = pytest.importorskip("scipy.io")
+    scipy_io.savemat(tmp_path / "t.mat", {"s": {"r": {"tab": rows}, "tab": 3 * rows}})
+    for name, factor in (("s.r.tab", 1), ("s.tab", 3)):
+        result = curve(tmp_path, "zeros(0, 2)", 1, 1, 2.0, "t.mat", name)
+        assert result["y"] == pytest.approx(factor * np.interp(result.time, factor * rows[:, 0], rows[:, 1]), abs=1e-9)
+    for name in ("s.no", "s.tab.no", "no.tab"):
+        with pytest.raises(ModelicaTextError, match=f"'t.mat' has no table {name} that can be read."):
+            curve(tmp_path, "zeros(0, 2)", 1, 1, 2.0, "t.mat", name)
 
 
 REFUSED = {

@@ -178,3 +178,24 @@ end A;
     assert run["held"][inside] == pytest.approx(held[inside])
     assert run["before"][inside] == pytest.approx(np.where(ticks > 0, 7 + (ticks - 1) / 2, 8.0)[inside])
     assert (run.final["low"], run.final["other"], run.final["n"]) == (0, 0, 6)
+
+
+@pytest.mark.parametrize("begin", [0.0, 0.3])
+def test_ticks_count_from_the_start_of_the_run(tmp_path: Path, begin: float) -> None:
+    (tmp_path / "a.mo").write_text("""
+model A
+  parameter Real t0(fixed = false); parameter Real T(start = 0.25);
+  Integer n(start = 0, fixed = true);
+initial equation
+  t0 = time;
+equation
+  when sample(t0 + T, T) then
+    n = pre(n) + 1;
+  end when;
+end A;
+""")
+    run = simulate(load(tmp_path / "a.mo"), 1.2, t0=begin)
+    passed = (run.time - begin) / 0.25
+    inside = np.abs(passed - np.round(passed)) > 1e-9
+    assert run["n"][inside] == pytest.approx(np.floor(passed[inside]))
+    assert run.final["t0"] == begin

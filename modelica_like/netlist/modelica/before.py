@@ -53,7 +53,7 @@ class Before:
         for left, right, source in values:
             node = self._node(left)
             names = self._befores(node) if node is not None else []
-            if not names and is_discrete(left) and not _uses_time(right):
+            if not names and is_discrete(left) and not uses_time(right):
                 names = [left.args[0][0]]
             if not names:
                 self.others.append((left, right, source))
@@ -62,7 +62,7 @@ class Before:
                     raise ModelicaTextError(f"Initial equations give {name} two values.", where=source)
         for _ in self.memory:  # one may need that of another
             self.memory = {name: self._known(value) for name, value in self.memory.items()}
-        self.memory = {name: value if _uses_time(value) else evaluated(value) for name, value in self.memory.items()}
+        self.memory = {name: value if uses_time(value) else evaluated(value) for name, value in self.memory.items()}
         self.late = {name: value for name, value in self.memory.items() if value.kind not in fold.KNOWN}
         self.memory = {name: value for name, value in self.memory.items() if name not in self.late}
 
@@ -90,11 +90,11 @@ class Before:
         return "pre" if before else "", variable.args[0][0]
 
 
-def _uses_time(value: Any) -> bool:
+def uses_time(value: Any) -> bool:
     """Tell whether an expression names the time: a run begins at any."""
     if isinstance(value, Expr):
-        return (value.kind == "name" and value.args[0][0] == "time") or _uses_time(value.args)
-    return isinstance(value, tuple | list) and any(_uses_time(inner) for inner in value)
+        return (value.kind == "name" and value.args[0][0] == "time") or uses_time(value.args)
+    return isinstance(value, tuple | list) and any(uses_time(inner) for inner in value)
 
 
 def begun(node: Expr, late: dict[str, Expr]) -> Expr:

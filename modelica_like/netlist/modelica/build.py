@@ -30,6 +30,7 @@ from modelica_like.language.assembly import declare, end_at
 from modelica_like.language.fields import Discrete, Field, Input, Parameter
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.attributes import check_attributes, check_declared
+from modelica_like.netlist.modelica.before import uses_time
 from modelica_like.netlist.modelica.carried import Carried
 from modelica_like.netlist.modelica.causal import is_causal, variables
 from modelica_like.netlist.modelica.connectors import bundle, connector_of
@@ -236,6 +237,12 @@ class _Builder:
         given = given.inner["start"] if begins else given
         low, high = (number_of(basic.given.inner.get(limit)) for limit in ("min", "max"))
         fixed = known(basic.given.inner.get("fixed")) is not False
+        initial = [
+            right for left, right, _ in self.statements.initial if left == Expr("name", ((name, ()),), left.line)
+        ]
+        if not fixed and any(map(uses_time, initial)):  # it begins with the run, and ticks may count from it
+            declare(self.component, name, discrete(unit_of(basic, self.notes), member.declaration.description))
+            return
         if begins and fixed:
             self.notes.tell(f"{f'{self.instance.path}.{name}'.lstrip('.')} has no value; its start value is taken.")
         outside = given.scope is not None and given.scope[0] is not self.instance

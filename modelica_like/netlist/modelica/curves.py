@@ -258,7 +258,7 @@ def read_rows(path: Path, name: str, delimiter: str = ",", skip: int = 0) -> Row
         if path.suffix.lower() == ".mat":
             return _of_matlab(path, name)
         return _of_text(read_text(path), name)
-    except (ValueError, KeyError, NotImplementedError):
+    except (ValueError, KeyError, IndexError, NotImplementedError):
         raise Unfit(f"'{path.name}' has no table {name} that can be read") from None
 
 
@@ -275,4 +275,8 @@ def _of_text(text: str, name: str) -> Rows:
 def _of_matlab(path: Path, name: str) -> Rows:
     from scipy.io import loadmat  # few tables are of this kind
 
-    return np.atleast_2d(np.asarray(loadmat(path, variable_names=[name])[name], float))
+    head, *fields = name.split(".")  # of structures in structures
+    value: Any = loadmat(path, variable_names=[head])[head]
+    for field_name in fields:
+        value = value[field_name][0, 0]
+    return np.atleast_2d(np.asarray(value, float))
