@@ -179,9 +179,14 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "  in a.mo:1 `function f input Real u[:]; output Real y; algorithm y := 0; for i in 1:2 loop "
         "if u[i] > 1 then break; end if; y := y + 1; end for; end f;`",
     ),
-    "a type of arrays": (
-        model("Axis a;", before="type Axis = Real[3];"),
-        "A short class definition of an array: that is not supported here.\n  in a.mo:1 `type Axis = Real[3];`",
+    "a package handed on with a modification": (
+        "package P\n  package C\n    constant Real k = 1;\n  end C;\n  model A\n    replaceable package K = C;\n"
+        "    Real y = K.k;\n  end A;\n  model B\n    replaceable package K = C;\n"
+        "    A a(redeclare package K = K(k = 2));\n"
+        "  end B;\n  model T\n    B b(redeclare package K = C);\n  end T;\nend P;\n",
+        "package K = K(…), which is handed on with a modification,: that is not supported here.\n"
+        "  in a.mo:11 `A a(redeclare package K = K(k = 2));`\n"
+        "Give the modification where it is replaced first.",
     ),
     "a text as a number": (
         model("Real x;", 'x = 2*"two";'),

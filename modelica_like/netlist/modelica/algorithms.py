@@ -115,6 +115,8 @@ class Algorithm:
                     self.assign(part, result)
             return
         value = value.args[0] if value.kind == "tuple" else value
+        if target.kind == "name" and len(target.args) == 2 and self._into_record(target, value):
+            return
         if target.kind != "name" or len(target.args) != 1 or target.args[0][0] not in self.declared:
             raise refused("this target of an assignment", self.text, target.line)
         name, subscripts = target.args[0]
@@ -131,6 +133,17 @@ class Algorithm:
             places.append(self.place(whole, subscript, open_size=open_size))
             whole = whole.args[places[-1]] if places[-1] < len(whole.args) else fold.number(0)
         self.local[name] = _replaced(self.local[name], places, value)
+
+    def _into_record(self, target: Expr, value: Expr) -> bool:
+        """Give an element of a record its value; tell whether the target is one."""
+        (name, at), (key, inner) = target.args
+        record = self.local.get(name)
+        if record is None or record.kind != "record" or at or inner or key not in record.args[0]:
+            return False
+        self.assigned(name)
+        values = (value if each == key else old for each, old in zip(record.args[0], record.args[1:], strict=True))
+        self.local[name] = Expr("record", (record.args[0], *values), target.line)
+        return True
 
     def _several(self, subscript: Expr, whole: Expr) -> tuple[Expr, ...] | None:
         """Return the subscripts of a slice, None if it is a single element."""

@@ -18,7 +18,7 @@ ARGUMENTS = {
 }  # fmt: skip
 """Least and largest number of arguments."""
 REFUSED = {
-    "spatialDistribution": "spatialDistribution",
+    "spatialDistribution": "spatialDistribution (of a constant velocity it is delay(u, T))",
     "inStream": "a stream connector", "actualStream": "a stream connector",
     "subSample": "a clock that follows another",
     "superSample": "a clock that follows another", "shiftSample": "a clock that follows another",

@@ -7,8 +7,10 @@ import re
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from modelica_like.errors import ModelicaTextError
 from modelica_like.netlist.document import read_text
@@ -92,6 +94,8 @@ class Classes:
         self.tops: dict[str, ClassText | None] = {}
         self.open: set[tuple[int, str]] = set()
         self.found: dict[tuple[int, str], Found | None] = {}
+        self.inherited: dict[tuple[int, int], ClassText] = {}
+        self.holders: dict[int, Any] = {}
         self.steps = 0
         self.lacking: dict[str, str] = {}
         self.untabled: set[str] = set()
@@ -144,7 +148,8 @@ class Classes:
             return name
         key = id(scope), name
         if key not in self.found:
-            self.found[key] = self._found(name, scope)
+            own = scope.inherits and name == scope.name and scope.owner is not None
+            self.found[key] = self._inherited(scope.owner, name) if own and scope.owner else self._found(name, scope)
         return self.found[key]
 
     def _found(self, name: str, scope: ClassText) -> Found | None:
@@ -155,7 +160,10 @@ class Classes:
         outermost = scope
         while level is not None:
             class_text = (
-                self._inside(level, name) or self._imported(level, head, rest) or self.tabled(f"{level.path}.{name}")
+                (self.inside(level.heir, name) if level.heir is not None else None)
+                or self.inside(level, name)
+                or self._imported(level, head, rest)
+                or self.tabled(f"{level.path}.{name}")
             )
             if class_text is not None:
                 return class_text
@@ -189,12 +197,17 @@ class Classes:
                     return class_text
         return None
 
-    def _inside(self, level: ClassText, name: str) -> Found | None:
+    def inside(self, level: ClassText, name: str) -> Found | None:
         """Return a class declared or inherited in a class."""
         head, _, rest = name.partition(".")
         inner = level.classes.get(head) or self._beside(level, head)
         if inner is not None:
-            return self._inside(inner, rest) if rest else inner
+            return self.inside(inner, rest) if rest else inner
+        return self._inherited(level, name)
+
+    def _inherited(self, level: ClassText, name: str) -> Found | None:
+        """Return a class that a class has from its bases; from those of a package, it sees what the package has."""
+        head = name.partition(".")[0]
         key = id(level), head
         if key in self.open:  # a base is looked up among what its own class inherits
             return None
@@ -206,12 +219,21 @@ class Classes:
             for extension in bases:
                 base = self.find(extension.base, level)
                 if isinstance(base, ClassText) and base is not level:
-                    class_text = self._inside(base, name)
+                    class_text = self.inside(base, name)
                     if class_text is not None:
-                        return class_text
+                        return self._of_heir(class_text, level) if level.kind == "package" else class_text
             return None
         finally:
             self.open.remove(key)
+
+    def _of_heir(self, inherited: Found, package: ClassText) -> Found:
+        """Return a class as a package has it that inherits it."""
+        if not isinstance(inherited, ClassText) or inherited.kind in ("package", "type", "connector"):
+            return inherited
+        key = id(inherited), id(package)
+        if key not in self.inherited:
+            self.inherited[key] = replace(inherited, heir=package)
+        return self.inherited[key]
 
     def full(self, path: str) -> Found | None:
         """Return a class by its full name; units of version 3 of the standard library have the names of version 4."""
@@ -222,14 +244,14 @@ class Classes:
             if path == class_text.path:
                 return class_text
             if path.startswith(f"{class_text.path}."):
-                own = self._inside(class_text, path[len(class_text.path) + 1 :])
+                own = self.inside(class_text, path[len(class_text.path) + 1 :])
                 if own is not None:
                     return own
         if path in BASIC or self.tabled(path):
             return self.tabled(path) or path
         head, _, rest = path.partition(".")
         for top in (self._top(head), built_in().get(head)):
-            inner = self._inside(top, rest) if top is not None and rest else top
+            inner = self.inside(top, rest) if top is not None and rest else top
             if inner is not None:
                 return inner
         return None
@@ -241,7 +263,7 @@ class Classes:
             return known if isinstance(known, ClassText) else None
         head, _, rest = known.path.partition(".")
         top = self._top(head)
-        inner = None if top is None else self._inside(top, rest)
+        inner = None if top is None else self.inside(top, rest)
         return inner if isinstance(inner, ClassText) else None
 
     def lack(self, part: str, path: str) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.algorithms import Algorithm
-from modelica_like.netlist.modelica.instance import Given, Instance, refused
+from modelica_like.netlist.modelica.instance import GIVE, Given, Instance, refused
 from modelica_like.netlist.modelica.members import value_of
 from modelica_like.netlist.modelica.natives import NATIVE
 from modelica_like.netlist.modelica.tree import ClassText, Empty, Expr
@@ -75,6 +75,42 @@ def _transposed(args: tuple[Expr, ...], line: int) -> Expr:
     return Expr("array", tuple(Expr("array", c, line) for c in zip(*(row.args for row in rows), strict=True)), line)
 
 
+def _concatenated(args: tuple[Expr, ...], line: int) -> Expr:
+    along, items = args[0], args[1:]
+    if along.kind != "number" or along.args[0] not in (1, 2) or any(item.kind != "array" for item in items):
+        raise fold.Unfit("cat(…) needs the dimension, 1 or 2, and arrays")
+    if along.args[0] == 1:
+        return Expr("array", tuple(part for item in items for part in item.args), line)
+    return _transposed((_concatenated((fold.number(1), *(_transposed((item,), line) for item in items)), line),), line)
+
+
+def _crossed(args: tuple[Expr, ...], line: int) -> Expr:
+    if any(_sizes(argument) != (3,) for argument in args):
+        raise fold.Unfit("cross(…) needs two vectors of 3 elements")
+    a, b = (argument.args for argument in args)
+    pairs = ((1, 2), (2, 0), (0, 1))
+    products = (tuple(fold.operation("*", (a[m], b[n]), line) for m, n in ((j, k), (k, j))) for j, k in pairs)
+    return Expr("array", tuple(fold.operation("-", pair, line) for pair in products), line)
+
+
+def _diagonal(args: tuple[Expr, ...], line: int) -> Expr:
+    items = fold.elements(args[0])
+    rows = ([item if j == k else fold.number(0, line) for k in range(len(items))] for j, item in enumerate(items))
+    return Expr("array", tuple(Expr("array", tuple(row), line) for row in rows), line)
+
+
+def _outer(args: tuple[Expr, ...], line: int) -> Expr:
+    left, right = map(fold.elements, args)
+    rows = (tuple(fold.operation("*", (a, b), line) for b in right) for a in left)
+    return Expr("array", tuple(Expr("array", row, line) for row in rows), line)
+
+
+def _semi_linear(args: tuple[Expr, ...], line: int) -> Expr:
+    x, above, below = args
+    sides = [fold.operation("*", (slope, x), line) for slope in (above, below)]
+    return fold.choice([fold.operation(">=", (x, fold.number(0, line)), line), sides[0]], sides[1], line)
+
+
 OF_ARRAYS: dict[str, tuple[int, Callable[[tuple[Expr, ...], int], Expr]]] = {
     "sum": (1, lambda args, line: fold.total(fold.elements(args[0]), line)),
     "product": (1, _product),
@@ -86,6 +122,11 @@ OF_ARRAYS: dict[str, tuple[int, Callable[[tuple[Expr, ...], int], Expr]]] = {
     "vector": (1, lambda args, line: Expr("array", tuple(fold.elements(args[0])), line)),
     "scalar": (1, _scalar),
     "transpose": (1, _transposed),
+    "cat": (-2, _concatenated),
+    "cross": (2, _crossed),
+    "diagonal": (1, _diagonal),
+    "outerProduct": (2, _outer),
+    "semiLinear": (3, _semi_linear),
 }
 """Functions whose arguments or results are arrays, each with the number of its arguments; of -2 it has 2 or more."""
 
@@ -140,7 +181,8 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
     if isinstance(text, ClassText) and is_external_object(text) and "constructor" in text.classes:
         text = text.classes["constructor"]
     if not isinstance(text, ClassText) or text.kind not in ("function", "record"):
-        raise refused(f"the function {name}", resolver.text, line, "Own functions with an algorithm are read.")
+        advice = GIVE if name.startswith("Modelica.") else "Own functions with an algorithm are read."
+        raise refused(f"the function {name}", resolver.text, line, advice)
     if text.kind == "record":
         return _record(resolver, text, given, named)
     if resolver.depth > _DEEPEST:
@@ -244,6 +286,14 @@ class _Call(Algorithm):
             return self.here(entry.scope[1] if entry.scope else member.text)(entry.value)
         if "input" in declaration.prefixes:
             raise refused(f"{self.text.name} without its argument {name}", self.resolver.text, line)
+        text = self.inside.find(declaration.type, member.text)
+        if isinstance(text, ClassText) and text.kind == "record" and not declaration.dimensions:
+            inner = Instance(self.classes, text, Given())
+            values = (
+                value_of(inner, key, text, line) if each.given.value is not None else fold.number(0, line)
+                for key, each in inner.members.items()
+            )
+            return Expr("record", (tuple(inner.members), *values), line)
         shape = tuple(self.here()(dimension) for dimension in declaration.dimensions if dimension.kind != "all")
         return _filled(fold.number(0, line), shape, line)
 

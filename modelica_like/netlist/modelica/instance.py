@@ -18,7 +18,7 @@ from modelica_like.netlist.modelica.tree import (
 )
 
 GIVE = "Give the library's own text by --library."
-_DEEPEST = 40
+DEEPEST = 40
 _NO_DECLARATION = Declaration(frozenset(), "", "", (), Modification(), None, "", 0)
 
 
@@ -165,8 +165,16 @@ class Instance:
         """Return the class that a name means, with classes that were redeclared."""
         head, _, rest = name.partition(".")
         replaced = self._replaced.get(head)
-        if replaced is not None and isinstance(replaced.redeclared, ClassText) and not rest:
-            return replaced.redeclared
+        if replaced is not None and isinstance(replaced.redeclared, ClassText):
+            new, scope = replaced.redeclared, replaced.scope
+            if scope is not None and scope[0] is not self and new.short and new.kind in ("package", "function"):
+                base = new.short.base
+                if base.partition(".")[0] in scope[0]._replaced:  # `redeclare package M = M`: what it is there
+                    if new.short.modification.arguments:
+                        what = f"{new.kind} {new.name} = {base}(…), which is handed on with a modification,"
+                        raise refused(what, new, new.line, "Give the modification where it is replaced first.")
+                    return scope[0].find(f"{base}.{rest}".rstrip("."), new.owner or text)
+            return self.classes.inside(new, rest) if rest else new
         return self.classes.find(name, text)
 
     def inner(self, name: str) -> Instance | None:
@@ -201,7 +209,7 @@ class Instance:
 
     def _collect(self, text: ClassText, outer: Given, depth: int) -> set[str]:
         """Collect the members of a class and its bases; return the names it has for modifications."""
-        if depth > _DEEPEST:
+        if depth > DEEPEST:
             raise ModelicaTextError(f"{text.path} extends itself.", where=text.place(text.line))
         for what, line in text.unsupported:
             raise refused(what, text, line)
@@ -215,7 +223,7 @@ class Instance:
                 raise ModelicaTextError(f"{element.name} is declared twice in {text.name}.", where=places)
             if isinstance(element, Extends):
                 names |= self._extend(element, text, outer, depth)
-            elif not isinstance(element, Import):
+            elif not isinstance(element, Import) and "redeclare" not in element.prefixes:
                 self._declare(element, text, outer)
         self.equations += [(equation, text) for equation in text.equations]
         self.initial_equations += [(equation, text) for equation in text.initial_equations]
@@ -228,6 +236,7 @@ class Instance:
             base = self.classes.text_of(base.path) or base
         if isinstance(base, ClassText):
             inner = given(clause.modification, (self, text), clause.line)
+            inner.inner |= self._redeclaring(text)
             redeclared = {k: v for k, v in inner.inner.items() if isinstance(v.redeclared, ClassText)}
             self._replaced = redeclared | self._replaced
             names = self._collect(base, outer.over(inner), depth + 1)
@@ -240,9 +249,29 @@ class Instance:
             raise unknown_class(clause.base, text, clause.line)
         return set()
 
+    def _with_dimensions(self, declaration: Declaration, text: ClassText) -> Declaration:
+        """Return a declaration with the dimensions of its type, `type Axis = Real[3]`."""
+        dimensions, found = declaration.dimensions, self.find(declaration.type, text)
+        steps = 0
+        while isinstance(found, ClassText) and found.short is not None:
+            dimensions, steps = dimensions + found.dimensions, steps + 1
+            if steps > DEEPEST:
+                raise ModelicaTextError(f"{found.path} extends itself.", where=found.place(found.line))
+            found = self.classes.find(found.short.base, found.owner or found)
+        return declaration if dimensions == declaration.dimensions else replace(declaration, dimensions=dimensions)
+
+    def _redeclaring(self, text: ClassText) -> dict[str, Given]:
+        """Return what a class says anew of its bases, by elements with `redeclare`."""
+        parts = [e for e in text.elements if isinstance(e, Declaration) and "redeclare" in e.prefixes]
+        classes = [inner for inner in text.classes.values() if inner.redeclares]
+        return {
+            new.name: Given(redeclared=new, scope=(self, text), line=new.line, text=text) for new in (*parts, *classes)
+        }
+
     def _declare(self, declaration: Declaration, text: ClassText, outer: Given) -> None:
         if "stream" in declaration.prefixes:
             raise refused(f"'stream' before {declaration.name}", text, declaration.line)
+        declaration = self._with_dimensions(declaration, text)
         entered = given(declaration.modification, (self, text), declaration.line)
         entered.final = "final" in declaration.prefixes
         bound = declaration.constrained

@@ -10,7 +10,7 @@ from modelica_like.errors import ModelicaTextError, UnknownName
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold, resolve
 from modelica_like.netlist.modelica.algorithms import Algorithm, targets_of
-from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, refused, unknown_class
+from modelica_like.netlist.modelica.instance import DEEPEST, Given, Instance, Member, given, refused, unknown_class
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement, names_in
 from modelica_like.netlist.modelica.types import basic_type, misfit
@@ -277,13 +277,17 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
         raise unknown_class(declared.type, member.text, declared.line)
     constraint = Given() if member.constraint else owner.constraint(declared.type, member.text)
     member.constraint = True
+    where, steps = owner, 0
     while isinstance(inner, ClassText) and inner.short is not None and not inner.prefixes:
         # `model A = B(k = 1)`: the part is a B, and the modification one of the part.
         scope = inner.owner or inner
-        base = owner.find(inner.short.base, scope)
+        where, steps = where.scope_of(inner), steps + 1
+        if steps > DEEPEST:
+            raise ModelicaTextError(f"{inner.path} extends itself.", where=inner.place(inner.line))
+        base = where.find(inner.short.base, scope)
         if base is None:
             raise unknown_class(inner.short.base, scope, inner.line)
-        short = given(inner.short.modification, (owner.scope_of(inner), scope), inner.line)
+        short = given(inner.short.modification, (where, scope), inner.line)
         member.given = member.given.over(short, declared.name)
         member.declaration = declared = replace(declared, type=inner.short.base)
         member.text, inner = scope, base
@@ -325,6 +329,13 @@ def _instance(owner: Instance, member: Member, text: ClassText, name: str, given
         scope, inside = given.scope
         if value.kind == "call":
             called = scope.find(value.args[0], inside)
+            if isinstance(called, ClassText) and called.kind == "function":
+                parts = {
+                    key: Expr("part", (value, key), value.line)
+                    for key in Instance(owner.classes, text, Given()).members
+                }
+                arguments = {key: Given(part, given.scope, line=value.line, text=inside) for key, part in parts.items()}
+                return Instance(owner.classes, text, Given(inner=given.inner).over(Given(inner=arguments)), owner, name)
             if not isinstance(called, ClassText) or called.kind != "record":
                 raise refused(f"{value.args[0]}(…) as the value of a record", inside, value.line)
             text = called  # it may extend the declared one, with values of its own

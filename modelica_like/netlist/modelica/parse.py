@@ -86,20 +86,20 @@ class _Parser(Expressions):
         if kind == "operator":
             kind = self.take("function", "record") or kind
             unsupported.append(("overloaded operators", line))
-        if self.take("extends"):
-            unsupported.append(("'class extends'", line))
+        inherits = bool(self.take("extends"))
         name = self.need("name")
         class_text = ClassText(
-            name, kind, line, self.file, owner, within, partial, unsupported=unsupported, lines=self.lines
-        )
+            name, kind, line, self.file, owner, within, partial, redeclares=inherits, inherits=inherits,
+            unsupported=unsupported, lines=self.lines,
+        )  # fmt: skip
         around, self.current = self.current, class_text
         if self.take("="):
             self._short(class_text)
             self.depth -= 1
             self.current = around
             return class_text
-        if self.kind == "(":
-            self.modification()
+        if inherits:
+            class_text.elements.append(Extends(name, self.modification(), line))
         class_text.description = self.strings()
         self._composition(class_text)
         bases = [element for element in class_text.elements if isinstance(element, Extends)]
@@ -206,8 +206,9 @@ class _Parser(Expressions):
         return result
 
     def _element_class(self, owner: ClassText | None) -> ClassText:
-        self.take("redeclare")
+        redeclares = bool(self.take("redeclare"))
         inner = self.class_text(owner)
+        inner.redeclares = inner.redeclares or redeclares
         inner.constrained = self._constrained()
         return inner
 

@@ -7,14 +7,14 @@ from typing import Any
 
 from modelica_like.errors import ModelicaTextError, did_you_mean
 from modelica_like.language.inside import declarations
-from modelica_like.netlist.modelica import fold, members
+from modelica_like.netlist.modelica import constants, fold, members
 from modelica_like.netlist.modelica.calls import ARGUMENTS, ELEMENTARY, KEPT, REFUSED
 from modelica_like.netlist.modelica.classes import Classes
-from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
+from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
 from modelica_like.netlist.modelica.lifting import way
 from modelica_like.netlist.modelica.parse import parse_expression
-from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Import
+from modelica_like.netlist.modelica.tree import ClassText, Expr
 from modelica_like.netlist.modelica.types import Basic, basic_type
 
 _STATE_SELECT = ("never", "avoid", "default", "prefer", "always")
@@ -53,6 +53,11 @@ class Resolver:
             return self._name(Expr("name", args, line))
         if kind == "call":
             return self._call(expression)
+        if kind == "part":  # of a record that an expression gives
+            whole = self(args[0])
+            if whole.kind != "record" or args[1] not in whole.args[0]:
+                raise refused(f"a value without '{args[1]}' for a record", self.text, line)
+            return whole.args[1 + whole.args[0].index(args[1])]
         if kind == "for":
             return self._built(args[0], list(args[1]))
         if kind == "if":
@@ -143,6 +148,9 @@ class Resolver:
         Raises:
             ModelicaTextError: it has none, or is no size.
         """
+        resolved = self(expression) if expression.kind == "name" else expression
+        if resolved.kind == "array" and all(item.kind == "literal" for item in resolved.args):
+            return len(resolved.args)
         size = self.number(expression)
         self._told(lambda: fold.number(fold.count(size)), expression.line)
         return int(size)
@@ -197,6 +205,8 @@ class Resolver:
         chosen = inside(expression)
         if chosen.kind == "array":
             return chosen
+        if chosen.kind == "literal":
+            chosen = fold.numbered(chosen)
         if chosen.kind != "number":
             raise ModelicaTextError(
                 "A subscript must be a number that constants and parameters determine.",
@@ -292,15 +302,21 @@ class Resolver:
             return Expr("literal", (f"{class_text.name}.{name}", class_text.literals.index(name) + 1), line)
         holder = class_text if isinstance(class_text, ClassText) else None
         if holder is None and not package:
-            holder = self._around(name)
+            holder = constants.around(self.classes, self.text, name, itself=self.instance is None)
         if holder is None:
-            holder = self._imported_constant(path)
+            holder = constants.imported(self.classes, self.text, path)
             name = path.rpartition(".")[2]
         if isinstance(holder, ClassText):
-            inside = Instance(self.classes, holder, Given())
+            inside = constants.holder_of(self.classes, holder)
             if name in inside.members:
                 self._demand_constant(inside.members[name], holder, expression)
                 return self.indexed(members.value_of(inside, name, self.text, line), expression.args[-1][1], line)
+        every = self.find(path)
+        if isinstance(every, ClassText) and every.literals:  # the indices of an array, the values of a loop
+            literals = enumerate(every.literals, 1)
+            return Expr(
+                "array", tuple(Expr("literal", (f"{every.name}.{each}", k), line) for k, each in literals), line
+            )
         names = [*self.local, *(self.instance.members if self.instance else ())]
         raise members.unknown_name(f"There is no '{path}'{did_you_mean(path, names) or '.'}", self.text, line)
 
@@ -316,27 +332,6 @@ class Resolver:
             where=self.text.place(expression.line),
             advice=f"Give {self.text.name} {needed} for it{', or declare it as a constant' * (kind == 'parameter')}.",
         )
-
-    def _imported_constant(self, name: str) -> ClassText | None:
-        """Return the package of a constant that is imported by its own name."""
-        level: ClassText | None = self.text
-        while level is not None:
-            for element in level.elements:
-                if isinstance(element, Import) and name in (element.alias, *element.names):
-                    class_text = self.classes.full(
-                        element.path if name in element.names else element.path.rpartition(".")[0]
-                    )
-                    return class_text if isinstance(class_text, ClassText) else None
-            level = self.classes.around(level)
-        return None
-
-    def _around(self, name: str) -> ClassText | None:
-        level = self.text if self.instance is None else self.classes.around(self.text)
-        while level is not None:
-            if any(isinstance(element, Declaration) and element.name == name for element in level.elements):
-                return level
-            level = self.classes.around(level)
-        return None
 
     def find(self, name: str) -> Any:
         """Return the class that a name means."""

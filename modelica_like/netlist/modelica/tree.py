@@ -167,6 +167,9 @@ class ClassText:
         file: it was read from.
         owner: enclosing class; at the outermost level None.
         within: name of the package around the outermost class.
+        redeclares: it takes the place of an inherited class.
+        inherits: it extends the inherited class of its name, `redeclare model extends Law`.
+        heir: package that inherits it; its constants and classes come before those around it.
         unsupported: constructs that are refused when the class is used, with their lines.
     """
 
@@ -190,6 +193,9 @@ class ClassText:
     experiment: dict[str, float] = field(default_factory=dict)
     external: str = ""
     dimensions: tuple[Expr, ...] = ()
+    redeclares: bool = False
+    inherits: bool = False
+    heir: ClassText | None = None
     unsupported: list[tuple[str, int]] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from modelica_like.netlist.modelica import fold
-from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, refused, unknown_class
+from modelica_like.netlist.modelica.instance import Given, Instance, Member, given, unknown_class
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Extends
 
 SCALARS = ("Real", "Integer", "Boolean", "String")
@@ -60,8 +60,6 @@ def basic_type(instance: Instance, member: Member) -> Basic | None:
             return Basic("object", attributes, prefixes)
         if base.short is None:
             return None
-        if base.dimensions:
-            raise refused("a short class definition of an array", base, base.line)
         scope = base.owner or base
         attributes = attributes.over(given(base.short.modification, (instance, scope), base.line), declaration.name)
         prefixes = prefixes | base.prefixes
