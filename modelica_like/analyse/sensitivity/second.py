@@ -93,7 +93,7 @@ class SecondDerivatives(NamedCallback):
         largest = np.maximum(np.abs(derivatives).max(axis=(1, 2)), hidden / _UNCERTAIN)
         relative = errors.max(axis=1) / np.where(largest > 0.0, largest, 1.0)[:, None]
         self._simulation.second_error = float(relative.max())
-        row, column = np.unravel_index(np.argmax(relative), relative.shape)
+        row, column = (int(k) for k in np.unravel_index(np.argmax(relative), relative.shape))
         if relative[row, column] > _UNCERTAIN:
             of, by = self._simulation.outputs[row], names[column]
             raise NoGradient(

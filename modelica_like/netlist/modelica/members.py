@@ -8,11 +8,10 @@ from dataclasses import replace
 
 from modelica_like.errors import ModelicaTextError, UnknownName
 from modelica_like.language.inside import declarations
-from modelica_like.netlist.modelica import fold, resolve
-from modelica_like.netlist.modelica.algorithms import Algorithm, targets_of
+from modelica_like.netlist.modelica import at_start, fold, resolve
 from modelica_like.netlist.modelica.instance import DEEPEST, Given, Instance, Member, given, refused, unknown_class
 from modelica_like.netlist.modelica.library import Known
-from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement, names_in
+from modelica_like.netlist.modelica.tree import ClassText, Expr, names_in
 from modelica_like.netlist.modelica.types import basic_type, misfit
 
 
@@ -93,7 +92,7 @@ def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
     if given.value is None or given.scope is None:
         basic = basic_type(owner, member)
         decides = bool(member.declaration.dimensions) or (basic is not None and basic.kind != "Real")
-        value = _from_the_start(owner, name) if decides and name not in owner.folded else None
+        value = at_start.value_from_start(owner, name) if decides and name not in owner.folded else None
         if value is not None:
             owner.values[name] = value
             return value
@@ -114,48 +113,6 @@ def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
     owner.values[name] = value  # its size may be that of the value
     check_value(owner, member, value)
     return value
-
-
-def _from_the_start(owner: Instance, name: str) -> Expr | None:
-    """Return what initial equations and algorithms of known numbers give an array or a choice, None if they do not."""
-    pending = list(owner.initial_equations)
-    for statement, text in pending:
-        resolver = resolve.Resolver(owner, text, numeric=True)
-        if statement.kind == "if":
-            for condition, body in statement.parts:
-                holds = Expr("boolean", (True,)) if condition is None else resolver(condition)
-                if holds.kind == "boolean" and holds.args[0]:
-                    pending += [(inner, text) for inner in body]
-                    break
-        elif statement.kind == "=":
-            left = statement.parts[0]
-            targets = left.args if left.kind == "tuple" else (left,)
-            places = [k for k, target in enumerate(targets) if target.path == name and not target.args[0][1]]
-            if places:
-                value = resolver(statement.parts[1])
-                return value.args[places[0]] if value.kind == "tuple" else value
-        elif statement.kind == "algorithm" and name in targets_of(statement.parts[0]):
-            return _AtOnce(owner, text, statement.parts[0]).local[name]
-    return None
-
-
-class _AtOnce(Algorithm):
-    """An initial algorithm of known numbers."""
-
-    def __init__(self, owner: Instance, text: ClassText, body: list[Statement]) -> None:
-        super().__init__(owner.classes, text)
-        self.owner = owner
-        self.declared = {name: member.declaration for name, member in owner.members.items()}
-        for name in set(targets_of(body)) & owner.members.keys():
-            value = fold.number(0)
-            for size in reversed(sizes(owner, owner.members[name])):
-                value = Expr("array", (value,) * size)
-            self.local[name] = value
-        self.run(body)
-
-    def here(self, text: ClassText | None = None) -> resolve.Resolver:
-        """Return what resolves expressions with the values so far."""
-        return resolve.Resolver(self.owner, text or self.text, self.local, numeric=True)
 
 
 def check_value(owner: Instance, member: Member, value: Expr) -> None:
@@ -389,9 +346,10 @@ def element(given: Given, index: int, size: int = 0) -> Given:
                 what, where=given.scope[1].place(given.line), advice="Write 'each' where all elements take the same."
             )
         if value.kind == "array" and index <= len(value.args):
-            entry.value = value.args[index - 1]
-            if entry.value.kind == "record" and given.value.kind == "array":
-                entry.value = given.value.args[index - 1]  # as it is written, with names of the place it is given at
+            item = value.args[index - 1]
+            # A record is given as it is written, with names of the place it is given at.
+            written = item.kind == "record" and given.value.kind == "array"
+            entry.value = given.value.args[index - 1] if written else item
     return entry
 
 
