@@ -20,6 +20,8 @@ from modelica_like.structure.reduce import ReducedDae
 Vector = NDArray[np.float64]
 
 _POSITIONS = ("rad", "m")
+_LARGEST = 1e300
+"""A limit that stands for none may be the largest number there is."""
 _ROUNDING = 1e-9
 """Relative size of a slope, or of what of it does not depend on others, that is rounding of few operations at a generic
 point: 1e-16 times what cancels there, while slopes differ by ratios of gears and arms."""
@@ -156,7 +158,7 @@ class Keeping:
         time, x, z, p, u = np.split(spread(0.5, 1.5, sum(sizes)), np.cumsum(sizes)[:-1])
         starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in flat.discretes]
         d = np.array([*starts, *[0.0] * (flat.d.numel() - len(starts))])
-        return [time, x, z, given * p + 1e-3 * (p - 1.0), u, d]
+        return [time, x, z, np.clip(given, -_LARGEST, _LARGEST) * p + 1e-3 * (p - 1.0), u, d]
 
 
 def _moves(rows: Vector, slopes: Vector, lengths: Vector) -> Vector:

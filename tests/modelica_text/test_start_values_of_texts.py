@@ -108,13 +108,17 @@ def test_a_run_begins_at_its_start_time(tmp_path: Path) -> None:
 model A
   parameter Real k = 2;
   Real x(start = 1, fixed = true);
-  discrete Real begin; Integer n(start = 0, fixed = true);
+  discrete Real begin; discrete Real never; Integer n(start = 0, fixed = true);
 initial equation
   pre(begin) = time;
+  pre(never) = time + 4;
 equation
   der(x) = k*time;
   when x > 1e9 then
     begin = time;
+  end when;
+  when false then
+    never = time;
   end when;
   when sample(0.5, 1) then
     n = pre(n) + 1;
@@ -127,7 +131,7 @@ end A;
         run = simulate(drive, solver=solver, rtol=1e-10)
         assert (run.time[0], run.time[-1]) == (-1, 2)
         assert run["x"] == pytest.approx(run.time**2, rel=1e-8, abs=1e-8)
-        assert (run.final["begin"], run.final["n"]) == (-1, 2)  # ticks at 0.5 and 1.5 s
+        assert (run.final["begin"], run.final["never"], run.final["n"]) == (-1, 3, 2)  # ticks at 0.5 and 1.5 s
     assert simulate(drive, t0=0.0).final["begin"] == 0
     model = build(drive)
     assert linearize(model).point.t == -1

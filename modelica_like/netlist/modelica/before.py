@@ -124,6 +124,7 @@ def begin_late(happening: Happening, late: dict[str, Expr]) -> Happening:
     own = {
         name: late[name] for name in dict.fromkeys(name for _, values in branches for name in values) if name in late
     }
+    branches = [branch for branch in branches if branch[0] or happening.text]  # one of what only begins has none
     if own:
         branches.append(((Expr("call", ("initial", (), ())),), own))
     return Happening(tuple(branches), happening.source, happening.text)

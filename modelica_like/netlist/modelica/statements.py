@@ -90,7 +90,12 @@ class Statements(Whens):
         )  # fmt: skip
         self.memory, self.initial = before.memory, before.others
         if before.late:
-            self.equations = [(left, begun(right, before.late), source) for left, right, source in self.equations]
+            staying = [
+                e for e in self.equations if e[1] == fold.call("pre", (e[0],), 0) and e[0].args[0][0] in before.late
+            ]
+            self.happenings += [Happening((((), {left.args[0][0]: right}),), at) for left, right, at in staying]
+            others = (e for e in self.equations if e not in staying)
+            self.equations = [(left, begun(right, before.late), source) for left, right, source in others]
             self.happenings = [begin_late(happening, before.late) for happening in self.happenings]
         memories = Memories(self.instance, self.assigned)
         others = [v for h in self.happenings for conditions, new in h.branches for v in (*conditions, *new.values())]
