@@ -9,9 +9,10 @@ from typing import Any, Generic, TypeVar, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError, Source
+from modelica_like.flatten.at_once import between_events, following
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
-from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, between_events, following, is_discrete
+from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, is_discrete
 from modelica_like.flatten.holds import HoldForm, IdealForm, hold_forms, ideal_forms, starts_at_rest
 from modelica_like.flatten.reasons import reason
 from modelica_like.flatten.steps import honest, with_events
