@@ -81,7 +81,7 @@ VALUES: dict[str, str] = {
     "lossTable": "[0, 0.9, 0.8, 0.1, 0.2; 5, 0.85, 0.75, 0.15, 0.3]", "radius": "0.4", "f_crit": "8",
     "tau_constant": "1.5", "stepTorque": "2", "offsetTorque": "0.4", "startTime": "0.23", "w_fixed": "1.7",
     "tau_nominal": "3", "w_nominal": "4", "w0": "1.5", "TRef": "300", "alpha20": "0.004", "constantExcitation": "0.7",
-    "s0": "0.3", "m": "0.7", "L": "0.5", "s_rel0": "0.1", "f_ref": "60", "s_ref": "0.9", "n": "1.4", "smax": "3",
+    "s0": "0.3", "m": "0.7", "L": "0.5", "s_rel0": "0.1", "s_ref": "0.9", "n": "1.4", "smax": "3",
     "smin": "-0.9", "F_prop": "0.8", "F_Coulomb": "1.1", "F_Stribeck": "0.9", "fexp": "1.6", "fWeight": "20",
     "CrConstant": "0.03", "inclinationConstant": "0.02", "v0": "3", "g": "9.7", "R": "0.35", "A": "0.9", "Cd": "0.4",
     "rho": "1.1", "vWindConstant": "3", "vReg": "0.02", "f_constant": "1.5", "stepForce": "2", "offsetForce": "0.4",
@@ -94,7 +94,7 @@ VALUES: dict[str, str] = {
 }  # fmt: skip
 """Of parameters by their names; classes where others are needed are below."""
 _PTP = "q_begin = {0.1}, q_end = {1.4}, qd_max = {2.1}, qdd_max = {9}, startTime = 0.13"
-_TABLE = "table = [0, 1, 2; 0.3, 2, 0.5; 0.7, 0.4, 1], columns = {3, 2}, timeScale = 1.2, offset = {0.4}"
+_TABLE = "table = [0, 1, 2; 0.3, 2, 0.5; 0.7, 0.4, 1], timeScale = 1.2, startTime = 0"
 _INIT = "Modelica.Blocks.Types.Init"
 _MACHINE = (
     "VaNominal = 90, IaNominal = 8, wNominal = 140, TaNominal = 370, Ra = 0.5, La = 0.02, Jr = 0.15, TaRef = 295, "
@@ -195,7 +195,7 @@ def _values(drive: Drive) -> str:
         prefixes = member.declaration.prefixes
         if "parameter" not in prefixes or {"final", "protected"} & prefixes or name in given:
             continue
-        if name in VALUES:
+        if name in VALUES and not (member.declaration.dimensions and not VALUES[name].startswith(("[", "{"))):
             values.append(f"{name} = {VALUES[name]}")
         elif member.declaration.type == "Boolean" and re.match("use(?!_fder)", name) and drive.ends:
             values.append(f"{name} = true")
