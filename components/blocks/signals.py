@@ -292,17 +292,21 @@ class Trapezoid(Periodic):
 
     def events(self) -> Events:
         begin = self.begin()
+        again = begin + self.period
         high = begin + self.rising
         fall = high + self.width
+        ends = {self.done: self.completed()}
         yield self.stage.go("low", "rising", at=begin)
-        yield self.stage.go("rising", "high", at=high)
-        yield self.stage.go("high", "falling", at=fall)
-        yield self.stage.go("falling", "low", at=fall + self.falling, reset={self.done: self.completed()})
+        # A shape that is longer than the period is cut off where the next one begins.
+        for stage, following, end in (("rising", "high", high), ("high", "falling", fall)):
+            yield self.stage.go(stage, following, at=end + self.period * where(end > again, _NEVER, 0))
+            yield self.stage.go(stage, "low", at=again + self.period * where(end > again, 0, _NEVER), reset=ends)
+        yield self.stage.go("falling", "low", at=minimum(fall + self.falling, again), reset=ends)
         parts = ("falling", self.rising + self.width), ("high", self.rising), ("rising", 0)
         yield from self.begins(self.stage, *parts)
 
     def length(self) -> Expr:
-        return self.rising + self.width + self.falling
+        return minimum(self.rising + self.width + self.falling, self.period)
 
 
 class Rowwise(Component, partial=True):

@@ -180,6 +180,10 @@ def check_expression(
     where = (source,) if source else ()
     with _told(label, where, label, source):
         unit = dimensions.unit(expression)
+    if unit == _MIXED:
+        raise UnitMismatch(
+            f"{label} expects {expected}; the branches of choose(…) or where(…) differ in unit.", where=where
+        )
     expect_unit(unit, expected, label, where)
 
 

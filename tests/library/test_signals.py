@@ -257,3 +257,21 @@ def test_pulses_that_are_over_before_a_late_start() -> None:
     run = torque_of(Pulse(amplitude="2 N.m", period=0.1, periods=25), 50.5, t0=50.0)
     assert np.all(run["mass.w"] == 0.0)
     assert run.final["signal.done"] == 25
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize(
+    ("rising", "width", "falling"),
+    [(0.1, 0.2, 0.3), (0.1, 0.5, 0.3), (0.5, 0.1, 0.1), (0.1, 0.3, 0.1), (0.4, 0.1, 0.1)],
+)
+@pytest.mark.parametrize("t0", [0.0, 0.85])
+def test_a_trapezoid_longer_than_its_period_begins_anew(
+    rising: float, width: float, falling: float, t0: float, solver: str
+) -> None:
+    """As the standard library has it; the impulse of one period of 0.4 s, in parts of a polygon."""
+    signal = Trapezoid(amplitude="1 N.m", period=0.4, rising=rising, width=width, falling=falling)
+    run = torque_of(signal, t0 + 2.0, t0=t0, solver=solver, rtol=1e-9)
+    times = np.array([0.0, rising, rising + width, rising + width + falling])
+    corners = np.append(times[times < 0.4], 0.4)
+    impulse = 5 * np.trapezoid(np.interp(corners, times, [0.0, 1.0, 1.0, 0.0]), corners)
+    assert run.final["mass.w"] == pytest.approx(impulse, rel=1e-9)

@@ -20,7 +20,20 @@ from modelica_like.errors import (
     UnitMismatch,
     ValueOutOfRange,
 )
-from modelica_like.language import Component, Equations, Expr, Parameter, Variable, delay, der, param, sin, tanh, var
+from modelica_like.language import (
+    Component,
+    Equations,
+    Expr,
+    Parameter,
+    Variable,
+    delay,
+    der,
+    param,
+    sin,
+    tanh,
+    var,
+    where,
+)
 
 
 class Lagging(Component):
@@ -55,6 +68,11 @@ class Never(Lagging):
 class Length(Lagging):
     def late(self) -> Expr:
         return delay(self.x, self.L)
+
+
+class Branches(Lagging):
+    def late(self) -> Expr:
+        return delay(self.x, where(self.T > 0.1, 1.0, self.T))
 
 
 class Unit(Lagging):
@@ -95,6 +113,11 @@ CASES: dict[type[Component], tuple[type[ModelicaLikeError], str]] = {
     Length: (
         UnitMismatch,
         f"Length, delay expects s; the expression is m.\n  in {HERE}:{{basis}} `yield self.y == self.late()`",
+    ),
+    Branches: (
+        UnitMismatch,
+        "Branches, delay expects s; the branches of choose(…) or where(…) differ in unit.\n"
+        f"  in {HERE}:{{basis}} `yield self.y == self.late()`",
     ),
     Unit: (
         UnitMismatch,
