@@ -23,8 +23,8 @@ def placed(drive: Component | CompiledDae, key: str) -> Iterator[None]:
         raise
 
 
-def with_values(drive: Assembly, values: Mapping[str, float]) -> Assembly:
-    """Return a copy of a drive with other values of parameters and of cells of tables, `coil.table[3,2]`."""
+def with_values(drive: Assembly, values: Mapping[str, float | str]) -> Assembly:
+    """Return a copy of a drive with other values of parameters, and numbers in cells of tables, `coil.table[3,2]`."""
     drive = copy.deepcopy(drive)
     parts = {part.path: part for part in drive.walk()}
     tables: dict[str, Any] = {}

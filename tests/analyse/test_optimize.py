@@ -180,9 +180,19 @@ subject_to = ["clutch.tau <= 15.1 N.m", "clutch.lock_time >= 0.1 s"]
     inertia = J - 0.004 + 0.001
     assert best["clutch.capacity"] == pytest.approx(inertia * W / 0.1 + LOAD, rel=1e-6)
     best.save(tmp_path / "best.toml")
+    assert f'capacity = "{best["clutch.capacity"]:.10g} N.m"' in (tmp_path / "best.toml").read_text()
     again = build(load(tmp_path / "best.toml"))
     assert again.p[again.parameter_position["clutch.capacity"]] == pytest.approx(best["clutch.capacity"])
     assert again.p[again.parameter_position["hub.J"]] == pytest.approx(0.001)
+
+
+def test_what_happens_at_the_end_of_a_run_is_a_limit() -> None:
+    """The least clutch locks as the run ends, after 0.4 s: weaker ones do not in it."""
+    best = optimum(DIRECT, minimize="clutch.capacity", free=CAPACITY, subject_to="clutch.lock_time >= 0.1 s")
+    assert best["clutch.capacity"] == pytest.approx(capacity(0.4), rel=2e-5)
+    assert best.optimal
+    assert best.runs < 20
+    assert "clutch.lock_time is at the end of the run: a longer run may have a better design." in str(best)
 
 
 @pytest.mark.slow

@@ -43,13 +43,28 @@ DRIVES: dict[str, tuple[str, str, str, dict[str, Any]]] = {
         "dc_bench", "battery.source_energy", "1 s",
         {"ratio": (2, 5), "disc": (0.0006, 0.0025)},
     ),
+    "fan": (
+        "fan", "clutch.loss_energy", "3 s",
+        {"clutch.capacity": (30, 80), "impeller.J": (0.2, 0.5)},
+    ),
+    "winch": (
+        "winch", "peak(rope.f)", "2 s",
+        {"rope.d": (2000, 20000), "drum_inertia.J": (0.05, 0.5)},
+    ),
+    "servo": (
+        "servo_axis", "integral((way.y - servo.motor.phi)**2)", "0.5 s",
+        {"servo.Kv": (20, 80), "table.m": (100, 200)},
+    ),
 }  # fmt: skip
+# Where a run of sticking and sliding ends has many optima: three starts find 1.4876 N, 900 runs of the other 1.4447 N.
+MANY_OPTIMA = "stick", ("stick_slip", "spring.f", "5 s", {"spring.c": (50, 200), "mass.m": (0.5, 2)})
+WORSE = pytest.mark.xfail(strict=True, raises=AssertionError, reason="three starts are too few for many optima")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", DRIVES)
+@pytest.mark.parametrize("name", [*DRIVES, pytest.param(MANY_OPTIMA[0], marks=WORSE)])
 def test_never_worse_than_differential_evolution(name: str) -> None:
-    file, aim, until, free = DRIVES[name]
+    file, aim, until, free = {**DRIVES, MANY_OPTIMA[0]: MANY_OPTIMA[1]}[name]
     path = EXAMPLES / f"{file}.toml"
     best = optimize(path, minimize=aim, free=free, until=until, starts=3)
     assert isinstance(best, Optimum)

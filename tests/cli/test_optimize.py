@@ -20,7 +20,8 @@ def test_the_best_as_a_table_and_a_netlist(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.stderr
     assert "'clutch.lock_time <= 0.25 s' is active: with 1 s more" in result.stdout
     data = tomllib.loads(best.read_text())
-    assert data["parts"]["clutch"]["capacity"] == pytest.approx(BEST, rel=1e-6)
+    number, unit = data["parts"]["clutch"]["capacity"].split()
+    assert (float(number), unit) == (pytest.approx(BEST, rel=1e-6), "N.m")
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

@@ -203,8 +203,8 @@ class _Study:
             {}, objectives, self._limits(search, outcome, first, after),
             outcome.excess <= FEASIBLE, outcome.optimal, self.runs.count,
             np.array([search.measures(design.values) for design in self.runs.designs]) * [search.aim_scale, 1.0],
-            notes=(*notes, *self._remarks(outcome)), drive=self.drive if isinstance(self.drive, Component) else None,
-            run=run,
+            notes=(*notes, *self._remarks(outcome, after)),
+            drive=self.drive if isinstance(self.drive, Component) else None, run=run,
         )  # fmt: skip
 
     def _checked(self, values: Mapping[str, float], design: Any) -> tuple[Vector, list[str]]:
@@ -252,11 +252,15 @@ class _Study:
             row += count
         return tuple(measured)
 
-    def _remarks(self, outcome: Outcome) -> Iterator[str]:
+    def _remarks(self, outcome: Outcome, after: Vector) -> Iterator[str]:
         if outcome.excess > FEASIBLE:
             yield "The limits cannot all be met: this design exceeds them least, relative to their sizes."
         elif not outcome.optimal:
             yield f"The search stopped before an optimum was certain ({outcome.status}); this is the best design tried."
+        for row in self.problem.within:
+            if after[:, self.problem.outputs.index(row.output)].max() < row.most * (1.0 - FEASIBLE):
+                continue
+            yield f"{row.output} is at the end of the run: a longer run may have a better design."
         refused = len(self.runs.refusals)
         if refused:
             reason = self.runs.refusals[0][1].what

@@ -32,9 +32,11 @@ from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, di
 from modelica_like.language import Component
 from modelica_like.language.inside import declarations
 from modelica_like.language.units import Unit, parse_unit, to_si
-from modelica_like.runs.readings import read_number
-from modelica_like.simulation import Model, build, loaded, quick_run
+from modelica_like.runs.readings import CONDITIONS, read_number, read_output
+from modelica_like.simulation import Model, build, loaded, plan, quick_run
 
+_BEFORE_END = 1e-5
+"""Of the time of a run: how much before its end an event may be; ten times what counts as no excess of a limit."""
 _PROFILE = {"points", "rows", "from", "to", "rising", "falling"}
 
 
@@ -81,6 +83,7 @@ class Problem:
         cases: load cases; all limits hold in each, and the worst counts.
         ordered: pairs (k, l) of what is free: value k is at most value l.
         outputs: names of all numbers of a design.
+        within: times of events without an upper limit, which are in the run.
         sized: the design checks of the drive's sizing file.
     """
 
@@ -92,6 +95,7 @@ class Problem:
     cases: tuple[Case, ...]
     ordered: tuple[tuple[int, int], ...]
     outputs: tuple[str, ...]
+    within: tuple[Row, ...]
     sized: Sized
 
     @property
@@ -151,7 +155,19 @@ def make_problem(
     outputs = tuple(dict.fromkeys([*(row.output for row in rows), *(limit.name for limit in limits)]))
     order = tuple((names.index(low), names.index(high)) for low, high in ordered)
     _check_chances(model, question, limits, placed)
-    return Problem(question, model, free, aims, limits, cases, order, outputs, sized)
+    read = [name for name in outputs if not is_modal(name) and not sized.has(name)]
+    within = _within_the_run(model, question, read, limits)
+    return Problem(question, model, free, aims, limits, cases, order, outputs, within, sized)
+
+
+def _within_the_run(
+    model: CompiledDae, question: Question, names: Sequence[str], limits: Sequence[Limit]
+) -> tuple[Row, ...]:
+    """Return rows that keep times of events, if no limit does, before the end of the run: later ones do not happen."""
+    times = [name for name in names if read_output(model, name).kind in ("time", *CONDITIONS)]
+    end = plan(model, question.until)[0] if times else 0.0
+    early = {row.output for limit in limits for row in limit.rows() if row.sign > 0 and row.most < end}
+    return tuple(Row(name, 1.0, end * (1.0 - _BEFORE_END)) for name in times if name not in early)
 
 
 def _units(model: CompiledDae, sized: Sized) -> Callable[[str], Unit]:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from modelica_like.runs.solution import Solution
 
+_DIGITS = 10
+"""Of values in a netlist: searches know less."""
 _WITHIN = 1e-6
 """Excess of a limit over its size that counts as none."""
 _AT_BOUND = 1e-6
@@ -48,6 +50,12 @@ class Chosen(_InUnit):
     high: float
     before: float
     value: float
+
+    @property
+    def written(self) -> float | str:
+        """Its best value as in a netlist: with its unit, or as a number in a cell of a table."""
+        number = f"{self.value:.{_DIGITS}g}"
+        return float(number) if self.name.endswith("]") or not self.unit_text else f"{number} {self.unit_text}"
 
     @property
     def at_bound(self) -> str:
@@ -174,7 +182,7 @@ class Optimum(Shown):
                 "Only a drive of a netlist can be saved as one.",
                 advice="The values are in `values`, the model in `model`.",
             )
-        return with_values(self.drive, self.values)
+        return with_values(self.drive, {parameter.name: parameter.written for parameter in self.parameters})
 
     def sentences(self) -> list[str]:
         """Return what holds the design back, what that costs, and notes."""

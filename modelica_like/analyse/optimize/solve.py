@@ -2,9 +2,10 @@
 
 What is free is scaled by its bounds, outputs by their sizes at the beginning. The largest of several numbers (load
 cases, both signs of a peak) has no derivative where another one overtakes: a bound of all is minimised instead. A run
-that is refused, or has no derivative, is not a number for IPOPT, which then takes a shorter step. Where it stops
-without an optimum, because a peak over time jumps from one instant to another, COBYQA (T. M. Ragonneau, 2022) goes on
-from the best design so far, without derivatives.
+that is refused, or has no derivative, is not a number for IPOPT, which then takes a shorter step. The end of the run
+is a limit of times of events: later ones do not happen in it. Where IPOPT stops without an optimum, because a peak over
+time jumps from one instant to another, COBYQA (T. M. Ragonneau, 2022) goes on from the best design so far, without
+derivatives.
 """
 
 from __future__ import annotations
@@ -85,6 +86,8 @@ class Search:
         places, _, most = self.limits
         np.maximum.at(sizes, places, np.abs(most))
         self.sizes = sizes
+        self.rows += problem.within
+        self.limits = problem.numbers(self.rows)
         self.aim_size = float(sizes[self.aim[0]].max())
 
     @property

@@ -95,7 +95,7 @@ class SecondDerivatives(NamedCallback):
         self._simulation.second_error = float(relative.max())
         row, column = (int(k) for k in np.unravel_index(np.argmax(relative), relative.shape))
         if relative[row, column] > _UNCERTAIN:
-            of, by = self._simulation.outputs[row], names[column]
+            of, by = self._simulation.outputs[row], names[int(column)]
             raise NoGradient(
                 f"The second derivatives of {of} by {by} are not certain: steps of {_CHANGE:g} and {2 * _CHANGE:g} of "
                 f"its value differ by {relative[row, column]:.2g} of the largest one.",
