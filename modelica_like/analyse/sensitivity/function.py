@@ -76,7 +76,7 @@ class SimulationFunction(NamedCallback):
         rtol = min(chosen.rtol, precision * _FINER)
         self._tight = {"until": end, "rtol": rtol, "atol": min(chosen.atol, rtol / 100)}
         self._options = replace(chosen, rtol=rtol, atol=self._tight["atol"])
-        self._chosen = chosen_parameters(self._model, inputs)
+        self._chosen = chosen_parameters(self._model.with_parameters(dict(freed.values)), inputs)
         self.start_values = np.array([parameter.value for _, parameter in self._chosen])
         result = self._by_run_time(self.start_values)
         if result is None:
