@@ -72,7 +72,7 @@ class Length(Lagging):
 
 class Branches(Lagging):
     def late(self) -> Expr:
-        return delay(self.x, where(self.T > 0.1, 1.0, self.T))
+        return delay(self.x, where(self.T > 2 * self.T, 1.0, self.T))
 
 
 class Unit(Lagging):
