@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like import build, export_html, load, simulate
+from modelica_like import build, export_html, load, simulate, split
 from modelica_like.errors import (
     ComponentUnbalanced,
     ExportError,
@@ -31,6 +31,7 @@ OUTER = (
     "connector F Real v; flow Real i; end F; model W F f; equation f.v = 1; end W; "
     "model B outer W w; F g; equation g.i = g.v; connect(g, w.f); end B;"
 )
+NESTED = "connector F Real v; flow Real i; end F; connector K input Boolean b; F f; end K; block D K k; end D;"
 ENDLESS = "while true loop y := 1; end while"
 GROWING = "function f input Real u; output Real y; algorithm y := u; for i in 1:60 loop y := y*y + y; end for; end f;"
 TYPES = (
@@ -286,6 +287,25 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("D d; D e;", "connect(d.k, e.k);", CAUSAL),
         "None of d.k, e.k gives b a value.\n  in a.mo:5 `connect(d.k, e.k);`\nExactly one end of a connection does.",
     ),
+    "several ends that give a value": (
+        model("D d; D e;", "connect(d.k, e.k);", CAUSAL.replace("input", "output")),
+        "2 of d.k, e.k give b a value.\n  in a.mo:5 `connect(d.k, e.k);`\nExactly one end of a connection does.",
+    ),
+    "a connector in a connector with inputs": (
+        model("D d;", "", NESTED),
+        f"f beside inputs and outputs in a connector: that is not supported here.\n  in a.mo:1 `{NESTED}`",
+    ),
+    "two values before the start": (
+        "model A\n  discrete Real n;\ninitial equation\n  pre(n) = 1;\n  pre(n) = 2;\n"
+        "equation\n  when time > 1 then\n    n = 2;\n  end when;\nend A;\n",
+        "Initial equations give n two values.\n  in a.mo:5 `pre(n) = 2;`",
+    ),
+    "two whens of an algorithm, one of them with other branches": (
+        "model A\n  Real a; Real b;\nalgorithm\n  when time > 1 then\n    a := 1;\n  elsewhen time > 2 then\n"
+        "    b := 1;\n  end when;\n  when time > 3 then\n    a := 2;\n  end when;\nend A;\n",
+        "a, which another 'when' and some branches of this one give a value: that is not supported here.\n"
+        "  in a.mo:4 `when time > 1 then`",
+    ),
     "an outer part's connector": (
         model("inner W w; B b;", "", OUTER),
         f"A connection with w.f, which is outer: that is not supported here.\n  in a.mo:1 `{OUTER}`\n"
@@ -293,7 +313,7 @@ MESSAGES: dict[str, tuple[str, str]] = {
     ),
     "a strange connector": (
         model("C c;", "c.k.b = true;", "connector K input Boolean b; Boolean c; end K; model C K k; end C;"),
-        "c in a connector, neither input nor output,: that is not supported here.\n"
+        "c in a connector, neither input nor output: that is not supported here.\n"
         "  in a.mo:1 `connector K input Boolean b; Boolean c; end K; model C K k; end C;`",
     ),
     "cardinality of a number": (
@@ -585,4 +605,14 @@ def test_what_begins_at_zero_refuses_a_drive_that_begins_later(tmp_path: Path, c
     check_message(
         ExportError, lambda: export_html(load(tmp_path / "a.mo"), tmp_path / "a.html"),
         "A page begins at 0 s, and this drive at 2 s.\nLeave `from` out, or shift the time in the drive.",
+    )  # fmt: skip
+
+
+def test_a_cosimulation_refuses_a_drive_that_begins_later(tmp_path: Path, check_message) -> None:
+    parts = 'a = { is = "Inertia", J = 1 }\nb = { is = "Inertia", J = 1 }\nc = { is = "SpringDamper", c = 1, d = 1 }'
+    series = '[series]\nshaft = ["a", "c", "b"]\n[start]\n"a.w" = 1\n"a.phi" = 0\n"b.w" = 0\n"b.phi" = 0\n'
+    (tmp_path / "a.toml").write_text(f'[parts]\n{parts}\n{series}[simulate]\nfrom = "2 s"\nuntil = "3 s"\n')
+    check_message(
+        ValueOutOfRange, lambda: split(tmp_path / "a.toml", "a.flange_b", tmp_path / "system"),
+        "A co-simulation begins at 0 s, and this drive at 2 s.\nLeave `from` out, or shift the time in the drive.",
     )  # fmt: skip

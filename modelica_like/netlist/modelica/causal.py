@@ -54,7 +54,7 @@ def variables(connector: Instance) -> list[Variable]:
             continue
         role = next((role for role in ("input", "output", "flow") if role in basic.prefixes), "potential")
         if role == "potential" and basic.kind != "Real":
-            raise refused(f"{name} in a connector, neither input nor output,", member.text, member.declaration.line)
+            raise refused(f"{name} in a connector, neither input nor output", member.text, member.declaration.line)
         result += [Variable(path, role, basic) for path, _ in elements_of(name, sizes(connector, member))]
     return result
 

@@ -76,7 +76,7 @@ class Section(Algorithm):
             for branches, source in reversed(self.whens):
                 mine = [(conditions, {name: values[name]}) for conditions, values in branches if name in values]
                 if mine and len(mine) < len(branches):
-                    what = f"{name}, which another 'when' and some branches of this one give a value,"
+                    what = f"{name}, which another 'when' and some branches of this one give a value"
                     raise refused(what, self.text, source.line or 0)
                 joined += mine
             self.statements.happen(joined, self.whens[0][1])
