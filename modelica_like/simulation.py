@@ -167,11 +167,10 @@ def simulate(
     t0 = model.begin if t0 is None else t0
     end, chosen = plan(model, until, t0=t0, options=options, compiled=compiled, **given)
     chosen.check_memory(len(model.states) + len(model.implicit))
-    begin = time.perf_counter()
     kind: StartKind = start or model.settings.get("start", "given")
     settings = {**model.settings, "start": kind, "on_chattering": chosen.on_chattering}
     model = as_asked(model if settings == model.settings else model.twin(settings=settings))
-    run = _Run(model, _loop(solver or "idas"), t0, end, kind, tuple(readings), progress, begin)
+    run = _Run(model, _loop(solver or "idas"), t0, end, kind, tuple(readings), progress, time.perf_counter())
     try:
         return conserving(run(chosen), run)
     except StepFailed as error:

@@ -254,23 +254,25 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
     if not isinstance(inner, ClassText):
         return inner
     if member.part is None:
-        count = sizes(owner, member)
-        if len(count) > 1:
-            raise refused(
-                f"{declared.name}, an array of components with several dimensions", member.text, declared.line
-            )
-        if not count:
-            member.part = _instance(owner, member, inner, declared.name, member.given)
-        else:
-            member.part = [
-                _instance(owner, member, inner, f"{declared.name}[{k}]", element(member.given, k, count[0]))
-                for k in range(1, count[0] + 1)
-            ]
+        member.part = _instances(owner, member, inner)
     if isinstance(member.part, list):
         if not 1 <= index <= len(member.part):
             raise refused(f"{declared.name}, an array of components, without an index", member.text, declared.line)
         return member.part[index - 1]
     return member.part
+
+
+def _instances(owner: Instance, member: Member, text: ClassText) -> Instance | list[Instance]:
+    """Create the instance of a part, or those of an array of parts."""
+    declared, count = member.declaration, sizes(owner, member)
+    if len(count) > 1:
+        raise refused(f"{declared.name}, an array of components with several dimensions", member.text, declared.line)
+    if not count:
+        return _instance(owner, member, text, declared.name, member.given)
+    return [
+        _instance(owner, member, text, f"{declared.name}[{k}]", element(member.given, k, count[0]))
+        for k in range(1, count[0] + 1)
+    ]
 
 
 def _instance(owner: Instance, member: Member, text: ClassText, name: str, given: Given) -> Instance:

@@ -257,17 +257,21 @@ class Resolver:
             return self._member(part, f"{path}.", rest, line)
         below = ".".join(head + "".join(f"[{int(self.number(index))}]" for index in subs) for head, subs in rest)
         if isinstance(part, Known):
-            below = part.here(below)
             if self.numeric:
-                return members.value_of_known(owner, member, part, below, self.text, line)
-            fields = declarations(part.type).fields
-            if not part.has(below):
-                owner.classes.lack(f"{owner.path}.{name}", part.path)
-                if owner.classes.text_of(part.path) is not None:
-                    raise members.unknown_name(f"{part.path} has no '{below}' here.", self.text, line)
-            for name in table()["rates"].get(below, "").split() if below not in fields else ():
-                if name in fields:
-                    return Expr("call", ("der", (Expr("name", ((f"{path}.{name}", ()),), line),), ()), line)
+                return members.value_of_known(owner, member, part, part.here(below), self.text, line)
+            return self._of_component(owner, name, part, path, part.here(below), line)
+        return Expr("name", ((f"{path}.{below}", ()),), line)
+
+    def _of_component(self, owner: Instance, part_name: str, part: Known, path: str, below: str, line: int) -> Expr:
+        """Return a variable of a component of the table, or the derivative that it is."""
+        fields = declarations(part.type).fields
+        if not part.has(below):
+            owner.classes.lack(f"{owner.path}.{part_name}", part.path)
+            if owner.classes.text_of(part.path) is not None:
+                raise members.unknown_name(f"{part.path} has no '{below}' here.", self.text, line)
+        for name in table()["rates"].get(below, "").split() if below not in fields else ():
+            if name in fields:
+                return Expr("call", ("der", (Expr("name", ((f"{path}.{name}", ()),), line),), ()), line)
         return Expr("name", ((f"{path}.{below}", ()),), line)
 
     def _scalar(

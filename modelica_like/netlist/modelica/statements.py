@@ -17,7 +17,7 @@ from modelica_like.netlist.modelica.sections import Section
 from modelica_like.netlist.modelica.signals import Memories, inner_signals
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement, calls_in
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside, is_signal
-from modelica_like.netlist.modelica.whens import Whens, as_condition, is_demand, is_ending
+from modelica_like.netlist.modelica.whens import Whens, as_condition, if_taken, is_demand, is_ending
 from modelica_like.netlist.modelica.wiring import Wire, groups
 from modelica_like.netlist.modelica.written import ASSERT, MEMORY, Happening
 
@@ -66,6 +66,20 @@ class Statements(Whens):
         self._bindings()
         for happening, text in self.instance.equations:
             self.statement(happening, text, {})
+        self._join()
+        self._read_start()
+        memories = Memories(self.instance, self.assigned)
+        others = [v for h in self.happenings for conditions, new in h.branches for v in (*conditions, *new.values())]
+        memories.read(self.equations, others, self.instance.text.place(self.instance.text.line))
+        self.equations, self.outputs = memories.equations, memories.of
+        self._lift()
+        for left, right, source in self.equations:
+            for call in (*calls_in(left), *calls_in(right)):
+                self._check_memory(call, source)
+        self._check_numbers()
+
+    def _join(self) -> None:
+        """Make equations of connections within the instance."""
         joints = Joints(self.instance)
         inner = inner_signals(self.instance, groups(joints.others))
         self.wires = inner.wires
@@ -78,6 +92,9 @@ class Statements(Whens):
             before = len(self.equations)
             self.equate(resolver(left), resolver(right), self.instance.text, 0)
             self.equations[before:] = [(one, other, source) for one, other, _ in self.equations[before:]]
+
+    def _read_start(self) -> None:
+        """Go through the initial equations."""
         start = Statements(self.instance, initially=True)
         for happening, text in self.instance.initial_equations:
             start.statement(happening, text, {})
@@ -86,7 +103,8 @@ class Statements(Whens):
             raise refused("a connection or a 'when' among initial equations", text, happening.line)
         self._orient()
         before = Before(
-            self.equations, start.equations, self._is_discrete, self._changes_at_events, resolver.known()
+            self.equations, start.equations, self._is_discrete, self._changes_at_events,
+            Resolver(self.instance, self.instance.text).known(),
         )  # fmt: skip
         self.memory, self.initial = before.memory, before.others
         if before.late:
@@ -97,14 +115,9 @@ class Statements(Whens):
             others = (e for e in self.equations if e not in staying)
             self.equations = [(left, begun(right, before.late), source) for left, right, source in others]
             self.happenings = [begin_late(happening, before.late) for happening in self.happenings]
-        memories = Memories(self.instance, self.assigned)
-        others = [v for h in self.happenings for conditions, new in h.branches for v in (*conditions, *new.values())]
-        memories.read(self.equations, others, self.instance.text.place(self.instance.text.line))
-        self.equations, self.outputs = memories.equations, memories.of
-        self._lift()
-        for left, right, source in self.equations:
-            for call in (*calls_in(left), *calls_in(right)):
-                self._check_memory(call, source)
+
+    def _check_numbers(self) -> None:
+        """Refuse texts and the like where numbers belong."""
         values = [side for left, right, _ in (*self.equations, *self.initial) for side in (left, right)]
         sources = [source for _, _, source in (*self.equations, *self.initial) for _ in (0, 1)]
         for happening in self.happenings:
@@ -308,7 +321,7 @@ class Statements(Whens):
             if target.connects or any(not happening.text for happening in target.happenings):
                 raise refused("a connection or an event in a branch that changes during a run", text, statement.line)
             before = [other for other, _ in open_branches if other is not None]
-            self.happenings += [_if_taken(holds, before, happening) for happening in target.happenings]
+            self.happenings += [if_taken(holds, before, happening) for happening in target.happenings]
             open_branches.append((None if holds.kind == "boolean" else holds, target))
             if holds.kind == "boolean":
                 break
@@ -363,16 +376,6 @@ class Statements(Whens):
                 what = "A condition is no number: write `if … then 1 else 0`."
                 raise ModelicaTextError(what, where=text.place(line))
             self.equations.append((left, fitting, text.place(line)))
-
-
-def _if_taken(holds: Expr, before: list[Expr], assertion: Happening) -> Happening:
-    """Return an assertion in a branch: it demands nothing where another one is taken."""
-    ((conditions, new),) = assertion.branches
-    taken = holds
-    for other in before:
-        taken = fold.operation("and", (fold.operation("not", (other,), other.line), taken), other.line)
-    demand = fold.operation("or", (fold.operation("not", (taken,), holds.line), conditions[0]), holds.line)
-    return Happening((((demand,), new),), assertion.source, assertion.text)
 
 
 def _is_numeric(node: Expr) -> bool:

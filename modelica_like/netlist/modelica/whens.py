@@ -173,6 +173,16 @@ class Whens:
         return fold.numbered(right) if basic is not None and basic.kind == "enumeration" else right
 
 
+def if_taken(holds: Expr, before: list[Expr], assertion: Happening) -> Happening:
+    """Return an assertion in a branch: it demands nothing where another one is taken."""
+    ((conditions, new),) = assertion.branches
+    taken = holds
+    for other in before:
+        taken = fold.operation("and", (fold.operation("not", (other,), other.line), taken), other.line)
+    demand = fold.operation("or", (fold.operation("not", (taken,), holds.line), conditions[0]), holds.line)
+    return Happening((((demand,), new),), assertion.source, assertion.text)
+
+
 def is_demand(call: Expr) -> bool:
     """Tell whether a call is an assertion or an error."""
     return call.args[0] == "assert" or call.args[0].endswith("Streams.error")
