@@ -318,10 +318,10 @@ void event_back(Instance *c, const Record *at) {
     state_copy_in(c, at->before);
     read_before(c, speed);
     if (!tells) add_doubt(c, FAILURE_LOST_AT_TOUCH, slope);
-    if (!tells || speed == 0 || (g->speed == 0 && !read) || !factor_implicit(c)) return;
+    int moves = tells && speed != 0 && (g->speed != 0 || read);
     g->cause_speed = speed;
-    check_meeting(c, at, at->n_rounds > 0 ? assignment(c, at, 0).fired : nothing_wanting(c));
-    check_reading(c, at);
+    if (at->n_rounds > 0 && (moves || g->early) && factor_implicit(c)) check_meeting(c, at, assignment(c, at, 0).fired);
+    if (moves) check_reading(c, at);
 }
 
 /* From behind the start to parameters, inputs and start values. */

@@ -284,7 +284,7 @@ static int feels(const Instance *c, const Record *at) {
 }
 
 /* What else happens in the first round must move as the cause does; but what begins to hold may do so in any order, and
- * parts that share a load give way together. */
+ * parts that share a load give way together. Just at the start what the clock moves would come a moment later. */
 void check_meeting(Instance *c, const Record *at, const unsigned char *fired) {
     Gradient *g = c->gradient;
     const Model *m = c->model;
@@ -293,23 +293,25 @@ void check_meeting(Instance *c, const Record *at, const unsigned char *fired) {
     for (int k = 0; k < m->n_transitions && is_felt; k++) {
         const Transition *to = &m->transitions[k];
         double speed = 1;
-        if (!fired[k] || to == cause || (shared && !to->timed && !cause->timed)) continue;
-        if (begins_hold(m, to) && begins_hold(m, cause)) continue;
+        if (!fired[k] || (g->early ? !to->timed : to == cause || (shared && !to->timed && !cause->timed))) continue;
+        if (!g->early && begins_hold(m, to) && begins_hold(m, cause)) continue;
         const Tape *tape = to->timed ? &m->tapes.moments : &m->tapes.guards;
         evaluate_now(c, tape, c->outputs);
         if (!to->timed) speed = -c->outputs[m->n_guards + to->index];
         slope_of_output(c, tape, to->index, c->outputs, g->slope);
-        if (speed == 0) add_doubt(c, FAILURE_LOST_AT_TOUCH, g->slope);
+        for (int n = 0; n < m->n_d && g->early; n++) g->slope[c->d - c->numbers + n] = 0; /* a clock counts what is */
+        if (g->early) add_doubt(c, FAILURE_LOST_AT_OTHER_MODES, g->slope);
+        else if (speed == 0) add_doubt(c, FAILURE_LOST_AT_TOUCH, g->slope);
         else if (comes_later(c, g->slope, speed) > SAME_TIME) add_doubt(c, FAILURE_LOST_AT_MEETING, g->slope);
     }
 }
 
-/* Are outputs read just at an event at which they, or their rates, jump? */
-static int is_read_at(Instance *c, const Record *at) {
-    const Gradient *g = c->gradient;
+/* Outputs may be read just at an event at which they, or their rates, jump. */
+void check_reading(Instance *c, const Record *at) {
+    Gradient *g = c->gradient;
     double span = span_of(c), sides[2][2] = {{0}}, t = ((const State *)at->before)->t;
     int any = 0;
-    if (g->along != NULL || g->present - t > SAME_TIME * max_of(fabs(t), span)) return 0;
+    if (g->along != NULL || g->present - t > SAME_TIME * max_of(fabs(t), span)) return;
     for (int v = 0; v < g->n_of; v++) {
         read_on_side(c, at->behind, g->of[v], sides[1]);
         read_on_side(c, at->before, g->of[v], sides[0]);
@@ -317,13 +319,7 @@ static int is_read_at(Instance *c, const Record *at) {
         any |= fabs(sides[1][0] - sides[0][0]) > FELT_JUMP * value;
         any |= fabs(sides[1][1] - sides[0][1]) > FELT_JUMP * (rate + value / span);
     }
-    return any;
-}
-
-void check_reading(Instance *c, const Record *at) {
-    double *slope = c->gradient->moment;
-    if (is_read_at(c, at) && comes_later(c, slope, c->gradient->cause_speed) > 0)
-        add_doubt(c, FAILURE_LOST_AT_READING, slope);
+    if (any && comes_later(c, g->moment, g->cause_speed) > 0) add_doubt(c, FAILURE_LOST_AT_READING, g->moment);
 }
 
 /* Do the modes at a start lead soon, by the clock, to those from which it was moved? */

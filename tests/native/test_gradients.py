@@ -8,7 +8,25 @@ import pytest
 from components import Clutch, Constant, FirstOrder, Inertia, Integrator, Limiter, Pulse, Sine
 from modelica_like import Assembly, build, sensitivities, simulate
 from modelica_like.errors import NoGradient
-from modelica_like.language import Component, Equations, Input, Output, maximum, signal_in, signal_out
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Input,
+    Output,
+    Parameter,
+    Variable,
+    clock,
+    der,
+    discrete,
+    maximum,
+    param,
+    signal_in,
+    signal_out,
+    var,
+    when,
+)
 
 ROOT = Path(__file__).parents[2]
 STARTUP = ROOT / "examples" / "machine_tool_startup.toml"
@@ -220,3 +238,26 @@ def test_what_begins_just_at_the_start():
     assert found[0, 0] == pytest.approx(-np.sin(0.4 * np.pi), rel=1e-6)
     with pytest.raises(NoGradient, match="a small change of it leads to other modes there"):
         integral_of(Pulse(period=1.0)).gradient()
+
+
+class Held(Component):
+    """The rate of x is k from the first tick on, which is just at the start."""
+
+    units_checked = False
+    x: Variable = var("1", "state")
+    k: Parameter = param("1", "rate", default=2.0)
+    first: Parameter = param("s", "first tick", default=0.0)
+    rate: Discrete = discrete("1", "rate that is held")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate
+
+    def events(self) -> Events:
+        yield when(clock(1.0, self.first), {self.rate: self.k})
+
+
+def test_a_clock_that_ticks_just_at_the_start():
+    """x is k (t - first): a later tick has that derivative, an earlier one has none."""
+    found = handle_at(Held(x=0.0), 0.5, ["x"], ["first", "k"]).gradient()
+    assert np.isnan(found[0, 0])
+    assert found[0, 1] == pytest.approx(0.5, rel=1e-12)

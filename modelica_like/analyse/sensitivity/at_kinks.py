@@ -60,6 +60,19 @@ def kink_arguments(model: CompiledDae, outputs: Sequence[Output]) -> tuple[Key, 
     return key, model.once(key, make)
 
 
+def kinks_of_outputs(model: CompiledDae, outputs: Sequence[Output]) -> tuple[Key, ca.Function]:
+    """Return what is zero at kinks of outputs alone, as one function, and its key."""
+    given, texts = [*model.arguments.values()], _texts(outputs)
+
+    def make() -> ca.Function:
+        values = ca.SX(ca.vertcat(ca.SX(0, 1), *(expression_of(model, text)[0]() for text in texts)))
+        arguments = {str(kink): kink for kink in arguments_of_kinks(ca.Function("outputs", given, [values]), given)}
+        return ca.Function("arguments", given, [ca.densify(ca.SX(ca.vertcat(ca.SX(0, 1), *arguments.values())))])
+
+    key = Cached.KINK_ARGUMENTS, ("outputs", *texts)
+    return key, model.once(key, make)
+
+
 def kinks(chain: Replay, outputs: Sequence[Output]) -> list[Edge]:
     """Return the arguments of operations with a kink, and the guards, that are zero all along some segments."""
     model = chain.model

@@ -12,9 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from modelica_like.analyse.replay.chain import Reading
-from modelica_like.analyse.replay.guards import Guards
-from modelica_like.analyse.replay.when import event_time
-from modelica_like.analyse.sensitivity.at_kinks import kink_arguments
+from modelica_like.analyse.sensitivity.at_kinks import kinks_of_outputs
 from modelica_like.analyse.sensitivity.moving_kinks import kinks_at
 from modelica_like.analyse.sensitivity.of_formulas import formula_kinks
 from modelica_like.analyse.sensitivity.values import slopes_of
@@ -31,9 +29,8 @@ from modelica_like.runs.conserve import find_astray
 from modelica_like.runs.readings import CONDITIONS, INTEGRATED, Output, by_output, joined, leaves
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Statistics
-from modelica_like.solve.initialize import Point, StartKind, call
+from modelica_like.solve.initialize import Point, StartKind
 from modelica_like.solve.initialize.slopes import Sizes, Slopes, slopes
-from modelica_like.solve.recorder import Event
 
 _NEAR = 1e-9
 """Distance of two times, relative to the run, that are one."""
@@ -97,7 +94,7 @@ def _kept(
     """Simulate and keep the run; None if it is not certain."""
     begin = initialize(model, start=start)
     loop = EngineLoop(extended, replace(options, points=_RESULTS), begin, end, by=names)
-    if not loop.starts_there or _moves_at_start(model, begin, names):
+    if not loop.starts_there:
         return None
     record = loop.run()
     steps, evaluations, integrations = loop.counts
@@ -106,58 +103,29 @@ def _kept(
         model, options, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
         tuple(record.notices), start, dense=record.keeper.dense(loop),
     )  # fmt: skip
-    refused = solution.dense is None or solution.ended is not None or _meet(solution)
+    refused = solution.dense is None or solution.ended is not None
     astray = options.on_energy_drift != "off" and not refused and find_astray(solution) is not None
     return None if refused or astray else _Run(solution, extended, loop)
 
 
-def _moves_at_start(model: CompiledDae, begin: Point, names: Sequence[str]) -> bool:
-    """Whether a parameter moves what happens by the clock just at the start: it may come before or behind that."""
-    columns = [len(begin.x) + model.fixed_position[name] for name in names]
-    moments = call(model, model.events.moments, begin)
-    there = {transition.index for transition in model.events.transitions
-             if transition.timed and abs(float(moments[transition.index]) - begin.t) <= _NEAR}  # fmt: skip
-    return bool(there) and bool(np.any(slopes(model, begin, "moments", sorted(there)).by[:, columns]))
-
-
 def _stands_at_kink(solution: Solution, outputs: Sequence[Output], names: Sequence[str]) -> bool:
-    """Whether a parameter leads off a kink, or the limit of a mode, at which the run stays all along a segment."""
-    model, fixed, guards = solution.model, (solution.model.p, solution.model.u), Guards(solution.model)
-    key, function = kink_arguments(model, outputs)
-    count = int(function.size1_out(0)) - int(model.events.guards.size1_out(0))
+    """Whether a parameter leads off a kink of an output at which the run stays all along a segment."""
+    model = solution.model
+    key, function = kinks_of_outputs(model, outputs)
+    if not function.size1_out(0):
+        return False
     fast = model.fast(key, lambda: function)
 
     def at(point: Point) -> Vector:
-        values = fast(point.t, point.x, point.z, *fixed, point.d)[0][:count]
-        return np.concatenate([values, guards.at(point)[0]]) if guards.count else values.copy()  # idle ones are -1
+        return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0].copy()
 
-    rows = [*range(count), *(count + transition.index for transition in guards.state_events)]
     along = [np.array([at(segment.point(k)) for k in range(len(segment.times))]) for segment in solution.segments]
     near = _NEAR * np.max([np.abs(values).max(axis=0) for values in along], axis=0)
     columns = [len(model.states) + model.fixed_position[name] for name in names]
     for segment, values in zip(solution.segments, along, strict=True):
-        still = [rows[k] for k in np.flatnonzero(np.all(np.abs(values) <= near, axis=0))]
+        still = np.flatnonzero(np.all(np.abs(values) <= near, axis=0)).tolist()
         if still and np.any(slopes(model, segment.point(-1), key, still, lambda: function).by[:, columns]):
             return True
-    return False
-
-
-def _meet(solution: Solution) -> bool:
-    """Whether events at an instant have different causes, or something is held that has not slid before."""
-    model = solution.model
-    instants: dict[int, list[Event]] = {}
-    for event in solution.events:
-        instants.setdefault(event.segment, []).append(event)
-    held = {(motion.mode, motion.number) for motion in model.held.motions}
-    later = [model.events.transitions[event.transition] for event in solution.events if event.round]
-    if any((transition.mode, transition.target) in held for transition in later):
-        return True
-    for segment, events in instants.items():
-        if segment and sum(not event.round for event in events) > 1:
-            last = solution.segments[segment - 1]
-            when = event_time(model, last.point(-1), tuple(events), last.start)
-            if when.reason is not None or when.apart:
-                return True
     return False
 
 
