@@ -107,15 +107,27 @@ def from_modelica(
     name: Annotated[
         str, Option("--class", metavar="NAME", help="Model to read; by default the last one of the file.")
     ] = "",
+    flat: Annotated[
+        bool, Option("--flat", help="Show its flattened equations as Modelica text, or write them to --output.")
+    ] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Write a model of Modelica text as a netlist."""
     target = output or text.parent / f"{text.stem or 'model'}.toml"
-    with told(debug, files=[target]):
+    with told(debug, files=[] if flat and output is None else [target]):
         from modelica_like.netlist.modelica.netlist_form import netlist_text
         from modelica_like.netlist.modelica.read import read_modelica
 
         model, notes = read_modelica(text, name)
+        if flat:
+            from modelica_like.netlist.modelica.flat_text import flat_text
+
+            equations = flat_text(model)
+            if output is None:
+                say(equations.rstrip("\n"))
+            else:
+                write_text(output, equations)
+            return
         write_text(target, netlist_text(model, target.parent, notes))
         if notes:
             warn(slips(*notes))

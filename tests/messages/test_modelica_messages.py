@@ -15,6 +15,7 @@ from modelica_like.errors import (
     UnknownName,
     ValueOutOfRange,
 )
+from modelica_like.netlist.modelica.flat_text import flat_text
 from modelica_like.netlist.modelica.write import modelica_text
 
 R = "Modelica.Mechanics.Rotational.Components"
@@ -616,3 +617,33 @@ def test_a_cosimulation_refuses_a_drive_that_begins_later(tmp_path: Path, check_
         ValueOutOfRange, lambda: split(tmp_path / "a.toml", "a.flange_b", tmp_path / "system"),
         "A co-simulation begins at 0 s, and this drive at 2 s.\nLeave `from` out, or shift the time in the drive.",
     )  # fmt: skip
+
+
+FLAT: dict[str, tuple[str, str]] = {
+    "a mode that holds a motion": (
+        f"model A\n{R}.Brake b(fn_max = 1);\n{R}.Inertia m(J = 1);\nequation\nconnect(b.flange_a, m.flange_a);\n"
+        "b.f_normalized = 1;\nend A;\n",
+        "b has the mode mode, which holds a motion, so it is not written flat.\n"
+        f"  in a.mo:2 `{R}.Brake b(fn_max = 1);`\n"
+        "Impacts, shared loads and states that modes take away are no equations of Modelica text.",
+    ),
+    "an elsewhen beside a condition of several": (
+        "model A\ndiscrete Real n;\nequation\nwhen {time > 1, time > 2} then\nn = 1;\nelsewhen time > 3 then\nn = 2;\n"
+        "end when;\nend A;\n",
+        "A has an 'elsewhen' and several conditions in a branch, which is not written.\n"
+        "  in a.mo:4 `when {time > 1, time > 2} then`\n"
+        "Join the conditions by a Boolean variable.",
+    ),
+    "elements of an array with different ends": (
+        f"model A\n{R}.IdealGear g[2](each ratio = 2, useSupport = {{true, false}});\n{R}.Inertia m(J = 1);\n"
+        f"{R}.Fixed f;\nequation\nconnect(f.flange, g[1].support);\nconnect(m.flange_b, g[1].flange_a);\nend A;\n",
+        "g is an array of different parts, which Modelica does not have.\nGive each part a name of its own.",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", FLAT)
+def test_what_is_not_written_flat(case: str, tmp_path: Path, check_message) -> None:
+    text, told = FLAT[case]
+    (tmp_path / "a.mo").write_text(text)
+    check_message(ModelicaTextError, lambda: flat_text(load(tmp_path / "a.mo")), told)

@@ -33,7 +33,7 @@ from modelica_like.netlist.modelica.attributes import check_attributes, check_de
 from modelica_like.netlist.modelica.before import uses_time
 from modelica_like.netlist.modelica.carried import Carried
 from modelica_like.netlist.modelica.causal import is_causal, variables
-from modelica_like.netlist.modelica.connectors import bundle, connector_of
+from modelica_like.netlist.modelica.connectors import bundle, connector_of, lend
 from modelica_like.netlist.modelica.fold import numbered
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
@@ -215,7 +215,10 @@ class _Builder:
                 part.balance += sum(variable.continuous for variable in variables(part))
                 return _Builder(part, self.notes).run()
             return bundle(name, part, self.instance, self.wires) if bundled(part) else connector_of(part)
-        return _Builder(part, self.notes, moved=part.owner is not self.instance).run()
+        component = _Builder(part, self.notes, moved=part.owner is not self.instance).run()
+        if part.text.kind == "record":
+            lend(component, self.instance)
+        return component
 
     def _basic(self, name: str, member: Member, basic: Basic) -> None:
         declared = member.declaration

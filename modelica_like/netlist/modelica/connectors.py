@@ -6,6 +6,7 @@ from typing import Any
 
 from modelica_like.errors import Source
 from modelica_like.language import Connector, flow, var
+from modelica_like.language.fields import Discrete, Input, Variable
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.attributes import check_attributes
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
@@ -74,3 +75,16 @@ def _side(leaf: str, part: Instance | Known | str, member: Member) -> Connector:
     if not isinstance(part, Instance) or part.text.kind != "connector" or bundled(part):
         raise refused(f"{leaf} in a connector", member.text, member.declaration.line)
     return connector_of(part)
+
+
+def lend(record: Written, owner: Instance) -> None:
+    """Let variables of a record that have no equations in it have them in its owner, as own ones."""
+    kept = inside(record)
+    fields = {name: field for name, field in record.fields.items() if not isinstance(field, Input)}
+    discretes = {name: field.kind for name, field in fields.items() if isinstance(field, Discrete)}
+    own = [left for left, _, _ in kept.statements if left.kind != "name" or left.args[0][0] not in discretes]
+    missing = sum(isinstance(field, Variable) for field in fields.values()) - len(own) - kept.lent
+    kept.lent += missing
+    owner.balance -= missing
+    counted = {name for name, kind in discretes.items() if kind != "number"}
+    kept.elsewhere |= counted - {left.args[0][0] for left, _, _ in kept.statements if left.kind == "name"}

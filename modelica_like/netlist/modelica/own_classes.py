@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 import casadi as ca
@@ -12,7 +12,7 @@ from modelica_like.errors import ModelicaTextError
 from modelica_like.flatten.steps import event_steps
 from modelica_like.flatten.template import relative_path
 from modelica_like.language import Component, Connector, Equations, Input, Output, Parameter, Variable
-from modelica_like.language.discrete import Ending, Marker, When, silence
+from modelica_like.language.discrete import INITIAL, TERMINAL, Assertion, Ending, Marker, Pre, When, silence
 from modelica_like.language.equation import Equation, as_statement
 from modelica_like.language.expr import TIME, Symbol, operands, symbols_in
 from modelica_like.language.fields import Discrete
@@ -38,6 +38,7 @@ _SINGLE: dict[int, Callable[[str], str]] = {
     ca.OP_NEG: lambda x: f"(-{x})", ca.OP_SQ: lambda x: f"{x}^2", ca.OP_TWICE: lambda x: f"(2*{x})",
     ca.OP_INV: lambda x: f"(1/{x})", ca.OP_NOT: lambda x: f"(not {x})", ca.OP_ASSIGN: lambda x: x,
 }  # fmt: skip
+NO_EQUATIONS = "Impacts, shared loads and states that modes take away are no equations of Modelica text."
 _JOINING = {ca.OP_AND, ca.OP_OR, ca.OP_NOT}
 _CONDITIONS = {*_JOINING, ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
 
@@ -56,90 +57,132 @@ def class_of_equations(
     Raises:
         ModelicaTextError: it has parts, or a mode that is ideal or holds a motion.
     """
-    held = [(key, mode) for key, mode in component.modes.items() if mode.holds or mode.ideal]
-    if component.parts or held:
-        what = "parts of its own"
-        if not component.parts:
-            what = f"the mode {held[0][0]}, which {'is ideal' if held[0][1].ideal else 'holds a motion'}"
+    what = "parts of its own" if component.parts else beyond_equations(component)
+    if what:
         raise ModelicaTextError(
             f"{component.label} is a {type(component).__name__}, for which the Modelica Standard Library has no class, "
             f"and it has {what}.",
             where=component.place_of(),
-            advice="Impacts, shared loads and states that modes take away are no equations of Modelica text.",
+            advice=NO_EQUATIONS,
         )
     lines = [f"model {name}", *_declarations(component, write_formula, driven), "equation"]
-    lines += [*_equations(component, component.equations()), *_events(component)]
-    if begin := _equations(component, component.initial_equations()):
+    lines += [*equation_lines(component.equations(), component), *event_lines(component, component, component.modes)]
+    if begin := equation_lines(component.initial_equations(), component):
         lines += ["initial equation", *begin]
     return "\n".join([*lines, f"end {name};"])
 
 
-def _equations(component: Component, written: Equations) -> list[str]:
+def beyond_equations(component: Component) -> str:
+    """Return what of the modes of a component no equation says, or an empty text."""
+    held = ((key, mode) for key, mode in component.modes.items() if mode.holds or mode.ideal)
+    phrases = (f"the mode {key}, which {'is ideal' if mode.ideal else 'holds a motion'}" for key, mode in held)
+    return next(phrases, "")
+
+
+def equation_lines(written: Equations, root: Component) -> list[str]:
+    """Return equations as lines of text, with names as seen from `root`."""
     lines: list[str] = []
     for item, source in located(written):
-        statement = as_statement(item, source, type(component).__name__)
+        statement = as_statement(item, source, type(root).__name__)
         if isinstance(statement, Equation):
             sides = ca.vertsplit(ca.cse(ca.vertcat(statement.left, statement.right)))
             events = event_steps(sides[0] - sides[1])
-            left, right = (_value(side, component, events=events) for side in sides)
+            left, right = (value_text(side, root, events=events) for side in sides)
             lines.append(f"  {left} = {right};")
     return lines
 
 
-def _events(component: Component) -> list[str]:
-    """Return the equations of the modes: a mode changes where a transition from its value before has its condition."""
+def event_lines(component: Component, root: Component, modes: Iterable[str]) -> list[str]:
+    """Return the equations of the modes: a mode changes where a transition from its value before has its condition.
+
+    Args:
+        component: whose events are written.
+        root: names are as seen from it.
+        modes: those that have an equation; others never change, and nothing uses them.
+
+    Raises:
+        ModelicaTextError: there are events that are not written.
+    """
     events = [e for e, _ in located(component.events())]
-    ends = [e for e in events if isinstance(e, When) and _only_ends(e)]
-    if any(not isinstance(e, Transition | StartMode) and e not in ends for e in events):
-        raise ModelicaTextError(f"{component.label} has a 'when' or an assertion of Python, which is not written.")
     lines: list[str] = []
-    for name, mode in component.modes.items():
+    for name, mode in ((name, component.modes[name]) for name in modes):
         goes = [e for e in events if isinstance(e, Transition) and e.mode.mode is mode and not e.fails]
         begins = [e for e in events if isinstance(e, StartMode) and e.mode.mode is mode]
-        chosen = " else".join(f"if {_condition(b.when, component, True)} then {mode.number(b.target)}" for b in begins)
+        chosen = " else".join(f"if {_condition(b.when, root, True)} then {mode.number(b.target)}" for b in begins)
         first = str(mode.number(component.start_mode(name)))
         first = f"{chosen} else {first}" if chosen else first
-        rest = "".join(f" elseif {_due(t, component)} then {mode.number(t.target)}" for t in goes)
-        name = identifier(name)
+        rest = "".join(f" elseif {_due(t, component, root)} then {mode.number(t.target)}" for t in goes)
+        name = identifier(relative_path(component, root, name))
         lines.append(f"  {name} = if initial() then ({first}){rest} else pre({name});")
     resets = [e for e in events if isinstance(e, Transition) and e.reset]
     for k, event in enumerate(resets):
         # What is true from the start has no edge in Modelica; here it fires at the start.
-        lines.append(f"  {'elsewhen' if k else 'when'} not initial() and {_due(event, component)} then")
+        lines.append(f"  {'elsewhen' if k else 'when'} not initial() and {_due(event, component, root)} then")
         for target, value in event.reset.items():
-            symbol, new = symbols_in(target)[0], _value(value, component, True)
+            symbol, new = symbols_in(target)[0], value_text(value, root, True)
             field = symbol.owner.fields[symbol.name]
             _check_reset(component, symbol, value)
-            path = identifier(relative_path(symbol.owner, component, symbol.name))
+            path = identifier(relative_path(symbol.owner, root, symbol.name))
             lines.append(f"    {path} = {new};" if isinstance(field, Discrete) else f"    reinit({path}, {new});")
     lines += ["  end when;"] if resets else []
-    for event in ends:
-        conditions = ", ".join(_condition(each, component) for each in event.conditions)
-        texts = (key.text.replace('"', "'") for _, new in event.branches for key in new if isinstance(key, Ending))
-        written = (f'    terminate("{re.sub(r"[{}]", "", text)}");' for text in texts)
-        lines += [f"  when {{{conditions}}} then", *written, "  end when;"]
     for event in events:
-        if isinstance(event, Transition) and event.fails:
+        if isinstance(event, When):
+            lines += _when_lines(event, component, root)
+        elif isinstance(event, Assertion):
+            lines.append(f"  assert({_condition(event.condition, root)}, {_words(event.text)});")
+        elif isinstance(event, Transition) and event.fails:
             words = event.notice.replace('"', "'")
-            lines.append(f'  assert(not ({_due(event, component, False)}), "{words}");')
+            lines.append(f'  assert(not ({_due(event, component, root, before=False)}), "{words}");')
     return lines
 
 
-def _only_ends(event: Any) -> bool:
-    """Return whether an event is a `when` that ends the run and does nothing else."""
-    whole = event.branches if isinstance(event, When) else ()
-    return len(whole) == 1 and all(isinstance(key, Ending) and not key.fails for key in whole[0][1])
+def _when_lines(event: When, component: Component, root: Component) -> list[str]:
+    """Return a `when` as lines of text."""
+    if 1 < len(event.branches) != len(event.conditions):
+        raise ModelicaTextError(
+            f"{component.label} has an 'elsewhen' and several conditions in a branch, which is not written.",
+            where=event.source, advice="Join the conditions by a Boolean variable.",
+        )  # fmt: skip
+    conditions = [_instant(each, root) for each in event.conditions]
+    if len(event.branches) == 1 and len(conditions) > 1:
+        conditions = [f"{{{', '.join(conditions)}}}"]
+    lines: list[str] = []
+    for condition, (_, values) in zip(conditions, event.branches, strict=True):
+        lines.append(f"  {'elsewhen' if lines else 'when'} {condition} then")
+        for target, value in values.items():
+            symbol, new = symbols_in(target)[0], value_text(value, root)
+            if isinstance(symbol, Ending):
+                lines.append(f"    assert({new} < 0.5, {_words(symbol.text)});" if symbol.fails else
+                             f"    terminate({_words(symbol.text)});")  # fmt: skip
+                continue
+            path = identifier(relative_path(symbol.owner, root, symbol.name))
+            discrete = isinstance(symbol.owner.fields[symbol.name], Discrete)
+            lines.append(f"    {path} = {new};" if discrete else f"    reinit({path}, {new});")
+    return [*lines, "  end when;"]
 
 
-def _due(transition: Transition, component: Component, before: bool = True) -> str:
+def _instant(condition: Any, root: Component) -> str:
+    """Return the condition of a `when`, which may be a tick."""
+    clocks = [s for s in symbols_in(condition) if isinstance(s, Marker) and s.kind == "clock"]
+    if clocks:
+        return f"sample({value_text(clocks[0].offset, root)}, {value_text(clocks[0].of, root)})"
+    return _condition(condition, root)
+
+
+def _words(text: str) -> str:
+    """Return what a message says as a text of Modelica, which has no values in braces."""
+    return '"' + re.sub(r"[{}]", "", text).replace('"', "'") + '"'
+
+
+def _due(transition: Transition, component: Component, root: Component, *, before: bool = True) -> str:
     """Return the condition of a transition, with modes and discrete values before the event or after it."""
-    name = identifier(transition.mode.mode.name)
+    name = identifier(relative_path(component, root, transition.mode.mode.name))
     name = f"pre({name})" if before else name
     sources = " or ".join(f"{name} == {transition.mode.mode.number(source)}" for source in transition.sources)
     when = (
-        f"time >= {_value(transition.at, component, before)}"
+        f"time >= {value_text(transition.at, root, before)}"
         if transition.when is None
-        else _condition(transition.when, component, before)
+        else _condition(transition.when, root, before)
     )
     return f"({sources}) and {when}"
 
@@ -233,10 +276,14 @@ def _is_condition(node: Any) -> bool:
 def _condition(expression: Any, component: Component, before: bool = False, events: Collection[int] = ()) -> str:
     """Return a condition as text; for the arguments see `_text`."""
     node = ca.SX(expression)
-    return str(bool(float(node))).lower() if node.is_constant() else _text(node, component, before, events)
+    if node.is_constant():
+        return str(bool(float(node))).lower()
+    text = _text(node, component, before, events)
+    # A Boolean variable is a number here.
+    return f"({text} > 0.5)" if node.is_symbolic() and symbols_in(node)[0].owner is not None else text
 
 
-def _value(expression: Any, component: Component, before: bool = False, events: Collection[int] = ()) -> str:
+def value_text(expression: Any, component: Component, before: bool = False, events: Collection[int] = ()) -> str:
     """Return a number as text; for the arguments see `_text`."""
     node = ca.SX(expression)
     text = _text(node, component, before, events)
@@ -254,12 +301,14 @@ def _text(expression: Any, component: Component, before: bool = False, events: C
         return repr(number) if number >= 0 else f"({number!r})"
     if node.is_symbolic():
         symbol = symbols_in(node)[0]
-        if symbol is TIME:
-            return "time"
+        if any(symbol is each for each in (TIME, INITIAL, TERMINAL)):
+            return symbol.name
+        if isinstance(symbol, Pre) and symbol.owner is not None and symbol.of.name in symbol.owner.fields:
+            return f"pre({identifier(relative_path(symbol.owner, component, symbol.of.name))})"
         if isinstance(symbol, Marker) and symbol.kind in ("relation", "floor"):
             if symbol.kind == "relation":
                 return _condition(symbol.of, component, before)
-            return f"floor({_value(symbol.of, component, before)})"
+            return f"floor({value_text(symbol.of, component, before)})"
         owner = symbol.owner  # None of what only the language has, such as a delay
         field = owner.fields.get(symbol.name) if owner is not None else None
         if owner is None or (field is None and symbol.name not in getattr(owner, "modes", {})):
@@ -274,7 +323,7 @@ def _text(expression: Any, component: Component, before: bool = False, events: C
     compared = operation in (ca.OP_EQ, ca.OP_NE) and all(map(_is_condition, operands(node)))
     for k, operand in enumerate(operands(node)):
         joined = operation in _JOINING or compared or (operation == ca.OP_IF_ELSE_ZERO and k == 0)
-        args.append((_condition if joined else _value)(operand, component, before, events))
+        args.append((_condition if joined else value_text)(operand, component, before, events))
     quiet = not _has_events(node, events)
     if operation in _SIGNS:
         return f"({args[0]} {_SIGNS[operation]} {args[1]})"
