@@ -3,7 +3,8 @@
  * reasons, and those at which a run is read. */
 #include "adjoint.h"
 
-#define RESTS 1e-3 /* of a run: for how long what is zero has to be so that it rests, and what rests is looked at */
+#define RESTS 1e-3       /* of a run: for how long what is zero has to be so that it rests, and is looked at */
+#define SELDOM 0.02      /* of a run: when it is looked at again, if modes stay */
 #define NEARBY_KINK 3e-6 /* of sizes: how far slopes beside a kink are looked at */
 #define FELT_SLOPE 1e-9  /* of slopes, by which states change in the time of a run */
 #define FELT_KINK 1e-3   /* of a slope: curvature changes it by about NEARBY_KINK */
@@ -136,10 +137,10 @@ static int slope_of_kink(Instance *c, const Tape *tape, int operation, int k, do
     return 1;
 }
 
-/* Has it rested for long? Then it is looked at, and next when that is as long ago again. */
+/* Has it rested for long? */
 static int rests_long(const Instance *c, double *since) {
     if (!(*since - c->state.t >= RESTS * span_of(c))) return 0;
-    *since = c->state.t;
+    *since = c->state.t - (SELDOM - RESTS) * span_of(c);
     return 1;
 }
 
