@@ -210,7 +210,10 @@ class _Builder:
                 self.states[k] = self.add(names[k], ("state", k), description="state that follows the motion")
                 continue
             base = names[k].removeprefix("der(").removesuffix(")")
-            units[names[k]] = units[base] / _SECOND
+            units[names[k]] = units.get(base, model.units.get(base, ONE)) / _SECOND
+            if base not in names:  # it is no state, because it follows from one that moves with it
+                self.states[k] = self.add(fmi_name(names[k]), ("state", k), unit=units[names[k]])
+                continue
             below = names.index(base)
             self.states[k] = self.derivatives[below] = self.add(
                 fmi_name(names[k]), ("state", k), unit=units[names[k]], derivative_of=self.states[below],

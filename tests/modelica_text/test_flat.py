@@ -5,10 +5,11 @@ from pathlib import Path
 import pytest
 from calls import called
 
-from modelica_like import load, simulate
+from modelica_like import build, export_fmu, load, simulate
 from modelica_like.netlist.modelica.flat_text import flat_text
 
 HERE = Path(__file__).parent
+EXAMPLES = HERE.parents[1] / "examples"
 
 
 @pytest.mark.parametrize(
@@ -46,3 +47,19 @@ def test_variables_of_a_record_have_their_equations_where_it_is(tmp_path: Path) 
     final = simulate(load(tmp_path / "a.mo"), 2.0, rtol=1e-10, atol=1e-12).final
     assert final["r.y"] == pytest.approx(3.0, rel=1e-9)
     assert final["r.n"] == 1
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_speed_may_be_a_state_of_a_position_that_is_none(tmp_path: Path, solver: str) -> None:
+    """The spring's length is the state, and the speed is that of its end."""
+    drive = EXAMPLES / "msl" / "translational" / "InitialConditions.toml"
+    assert called(["to-modelica", str(drive), "-o", str(tmp_path / "a.mo")]).exit_code == 0
+    (tmp_path / "flat.mo").write_text(flat_text(load(tmp_path / "a.mo")))
+    model = build(load(tmp_path / "flat.mo"))
+    assert "der(s2.flange_b.s)" in model.states
+    assert "s2.flange_b.s" not in model.states
+    before, after = (simulate(m, 1.0, rtol=1e-10, atol=1e-12, solver=solver) for m in (drive, model))
+    largest = max(abs(value) for value in before.final.values())
+    for name in {*before.final} & {*after.final}:
+        assert after.final[name] == pytest.approx(before.final[name], abs=1e-8 * largest)
+    export_fmu(model, tmp_path / "flat.fmu")  # which runs it and compares
