@@ -61,11 +61,11 @@ static const double *variables_at(Batch *b, double t, int now) {
 #define READ_NODES 5
 static const double NODE_PLACES[READ_NODES] = {0, 0.17267316464601143, 0.5, 0.8273268353539886, 1},
                     SHARES[READ_NODES] = {9. / 180, 49. / 180, 64. / 180, 49. / 180, 9. / 180};
-#define BENT 3e-5       /* of the largest amount: difference to Simpson's rule; the error is its square, at most 1e-9 */
-#define TWISTED 0.03    /* of the largest amount: part of third degree, which both rules do not see */
-#define LEAST_PART 1e-4 /* part of a step; kinks are less precise only within */
-#define MOST_EDGES 200  /* of a step: more are rounding beside an edge on which it stays */
-#define QUARTIC_LOOKS 16 /* at the quartic, for its extremes */
+#define BENT 3e-5    /* of the largest amount: difference to Simpson's rule; the error is its square, at most 1e-9 */
+#define TWISTED 0.03 /* of the largest amount: part of third degree, which both rules do not see */
+#define SHORTEST_PART 1e-4 /* part of a step; kinks are less precise only within */
+#define MOST_EDGES 200     /* of a step: more are rounding beside an edge on which it stays */
+#define QUARTIC_LOOKS 16   /* at the quartic, for its extremes */
 #define BESIDE 1e-3
 #define GOLDEN 0.6180339887498949
 #define GOLDEN_TRIALS 40 /* golden section: the time is as precise as the value allows */
@@ -213,7 +213,7 @@ static void take_stretch(Batch *b, double begin, double h) {
 
 static void read_along(Batch *b, double t, double end) {
     /* Halves of what is less than a few last digits of the time are as long as the whole. */
-    double least = max_of(LEAST_PART * (end - t), least_step(&b->c->state)), h = end - t;
+    double least = max_of(SHORTEST_PART * (end - t), least_step(&b->c->state)), h = end - t;
     look_along(b, t, 0);
     while (t < end && !b->failed) {
         if (t + 1.0001 * h >= end) h = end - t;

