@@ -7,7 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hand import Hand, using
+from pages import serving
 from playwright.sync_api import Page, sync_playwright
+
+from modelica_like.page import PageServer, Session
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
 _MISSING = "No browser was found: install Chromium (make browser), or name one by $BROWSER_FOR_TESTS."
@@ -78,3 +82,18 @@ def browser(chromium: Any) -> Iterator[Browser]:
     context = chromium.new_context()
     yield Browser(context.new_page())
     context.close()
+
+
+@pytest.fixture
+def server(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[PageServer]:
+    """Serve the netlist that a module has as `TEXT`, with the files of its `OTHERS` beside it."""
+    for name, text in {"drive.toml": request.module.TEXT, **getattr(request.module, "OTHERS", {})}.items():
+        (tmp_path / name).write_text(text)
+    with serving(Session(tmp_path / "drive.toml", folder=tmp_path)) as served:
+        yield served
+
+
+@pytest.fixture
+def hand(browser: Any, server: PageServer) -> Iterator[Hand]:
+    with using(browser, server) as hand:
+        yield hand

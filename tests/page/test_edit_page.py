@@ -1,12 +1,11 @@
 """The page in a browser: mistakes, curves, keys, other editors, and clicks without a meaning."""
 
 import random
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hand import READY, Hand, using
+from hand import READY, Hand
 from pages import serving
 
 from modelica_like import simulate
@@ -29,19 +28,6 @@ TEXTS = [
     ("[parts]", '[parts]\nnew = { is = "Clutch" }'), ("[parts]", '[parts]\nnew = { is = "Inertia", J = 1, K = 2 }'),
     ("[parts]", '[start]\n"J1.x" = 1\n[parts]'), ("[parts]", '[parts]\nnew = { is = "Inertia", count = -1, J = 1 }'),
 ]  # fmt: skip
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[PageServer]:
-    (tmp_path / "drive.toml").write_text(TEXT)
-    with serving(Session(tmp_path / "drive.toml", folder=tmp_path)) as made:
-        yield made
-
-
-@pytest.fixture
-def hand(browser: Any, server: PageServer) -> Iterator[Hand]:
-    with using(browser, server) as made:
-        yield made
 
 
 @pytest.mark.browser
@@ -260,7 +246,7 @@ def test_clicks_and_keys_without_a_meaning(hand: Hand, server: PageServer, seed:
 
 
 @pytest.mark.browser
-def test_a_server_that_has_ended_is_told(browser: Any, tmp_path: Path) -> None:
+def test_a_server_that_has_ended_is_told_and_its_text_goes_to_the_next(browser: Any, tmp_path: Path) -> None:
     (tmp_path / "drive.toml").write_text(TEXT)
     with serving(Session(tmp_path / "drive.toml", folder=tmp_path)) as server:
         browser.open(server.address, 1400, 900, ready=READY)
@@ -272,5 +258,15 @@ def test_a_server_that_has_ended_is_told(browser: Any, tmp_path: Path) -> None:
         hand.page.fill("#text", f"# kept\n{TEXT}")
         hand.page.locator("#text").blur()
         hand.until("document.getElementById('said').textContent.startsWith('Nobody answers.')")
-        assert hand.page.input_value("#text").startswith("# kept")
+        kept = hand.page.input_value("#text")
+        assert kept.startswith("# kept")
     browser.complaints.clear()
+    with serving(Session(tmp_path / "drive.toml", folder=tmp_path)) as again:
+        browser.open(again.address, 1400, 900, ready=READY)
+        hand.wait()
+        assert hand.text == TEXT
+        hand.page.click("#shelf-button")
+        hand.write(kept)
+        hand.page.click("#save")
+        hand.wait()
+    assert (tmp_path / "drive.toml").read_text() == kept

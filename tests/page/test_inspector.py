@@ -1,14 +1,7 @@
 """The values of what is selected: where they come from, what is missing, tables, and parts that are netlists."""
 
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
-
 import pytest
-from hand import Hand, using
-from pages import serving
-
-from modelica_like.page import PageServer, Session
+from hand import Hand
 
 TEXT = """[parts]
 motor = { is = "Torque", tau = "5 N.m" }
@@ -27,7 +20,8 @@ drive = ["motor", "J1", "shaft", "J2"]
 [simulate]
 until = "1 s"
 """
-TAIL = """[parameters]
+OTHERS = {
+    "tail.toml": """[parameters]
 damping = "2 N.m.s/rad"
 
 [parts]
@@ -40,21 +34,13 @@ x = ["oil", "wall"]
 [expose]
 flange_a = "oil.flange_a"
 """
+}
 
 
 @pytest.fixture
-def server(tmp_path: Path) -> Iterator[PageServer]:
-    (tmp_path / "drive.toml").write_text(TEXT)
-    (tmp_path / "tail.toml").write_text(TAIL)
-    with serving(Session(tmp_path / "drive.toml", folder=tmp_path)) as made:
-        yield made
-
-
-@pytest.fixture
-def hand(browser: Any, server: PageServer) -> Iterator[Hand]:
-    with using(browser, server) as made:
-        made.until("results.run")
-        yield made
+def hand(hand: Hand) -> Hand:
+    hand.until("results.run")
+    return hand
 
 
 @pytest.mark.browser

@@ -1,6 +1,5 @@
 """What a hand does with parts: copies, cuts, pastes, groups, opens, replaces; and what is saved without being asked."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,7 @@ from hand import Hand, using
 from pages import serving
 
 from modelica_like import simulate
-from modelica_like.page import PageServer, Session
+from modelica_like.page import Session
 
 TEXT = """# A drive.
 [parts]
@@ -31,19 +30,6 @@ oil = { is = "Damper", d = "1 N.m.s/rad" }
 [series]
 brake = ["J1", "oil"]
 """
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[PageServer]:
-    (tmp_path / "drive.toml").write_text(TEXT)
-    with serving(Session(tmp_path / "drive.toml", folder=tmp_path)) as made:
-        yield made
-
-
-@pytest.fixture
-def hand(browser: Any, server: PageServer) -> Iterator[Hand]:
-    with using(browser, server) as made:
-        yield made
 
 
 def chosen(hand: Hand) -> list[str]:

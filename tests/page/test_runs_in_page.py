@@ -1,15 +1,9 @@
 """Runs in the page: played in the picture, signals dragged into curves, kept, measured files, calibration."""
 
-from collections.abc import Iterator
 from math import exp, pi
-from pathlib import Path
-from typing import Any
 
 import pytest
-from hand import Hand, using
-from pages import serving
-
-from modelica_like.page import PageServer, Session
+from hand import Hand
 
 TEXT = """[parts]
 wall = { is = "Fixed" }
@@ -41,17 +35,9 @@ def table() -> bytes:
 
 
 @pytest.fixture
-def server(tmp_path: Path) -> Iterator[PageServer]:
-    (tmp_path / "drive.toml").write_text(TEXT)
-    with serving(Session(tmp_path / "drive.toml", folder=tmp_path)) as made:
-        yield made
-
-
-@pytest.fixture
-def hand(browser: Any, server: PageServer) -> Iterator[Hand]:
-    with using(browser, server) as made:
-        made.until("results.run")
-        yield made
+def hand(hand: Hand) -> Hand:
+    hand.until("results.run")
+    return hand
 
 
 def measured(hand: Hand) -> None:
