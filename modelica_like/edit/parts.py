@@ -23,10 +23,11 @@ from modelica_like.language import Assembly, Component, Connector, Input, Output
 from modelica_like.language.assembly import end_at
 from modelica_like.language.fields import require_identifier
 from modelica_like.language.formula import CONSTANTS
-from modelica_like.netlist.document import Document, check_part
+from modelica_like.netlist.document import Document
 from modelica_like.netlist.further import head
 from modelica_like.netlist.outline import Path
 from modelica_like.netlist.read import assemble
+from modelica_like.netlist.sections import check_part
 
 
 def assembly(

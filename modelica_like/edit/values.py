@@ -15,9 +15,9 @@ from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, d
 from modelica_like.language import Assembly, Discrete, Variable
 from modelica_like.language.assembly import end_at
 from modelica_like.netlist import spell
-from modelica_like.netlist.document import READERS, read_sections
 from modelica_like.netlist.further import head
 from modelica_like.netlist.outline import Path, Section, decoded
+from modelica_like.netlist.sections import READERS, read_sections
 from modelica_like.netlist.write import plain
 
 

@@ -13,10 +13,10 @@ from modelica_like.language.inside import declarations
 from modelica_like.language.places import texts_of_fields
 from modelica_like.language.tables import REQUIRED, Column, Rows
 from modelica_like.language.units import ANY, parse_unit
-from modelica_like.netlist.document import OnChattering, StartKind
 from modelica_like.netlist.json_units import Quantities, unnamed_quantities
 from modelica_like.netlist.read import FMU_PART
 from modelica_like.netlist.registry import library_types
+from modelica_like.netlist.sections import OnChattering, StartKind
 
 _QUANTITY = {"type": ["number", "string"]}
 _TIME = {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"$ref": "#/definitions/quantity_in_s"}]}

@@ -23,9 +23,10 @@ from modelica_like.language import Assembly, Component, Variable, guess
 from modelica_like.language.fields import Discrete
 from modelica_like.language.inside import declarations, inside
 from modelica_like.language.scopes import give_by_path
-from modelica_like.netlist.document import Document, check_part, read_text, survey
+from modelica_like.netlist.document import Document, read_text, survey
 from modelica_like.netlist.further import further, head
 from modelica_like.netlist.registry import find_type
+from modelica_like.netlist.sections import check_part
 from modelica_like.trust import trusting
 
 _MAX_ERRORS = 100

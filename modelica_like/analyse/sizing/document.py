@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like.errors import ModelicaLikeError, NetlistError, Source, raise_together_or_one
-from modelica_like.netlist.document import Reader, as_text, each, parse_toml, read_sections, read_text, whole
+from modelica_like.netlist.document import parse_toml, read_text
 from modelica_like.netlist.locate import Lines, locate
+from modelica_like.netlist.sections import Reader, as_text, each, read_sections, whole
 
 
 @dataclass

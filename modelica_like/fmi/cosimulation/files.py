@@ -18,6 +18,7 @@ from modelica_like.fmi.cosimulation.described import check_units
 from modelica_like.fmi.cosimulation.system import Bond, Link, Port, Settings, System, Unit, check_system, find_bonds
 from modelica_like.language.units import ONE, parse_unit, to_si
 from modelica_like.netlist import document as toml
+from modelica_like.netlist import sections as form
 from modelica_like.netlist.locate import Lines, locate
 from modelica_like.netlist.read import FMU_PART
 from modelica_like.writing import write_text
@@ -37,7 +38,7 @@ def load_system(path: Path, work: Path) -> System:
 
         return system_of_netlist(path, work)
     errors: list[ModelicaLikeError] = []
-    read = toml.read_sections(data, "A system", _READERS, lines, errors)
+    read = form.read_sections(data, "A system", _READERS, lines, errors)
     if errors:
         raise raise_together_or_one(errors)
     fmus, links, bonds = (tuple(read.get(name, {}).values()) for name in ("fmus", "connect", "bonds"))
@@ -118,10 +119,10 @@ def _yes_or_no(key: str, value: Any) -> bool:
 
 
 def _time(key: str, value: Any) -> float:
-    return to_si(toml.duration(key, value), parse_unit("s"), key)
+    return to_si(form.duration(key, value), parse_unit("s"), key)
 
 
-def _word(words: Sequence[str]) -> toml.Check:
+def _word(words: Sequence[str]) -> form.Check:
     def check(key: str, value: Any) -> Any:
         if value not in words:
             raise UnknownName(f"{key} = {value!r} must be {' or '.join(words)}.")
@@ -136,13 +137,13 @@ def _tolerance(key: str, value: Any) -> float:
     return value
 
 
-_OPTIONS: Mapping[str, toml.Check] = {
+_OPTIONS: Mapping[str, form.Check] = {
     "until": _time, "step": _time, "master": _word(get_args(kinds.Master)), "inputs": _word(get_args(kinds.Inputs)),
     "tolerance": _tolerance,
 }  # fmt: skip
-_READERS: Mapping[str, toml.Reader] = {
-    "name": toml.whole(toml.as_text), "own_names": toml.whole(_yes_or_no), "fmus": toml.each(_unit),
-    "connect": toml.each(_link), "bonds": toml.each(_bond), "simulate": toml.options(_OPTIONS),
+_READERS: Mapping[str, form.Reader] = {
+    "name": form.whole(form.as_text), "own_names": form.whole(_yes_or_no), "fmus": form.each(_unit),
+    "connect": form.each(_link), "bonds": form.each(_bond), "simulate": form.options(_OPTIONS),
 }  # fmt: skip
 
 

@@ -21,8 +21,9 @@ from modelica_like.fmi.export import export_fmu
 from modelica_like.language import Assembly, Connector
 from modelica_like.language.fields import Input
 from modelica_like.language.units import ONE, parse_unit, to_si
-from modelica_like.netlist.document import Document, flattened, parse, read_text
+from modelica_like.netlist.document import Document, parse, read_text
 from modelica_like.netlist.read import FMU_PART, assemble
+from modelica_like.netlist.sections import flattened
 from modelica_like.simulation import seconds
 
 _OWN = ("is", "file")

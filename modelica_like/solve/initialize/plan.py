@@ -14,7 +14,7 @@ from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, StartEntry, StartSystem, Vector
 from modelica_like.errors import MissingStart
 from modelica_like.flatten.generic import spread
-from modelica_like.netlist.document import StartKind as StartKind
+from modelica_like.netlist.sections import StartKind as StartKind
 from modelica_like.solve.initialize.point import Point
 from modelica_like.structure.matching import Elimination, Matching
 
