@@ -2,7 +2,8 @@
 
 Run with `python benchmarks/growth.py [parts parts] [word …]`: only calls with one of these words, by default all, and
 with so many parts, by default 300 and 3,000. Two drives are measured at both sizes: a chain of inertias and springs,
-read from a netlist, and the random tree of `large.py` with clutches, backlash and gears. Tenfold parts may take up to
+read from a netlist, and the random tree of `large.py` with clutches, backlash and gears; and a mass whose force follows
+a table of so many rows. Tenfold parts may take up to
 15 times as long: what is linear takes 10 times, sorting and memory that leaves the caches add to it, what is quadratic
 takes 100 times. Times are CPU times, the shortest of some repeats; only their growth decides.
 
@@ -22,6 +23,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from large import Drive
 from rich.console import Console
 
@@ -67,6 +69,14 @@ NEEDED = "load", "build", "run, idas", "export", "tree: build"
 STEEPER = {"schematic": 25.0, "compare": 20.0}
 """Calls that may grow more, by their nature: the places of parts are found by a linear programme, whose steps grow with
 its size (1.9 s of 3.6 s with 3,000 parts), and tables of all signals leave the caches."""
+PUSHED = """[simulate]
+until = 1
+[parts]
+push = { is = "Force" }
+mass = { is = "Mass", m = 2, s = 0, v = 0 }
+[connect]
+end = ["push.flange", "mass.flange_a"]
+"""
 MODES = "all modes, of a tenth of the parts"
 
 Call = tuple[str, Callable[[], Any]]
@@ -173,10 +183,18 @@ def of_tree(parts: int, folder: Path) -> Iterator[Call]:
     yield MODES, lambda: linearize(build(loads(netlist(parts // 10)))).modes()
 
 
+def of_rows(rows: int, folder: Path) -> Iterator[Call]:
+    """Yield runs whose input follows a measured table of so many rows, each of which is an event."""
+    drive, times = loads(PUSHED), np.linspace(0.0, 1.0, rows)
+    inputs = {"push.f": np.c_[times, np.sin(40 * times)]}
+    yield "rows: run, idas", lambda: simulate(drive, inputs=inputs)
+    yield "rows: run, native", lambda: simulate(drive, inputs=inputs, solver="native")
+
+
 def chosen(parts: int, words: list[str]) -> Iterator[Call]:
     """Yield the calls that are asked for."""
     with tempfile.TemporaryDirectory() as work:
-        for calls in (of_chain, of_tree):
+        for calls in (of_chain, of_tree, of_rows):
             for name, call in calls(parts, Path(work)):
                 if not words or name in NEEDED or any(word in name for word in words):
                     yield name, call

@@ -5,6 +5,8 @@ Jumps and kinks of a signal are time events, so that the solver never steps acro
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from math import log, pi
 from typing import Literal
 
@@ -26,6 +28,7 @@ from modelica_like.language import (
     any_of,
     column,
     discrete,
+    element,
     exp,
     floor,
     interpolate,
@@ -309,6 +312,15 @@ class Trapezoid(Periodic):
         return minimum(self.rising + self.width + self.falling, self.period)
 
 
+_LONG = 64
+"""Rows from which on a table of numbers is a list: looking for the row would cost more than the rest of a drive."""
+
+
+def is_long(column: Sequence[Expr | float]) -> bool:
+    """Tell whether a column of a table is a long list of numbers."""
+    return len(column) >= _LONG and all(isinstance(value, float | int) for value in column)
+
+
 class Rowwise(Component, partial=True):
     """Signal from a table over time, with a time event at every row."""
 
@@ -324,15 +336,21 @@ class Rowwise(Component, partial=True):
 
     def passed(self) -> Expr | float:
         """Return the number of the last row that was passed: a run may start late."""
-        now, passed = self.time / self.time_scale, -1.0
-        for moment in self.moments():
-            passed = passed + where(now < moment, 0, 1)
+        now, passed, moments = self.time / self.time_scale, -1.0, self.moments()
+        if not is_long(moments):
+            return sum((where(now < moment, 0, 1) for moment in moments), passed)
+        for step in (2**k for k in reversed(range(len(moments).bit_length()))):  # halving
+            there = all_of(passed + step < len(moments), now >= element(moments, passed + step))
+            passed = passed + where(there, step, 0)
         return passed
 
     def events(self) -> Events:
-        following = _NEVER
-        for k, moment in reversed(list(enumerate(self.moments()))):
-            following = where(self.row < k, moment, following)
+        moments, following = self.moments(), _NEVER
+        if is_long(moments):
+            following = element((*moments, _NEVER), self.row + 1)
+        else:
+            for k, moment in reversed(list(enumerate(moments))):
+                following = where(self.row < k, moment, following)
         ahead = {self.row: maximum(self.row + 1, self.passed())}
         yield self.kinks.go("ahead", "ahead", at=following * self.time_scale, reset=ahead)
 
@@ -355,9 +373,22 @@ class Table(Rowwise):
 
     def equations(self) -> Equations:
         times, values = zip(*self.table, strict=True)
-        yield self.y == self.scale * interpolate(
-            self.time / self.time_scale, times, values, self.smooth, self.extrapolate
-        )
+        now = self.time / self.time_scale
+        if not self.smooth and is_long(times) and is_long(values):
+            yield self.y == self.scale * self._on_line(now, times, values)
+            return
+        yield self.y == self.scale * interpolate(now, times, values, self.smooth, self.extrapolate)
+
+    def _on_line(self, now: Expr, times: tuple[float, ...], values: tuple[float, ...]) -> Expr:
+        """Return the value on the line between the last row that was passed and the next one."""
+        lines = [(t, y, (later - y) / (end - t)) for (t, y), (end, later) in pairwise(self.table)]
+        last = (*self.table[-1], lines[-1][2])
+        if self.extrapolate != "linear":
+            lines, last = [(*self.table[0], 0.0), *lines], (*self.table[-1], 0.0)
+        else:
+            lines = [lines[0], *lines]
+        begin, value, slope = (element(column, self.row + 1) for column in zip(*lines, last, strict=True))
+        return value + slope * (now - begin)
 
     def events(self) -> Events:
         if not self.smooth:

@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.compile.narrow import NARROW, Narrow
+from modelica_like.language.elements import applied
 
 PHASE_STEP = math.pi / 6
 """Largest advance of a phase in rad that an integrator may pass unseen: twelve looks show all humps of a wave."""
@@ -125,7 +126,7 @@ def _operations(arguments: dict[str, Any], expressions: Any, codes: frozenset[in
             moving = any(moves[read] for read in reads)
             if moving and kind in codes:
                 yield kind, operands
-            held[place] = ca.SX.unary(kind, *operands) if len(operands) == 1 else ca.SX.binary(kind, *operands)
+            held[place] = applied(kind, operands, function)
             moves[place] = moving
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledUpdate, Reset
 from modelica_like.errors import Source, StructureError
 from modelica_like.flatten.model import FlatModel, evaluate
+from modelica_like.language.elements import inserted
 from modelica_like.structure.reduce import ReducedDae
 
 _ALWAYS: Any = ca.SX(1)
@@ -60,7 +61,7 @@ def updates(
     _solve_delays([k for k, row in enumerate(discrete) if row.entry in delayed], symbols, values)
     order = _order(flat, discrete, symbols, values)
     if order:
-        _, results = ca.substitute_inplace([symbols[k] for k in order], [values[k] for k in order], results, False)
+        results = inserted([symbols[k] for k in order], [values[k] for k in order], results)
     results = _replaced(results, [(symbol, flat.d[entry]) for entry, symbol in old.items()])
     return ca.vertcat(*results), tuple(row.update for row in rows)
 

@@ -24,6 +24,10 @@ static inline double product(double a, double b) { return a == 0 || b == 0 ? 0 :
 /* As fmax and fmin, for which compilers call a library: what is no number does not count. */
 static inline double max_of(double a, double b) { return a >= b || b != b ? a : b; }
 static inline double min_of(double a, double b) { return a <= b || b != b ? a : b; }
+/* Of a list of numbers, which stand behind their count; below and beyond, the first and the last one. */
+static inline double element(const double *list, double index) {
+    return list[1 + (int)min_of(max_of(index, 0), list[0] - 1)];
+}
 
 static inline double sign(double a) { return a < 0 ? -1 : a > 0 ? 1 : a; }
 

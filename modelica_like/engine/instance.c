@@ -201,6 +201,8 @@ Instance *instance_new(Instance bare, const char *token) {
     c->altered = 1;
     c->fixed_moments = has_fixed_moments(m);
     memcpy(c->slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
+    memset(c->known_slots + m->slot_constants, 1, (size_t)m->n_constants);
+    for (int k = m->slot_constants; k < m->slot_results; k++) c->same[k] = c->places_of_slots[k] = k;
     instance_reset(c);
     return c;
 }

@@ -50,3 +50,6 @@ OPERATION(ATAN2, atan2(a, b), b / (a * a + b * b), -a / (a * a + b * b))
 OPERATION(HYPOT, hypot(a, b), a / f, b / f)
 OPERATION(LOG1P, log1p(a), 1 / (1 + a), 0)
 OPERATION(EXPM1, expm1(a), f + 1, 0)
+#ifndef CODE_ONLY /* there it is written out: it reads slots */
+OPERATION(ELEMENT, element(slots + operand[k].right, a), 0, 0)
+#endif

@@ -73,12 +73,11 @@ static void work_out(Instance *c, const Tape *tape) {
     unsigned char *known = c->known_slots;
     const Operands *operand = tape->operands;
     int slot = tape->first_result;
-    memset(known, 0, (size_t)m->n_slots);
+    memset(known, 0, (size_t)m->slot_constants); /* of constants, which may be many, `instance_new` */
     for (int k = 0; k < m->n_p; k++) known[m->slot_p + k] = !c->tuned[k];
     for (int k = 0; k < m->n_d; k++) /* a gradient goes back to discrete values, and to shares where there are any */
         known[m->slot_d + k] = !c->passing || (k < m->n_modes ? m->modes[k].n_names > 0 : c->d[k] == 0);
-    memset(known + m->slot_constants, 1, (size_t)m->n_constants);
-    for (int k = 0; k < slot; k++) c->same[k] = k;
+    for (int k = 0; k < m->slot_constants; k++) c->same[k] = k;
     for (int r = 0; r < tape->n_runs; r++)
         for (int k = 0; k < tape->runs[r].count; k++, operand++, slot++) {
             Operands one = {c->same[operand->left], c->same[operand->right]};
@@ -92,7 +91,8 @@ static void work_out(Instance *c, const Tape *tape) {
 
 static void mark_needed(Instance *c, const Tape *tape) {
     const int *same = c->same;
-    unsigned char *needed = memset(c->needed_slots, 0, (size_t)c->model->n_slots);
+    unsigned char *needed = c->needed_slots;
+    memset(needed + tape->first_result, 0, (size_t)tape->n_operations);
     for (int k = 0; k < tape->n_outputs; k++)
         if (is_wanted(c, tape, k)) needed[same[tape->outputs[k]]] = 1;
     for (int k = tape->n_operations - 1; k >= 0; k--) {
@@ -107,7 +107,7 @@ static void mark_needed(Instance *c, const Tape *tape) {
 static void write_special(Instance *c, Special *s, const Tape *tape) {
     const unsigned char *needed = c->needed_slots;
     int *place = c->places_of_slots, written = 0, first = c->model->n_slots, values = first + c->known_used, k = 0;
-    for (int slot = 0; slot < tape->first_result; slot++) place[slot] = slot;
+    for (int slot = 0; slot < c->model->slot_constants; slot++) place[slot] = slot;
     s->tape.n_runs = s->tape.n_outputs = 0;
     s->tape.first_result = tape->first_result;
     s->operands = (Operands *)(void *)(c->room + c->room_used);

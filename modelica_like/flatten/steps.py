@@ -10,6 +10,7 @@ import numpy as np
 
 from modelica_like.flatten.generic import Matrix, meets, pairs
 from modelica_like.language.discrete import CONTINUOUS, is_a, is_fixed, marker, moves, silence
+from modelica_like.language.elements import rebuilt
 from modelica_like.language.expr import TIME, Symbol, operands, symbols_in
 from modelica_like.language.fields import Variable
 
@@ -128,7 +129,7 @@ class _Written:
         news = [self._known[x][1] for x in olds]
         if olds == [new.element_hash() for new in news]:
             return node
-        return ca.SX.unary(node.op(), *news) if len(news) == 1 else ca.SX.binary(node.op(), *news)
+        return rebuilt(node, news)
 
     def _of_node(self, node: Any, parts: list[Any]) -> Any:
         operation = node.op()

@@ -200,6 +200,8 @@ class _Body:
         values = self._value(left), self._value(right)
         self._here[slot] = self._open[-1][1] if self._open else 0
         value = _PLAIN.get(name, f"value_{name}({{}}, {{}})").format(*values)
+        if name == "ELEMENT":
+            value = f"element(s + {right}, {values[0]})"
         line = f"v{slot} = {value};"
         slope = "0"
         if self._slopes and self._writer.moving[slot]:

@@ -7,12 +7,13 @@ list. Compile time and size grow with the number of operations only.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import accumulate, groupby
+from itertools import accumulate, chain, groupby
 from typing import Any
 
 import casadi as ca
 
 from modelica_like.errors import LanguageError
+from modelica_like.language.elements import numbers_of
 
 ARGUMENTS = ("t", "x", "z", "p", "u", "d", "y")
 """Arguments of tapes: time, states, implicit unknowns, parameters, inputs, modes, and variables of the start system."""
@@ -21,12 +22,16 @@ OPERATIONS = (
     "ADD", "SUB", "MUL", "DIV", "NEG", "EXP", "LOG", "POW", "CONSTPOW", "SQRT", "SQ", "TWICE", "SIN", "COS", "TAN",
     "ASIN", "ACOS", "ATAN", "LT", "LE", "EQ", "NE", "NOT", "AND", "OR", "FLOOR", "CEIL", "FMOD", "REMAINDER", "FABS",
     "SIGN", "COPYSIGN", "IF_ELSE_ZERO", "ERF", "FMIN", "FMAX", "INV", "SINH", "COSH", "TANH", "ASINH", "ACOSH",
-    "ATANH", "ATAN2", "HYPOT", "LOG1P", "EXPM1",
+    "ATANH", "ATAN2", "HYPOT", "LOG1P", "EXPM1", "ELEMENT",
 )  # fmt: skip
 """The operations of `tape.c`, in the order of its enumeration."""
 
 _COPIES = (ca.OP_ASSIGN, ca.OP_LIFT)
-_NAMES = {getattr(ca, f"OP_{name}"): name for name in OPERATIONS}
+_NAMES = {getattr(ca, f"OP_{name}"): name for name in OPERATIONS if name != "ELEMENT"}
+
+
+Constant = float | tuple[float, ...]
+"""A number, or a list of numbers behind its length."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +66,7 @@ class Slots:
 
     Attributes:
         sizes: number of values of every argument.
-        constants: all constants of all tapes.
+        constants: all constants of all tapes; a list of numbers has its length and then its numbers.
     """
 
     sizes: dict[str, int]
@@ -82,16 +87,20 @@ def write_tapes(functions: dict[str, Any], sizes: dict[str, int]) -> tuple[Slots
         zip(ARGUMENTS, accumulate((sizes[name] for name in ARGUMENTS), initial=0), strict=False)
     )
     base = sum(sizes.values())
-    constants = {0.0: -1}
+    constants: dict[Constant, int] = {0.0: -1}
     read = [_read(name, function, first, base, constants) for name, function in functions.items()]
-    places = {number: base + k for k, number in enumerate(constants.values())}
-    return Slots(sizes, tuple(constants)), tuple(_sorted(tape, places, base) for tape in read)
+    values = [constant if isinstance(constant, tuple) else (constant,) for constant in constants]
+    firsts = accumulate(map(len, values), initial=base)
+    places = dict(zip(constants.values(), firsts, strict=False))
+    slots = Slots(sizes, tuple(chain.from_iterable(values)))
+    return slots, tuple(_sorted(tape, places, base, base + len(slots.constants)) for tape in read)
 
 
-def _read(name: str, function: Any, first: dict[str, int], base: int, constants: dict[float, int]) -> Tape:
+def _read(name: str, function: Any, first: dict[str, int], base: int, constants: dict[Constant, int]) -> Tape:
     """Read a function unchanged: results follow the arguments, and constants have numbers below zero."""
     starts = [first[argument] for argument in function.name_in()]
     held: dict[int, int] = {}
+    value_of: dict[int, float] = {}
     operations: list[tuple[str, int, int]] = []
     outputs = [constants[0.0]] * function.nnz_out(0)
     instruction, constant = function.instruction_id, function.instruction_constant
@@ -99,12 +108,20 @@ def _read(name: str, function: Any, first: dict[str, int], base: int, constants:
     for k in range(function.n_instructions()):
         code = instruction(k)
         if code == ca.OP_CONST:
+            value_of[writes(k)[0]] = constant(k)
             held[writes(k)[0]] = constants.setdefault(constant(k), -1 - len(constants))
         elif code == ca.OP_OUTPUT:
             outputs[writes(k)[1]] = held[reads(k)[0]]
         elif code == ca.OP_INPUT:
             argument, element = reads(k)
             held[writes(k)[0]] = starts[argument] + element
+        elif code == ca.OP_CALL:
+            index, number, count = reads(k)
+            numbers = numbers_of(value_of[number], value_of[count], function)
+            operations.append(
+                ("ELEMENT", held[index], constants.setdefault((len(numbers), *numbers), -1 - len(constants)))
+            )
+            held[writes(k)[0]] = base + len(operations) - 1
         elif code in _COPIES:
             held[writes(k)[0]] = held[reads(k)[0]]
         elif code in _NAMES:
@@ -119,13 +136,14 @@ def _read(name: str, function: Any, first: dict[str, int], base: int, constants:
     return Tape(name, tuple(operations), tuple(outputs))
 
 
-def _sorted(tape: Tape, places: dict[int, int], base: int) -> Tape:
+def _sorted(tape: Tape, places: dict[int, int], base: int, results: int) -> Tape:
     """Reorder operations into long groups of equal ones: always the kind of which most are ready.
 
     Args:
         tape: as `_read` returns it.
         places: slots of the constants.
-        base: slot of the first constant; results follow the last one.
+        base: slot of the first constant.
+        results: slot of the first result.
     """
     users: list[list[int]] = [[] for _ in tape.operations]
     missing: list[int] = []
@@ -147,7 +165,6 @@ def _sorted(tape: Tape, places: dict[int, int], base: int) -> Tape:
                 if not missing[user]:
                     ready.setdefault(tape.operations[user][0], []).append(user)
         chosen.clear()
-    results = base + len(places)
     place = places | {base + k: results + position for position, k in enumerate(order)}
     moved = tuple(
         (name, place.get(left, left), place.get(right, right))

@@ -21,6 +21,7 @@ from modelica_like.language.discrete import sample as sample
 from modelica_like.language.discrete import terminal as terminal
 from modelica_like.language.discrete import terminate as terminate
 from modelica_like.language.discrete import when as when
+from modelica_like.language.elements import element as element
 from modelica_like.language.equation import Equations as Equations
 from modelica_like.language.equation import connect as connect
 from modelica_like.language.equation import free as free

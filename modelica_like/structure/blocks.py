@@ -13,6 +13,7 @@ import casadi as ca
 
 from modelica_like.errors import StructureError
 from modelica_like.flatten.steps import STEPS
+from modelica_like.language.elements import inserted
 from modelica_like.structure.decided import vanishing
 from modelica_like.structure.isolate import isolate, isolate_inverse
 
@@ -235,8 +236,7 @@ class BlockSolver:
         if not (inner and expressions):
             return expressions
         symbols = [self.unknowns[column] for column, _ in inner]
-        _, replaced = ca.substitute_inplace(symbols, [expression for _, expression in inner], expressions, False)
-        return list(replaced)
+        return inserted(symbols, [expression for _, expression in inner], expressions)
 
 
 def cramer(matrix: Any, right: Any) -> tuple[list[Any], Any]:

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.flatten.generic import spread
+from modelica_like.language.elements import rebuilt
 from modelica_like.language.expr import operands
 from modelica_like.structure.system import System
 
@@ -100,4 +101,4 @@ class _Branches:
             holds = bool(float(self._system.generic(parts[0])))
             self._conditions.append(parts[0] if holds else ca.logic_not(parts[0]))
             return parts[1] if holds else ca.SX(0)
-        return ca.SX.unary(node.op(), *parts) if len(parts) == 1 else ca.SX.binary(node.op(), *parts)
+        return rebuilt(node, parts)

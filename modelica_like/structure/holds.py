@@ -21,6 +21,7 @@ import numpy as np
 
 from modelica_like.flatten.holds import TERMS
 from modelica_like.flatten.model import FlatModel, evaluate
+from modelica_like.language.elements import inserted
 from modelica_like.structure.discretes import Part
 from modelica_like.structure.system import System
 
@@ -212,7 +213,7 @@ def _slopes(system: System, nodes: list[int], order: list[tuple[Any, Any]], stat
     """Slopes of motions by the states that move them: not by positions, on which the slopes of a linkage hang."""
     motions = system.node_values[nodes]
     if order:
-        _, (motions,) = ca.substitute_inplace([s for s, _ in order], [e for _, e in order], [motions], False)
+        (motions,) = inserted([s for s, _ in order], [e for _, e in order], [motions])
     among = {*states}
     return ca.jacobian(motions, system.column(level for level in states if system.derivative(level) not in among))
 

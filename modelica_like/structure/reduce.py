@@ -10,6 +10,7 @@ import casadi as ca
 
 from modelica_like.errors import StructureError
 from modelica_like.flatten.model import FlatModel, Origin
+from modelica_like.language.elements import inserted
 from modelica_like.structure.alias import Aliases, find_aliases
 from modelica_like.structure.blocks import Block, BlockSolver, Solved
 from modelica_like.structure.decided import decide, needs_decision
@@ -337,6 +338,6 @@ def _written_out(system: System, unknowns: list[int], solved: Solved) -> tuple[A
     results: list[Any] = [system.everything, *solved.alg, *(expression for _, expression in solved.determinants)]
     if solved.order:
         symbols, expressions = [system.symbols[unknowns[k]] for k, _ in solved.order], [e for _, e in solved.order]
-        _, results = ca.substitute_inplace(symbols, expressions, results, False)
+        results = inserted(symbols, expressions, results)
     end = 1 + len(solved.alg)
     return results[0], results[1:end], results[end:]

@@ -19,6 +19,7 @@ from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.edges import kinks_of
 from modelica_like.errors import NoGradient
+from modelica_like.language.elements import applied
 from modelica_like.solve.initialize import Point, call, solve_implicit
 from modelica_like.solve.initialize.slopes import Slopes, slopes
 from modelica_like.solve.recorder import Segment
@@ -214,11 +215,10 @@ def arguments_of_kinks(function: ca.Function, given: list[Any]) -> list[Any]:
             value = given[inputs[0]].nz[inputs[1]]
         elif operation == ca.OP_CONST:
             value = ca.SX(function.instruction_constant(k))
-        elif len(inputs) == 1:
-            value = ca.SX.unary(operation, work[inputs[0]])
-            arguments += [work[inputs[0]]] if operation in _ZEROS else []
         else:
-            value = ca.SX.binary(operation, work[inputs[0]], work[inputs[1]])
-            arguments += [work[inputs[0]] - work[inputs[1]]] if operation in _DIFFERENCES else []
+            operands = [work[place] for place in inputs]
+            value = applied(operation, operands, function)
+            arguments += operands[:1] if operation in _ZEROS else []
+            arguments += [operands[0] - operands[1]] if operation in _DIFFERENCES else []
         work[function.instruction_output(k)[0]] = value
     return arguments

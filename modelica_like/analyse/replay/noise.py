@@ -9,6 +9,8 @@ from typing import Any
 
 import casadi as ca
 
+from modelica_like.language.elements import applied
+
 _SUMS = frozenset({ca.OP_ADD, ca.OP_SUB, ca.OP_FMIN, ca.OP_FMAX})
 _SAME = frozenset({ca.OP_NEG, ca.OP_FABS, ca.OP_TWICE, ca.OP_COPYSIGN})
 
@@ -34,10 +36,8 @@ def rounding(arguments: list[Any], expressions: Any) -> Any:
             value = ca.SX(function.instruction_constant(k))
         elif code == ca.OP_INPUT:
             value = symbols[reads[0]][reads[1]]
-        elif len(reads) == 1:
-            value = ca.SX.unary(code, held[reads[0]])
         else:
-            value = ca.SX.binary(code, held[reads[0]], held[reads[1]])
+            value = applied(code, [held[read] for read in reads], function)
         leaf = code in (ca.OP_CONST, ca.OP_INPUT)
         error = 0 if leaf else _carried(code, [held[read] for read in reads], [wrong[read] for read in reads])
         held[places[0]], wrong[places[0]] = value, ca.fabs(value) + error
