@@ -14,6 +14,8 @@
 #define BESIDE 1e-14     /* of the time: rounding, by which counts rise before or behind their edges */
 #define JUMP 1e-4        /* of slopes at neighbouring times: much more than they change there if they are steep */
 #define ALREADY 1e-9     /* of the step: edges at its beginning, on which it stands */
+#define TOPS 2           /* parabolas through a top: the second one is */
+#define NARROWER 0.05    /* times as wide */
 #define MOST_WINDOWS 200 /* of a step: with more, it becomes shorter */
 #define MOST_NOISE 16    /* windows shorter than the time resolution: what stays at an edge has them by rounding */
 #define FINE 0.9         /* of the advance of a phase that a step may have */
@@ -31,18 +33,43 @@ static double *edges_inside(Instance *c, double t, double *values) {
 
 static int differs(double before, double after) { return (before > 0) != (after > 0); }
 
-/* Does the parabola through three equidistant values touch zero between them, where their signs are equal? */
-static int touches(double first, double middle, double last) {
-    double slope = last - first, bend = first - 2 * middle + last, place = -0.5 * slope / bend;
-    double extremum = middle + 0.25 * slope * place;
-    return fabs(place) < 1 && extremum * first < NEAR * first * first;
+/* Does the parabola through three equidistant values touch zero between them, where their signs are equal? `place`: of
+ * its top, from -1 to 1. What begins at an edge has no sign there. */
+static int touches(double first, double middle, double last, double *place) {
+    double slope = last - first, bend = first - 2 * middle + last, extremum;
+    *place = -0.5 * slope / bend;
+    extremum = middle + 0.25 * slope * *place;
+    if (!(fabs(*place) < 1)) return 0;
+    return fabs(first) > AT_EDGE ? extremum * first < NEAR * first * first : extremum * last < 0;
 }
 
 static int any_edge(int begin, int end, const double *first, const double *middle, const double *last) {
+    double place;
     for (int k = begin; k < end; k++)
-        if (differs(first[k], middle[k]) || differs(middle[k], last[k]) || touches(first[k], middle[k], last[k]))
+        if (differs(first[k], middle[k]) || differs(middle[k], last[k]) ||
+            touches(first[k], middle[k], last[k], &place))
             return 1;
     return 0;
+}
+
+/* Notes a time at which an edge of the piece has another sign than at its ends, by edges there and in the middle: looks
+ * at parts of the piece may all miss it. At the top of the parabola, and of a second one about that. */
+static void find_top(Instance *c, const double *first, const double *middle, const double *last, double *now) {
+    double begin = c->piece->begin, h = c->piece->end - begin, place;
+    c->edge_top = INFINITY;
+    for (int k = 0; k < c->model->settings->n_edges; k++) {
+        double values[3] = {first[k], middle[k], last[k]}, half = 0.5 * h, top = begin + half;
+        if (differs(middle[k], last[k])) continue;
+        for (int round = 0; round < TOPS && touches(values[0], values[1], values[2], &place); round++) {
+            top += place * half;
+            half *= NARROWER;
+            top = max_of(begin + half, min_of(top, begin + h - half));
+            for (int n = 0; n < 3; n++) {
+                values[n] = edges_inside(c, top + (n - 1) * half, now)[k];
+                if (differs(last[k], values[n])) c->edge_top = min_of(c->edge_top, top + (n - 1) * half);
+            }
+        }
+    }
 }
 
 static int any_between(const Instance *c, const double *before, const double *after) {
@@ -76,8 +103,10 @@ static double next_edge(Instance *c, double low, double *before, int precisely) 
     double h = piece->end - piece->begin, high = low, part = h / PARTS;
     size_t n = (size_t)c->model->tapes.edges.n_outputs, size = n * sizeof(double);
     double *after = before + n, *now = after + n, *sizes = now + n;
-    for (int k = 1 + (int)((low - piece->begin) / part); k <= PARTS && high == low; k++) {
+    for (int k = 1 + (int)((low - piece->begin) / part); k <= PARTS && high == low;) {
         double t = k < PARTS ? piece->begin + k * part : piece->end;
+        if (low < c->edge_top && c->edge_top < t) t = c->edge_top;
+        else k++;
         if (any_between(c, before, edges_inside(c, t, after))) high = t;
         else memcpy(before, after, size), low = high = t;
     }
@@ -101,9 +130,14 @@ static double next_edge(Instance *c, double low, double *before, int precisely) 
 
 /* The last time before the first edge of the piece after `t`, or infinity; the time just behind it. */
 double edge_ahead(Instance *c, double t, double *behind) {
-    double *now = c->edges_middle, most = 2 * LOCATED * (c->piece->end - c->piece->begin);
+    double *now = c->edges_middle, begin = c->piece->begin, h = c->piece->end - begin, most = 2 * LOCATED * h;
+    size_t n = (size_t)c->model->tapes.edges.n_outputs;
     *behind = INFINITY;
     if (c->model->settings->n_edges == 0) return INFINITY;
+    if (t == begin) { /* the first one of the piece */
+        for (int k = 0; k < 3; k++) edges_inside(c, begin + 0.5 * k * h, now + (size_t)k * n);
+        find_top(c, now, now + n, now + 2 * n, now + 3 * n);
+    }
     edges_inside(c, t, now);
     *behind = next_edge(c, t, now, 1);
     return max_of(t, min_of(*behind - most, nextafter(*behind, t)));
@@ -216,6 +250,7 @@ static int has_risen(Instance *c, double t) {
 static double judge_windows(Instance *c, double least, int of_slopes, int of_guards, int precisely) {
     double begin = c->piece->begin, h = c->piece->end - begin, landing = h, *now = c->edges_middle;
     double resolved = begin + TIME_RESOLUTION * max_of(1, fabs(begin));
+    least = max_of(max_of(least, ALREADY * h), c->lands ? resolved - begin : 0); /* rounding brings edges back */
     int unseen = 0, noise = 0, windows = 0;
     memcpy(now, c->edges, (size_t)c->model->tapes.edges.n_outputs * sizeof(double));
     for (double before = begin, edge = begin; edge < c->piece->end && !(unseen && landing < h); before = edge) {
@@ -229,7 +264,7 @@ static double judge_windows(Instance *c, double least, int of_slopes, int of_gua
         if (of_guards && between > resolved && has_risen(c, between)) return between - begin;
         if (of_guards && edge > resolved && has_risen(c, edge)) return edge - begin;
         unseen |= of_slopes && (c->lands || is_unseen(c, before, edge));
-        if (landing == h && edge - begin > max_of(least, ALREADY * h)) landing = edge - begin;
+        if (landing == h && edge - begin > least) landing = edge - begin;
     }
     if (unseen && landing >= h && takes_panels(c)) return 0.5 * h; /* the piece ends at its only edge */
     return unseen && landing < h ? landing * (1 + BEHIND) : INFINITY;
@@ -277,6 +312,7 @@ double seen_length(Instance *c, double least, double *most) {
     of_slopes = any_edge(0, m->settings->n_slope_edges, first, middle, last);
     of_guards = any_edge(m->settings->n_slope_edges, n_edges, first, middle, last);
     if (!of_slopes && !of_guards) return explained_length(c);
+    find_top(c, first, middle, last, middle + n);
     memset(c->positive, 0, (size_t)m->n_guards);
     if (of_guards) note_positive(c, begin), note_positive(c, c->piece->end);
     if (!isfinite(judge_windows(c, least, of_slopes, of_guards, 0))) return INFINITY;

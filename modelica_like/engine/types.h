@@ -219,6 +219,7 @@ typedef struct Instance {
     int by_lu;           /* what the step matrix was factorised by; otherwise by QR */
     int edgeless;        /* the piece is out of reach of edges */
     int edges_valid;     /* the first third of `edges` belongs to the present point */
+    double edge_top;     /* a time at which an edge of the piece has another sign than at its ends, or infinity */
     double edges_kept;   /* the last third to the beginning of a step of this length, which ended there; or 0 */
     Gradient *gradient;  /* or NULL */
     int lands;           /* steps end where slopes may change: derivatives along them are as good as they are then */

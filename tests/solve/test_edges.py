@@ -320,3 +320,30 @@ def test_an_argument_that_is_flat_before_its_edge_is_no_edge(solver: Solver) -> 
     # 1000 N.m + 10 N.m s/rad |w| against 0.12 kg.m2; 16 kN.m against 2.8 kg.m2.
     assert stops["bearing.mode"] == pytest.approx(0.12 / 10 * math.log(1.01), rel=1e-6)
     assert stops["brake.mode"] == pytest.approx(2.8 * 1.75 / 16000, rel=1e-6)
+
+
+class Thrown(Component):
+    """A body thrown up at 2 m/s, at whose top of 1 m is a spring."""
+
+    units_checked = False
+    s: Variable = var("1", "height", default=0.0)
+    v: Variable = var("1", "speed", default=2.0)
+    edge: Parameter = param("1", "where the spring begins")
+    k: Parameter = param("1", "its stiffness over the mass", default=1e3)
+
+    def equations(self) -> Equations:
+        yield der(self.s) == self.v
+        yield der(self.v) == -2.0 - self.k * where(self.s > self.edge, self.s - self.edge, 0 * self.s)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+@pytest.mark.parametrize("way", [1e-2, 1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_a_touch_at_the_top_of_a_flight_is_not_stepped_over(solver: Solver, way: float, rtol: float) -> None:
+    """It is in touch for as little as a hundredth of the step; then it falls with as much as it had before."""
+    up = 2.0 * math.sqrt(way)
+    contact = 2 / math.sqrt(1e3) * math.atan(up * math.sqrt(1e3) / 2.0)
+    rest = 3.0 - (2.0 - up) / 2.0 - contact
+    run = simulate(Thrown(edge=1 - way), 3.0, solver=solver, rtol=rtol, atol=rtol / 100)
+    assert run.final["v"] == pytest.approx(-up - 2 * rest, rel=20 * rtol)
+    assert run.final["s"] == pytest.approx(1 - way - up * rest - rest**2, rel=20 * rtol)
