@@ -33,6 +33,10 @@ OUTER = (
     "model B outer W w; F g; equation g.i = g.v; connect(g, w.f); end B;"
 )
 NESTED = "connector F Real v; flow Real i; end F; connector K input Boolean b; F f; end K; block D K k; end D;"
+BUS = (
+    "connector U = input Real; connector Y = output Real; expandable connector B end B; block G U u; end G; "
+    "block S Y y = 1; end S;"
+)
 ENDLESS = "while true loop y := 1; end while"
 GROWING = "function f input Real u; output Real y; algorithm y := u; for i in 1:60 loop y := y*y + y; end for; end f;"
 TYPES = (
@@ -40,6 +44,25 @@ TYPES = (
     "record P parameter Real u = 1; parameter Real v = 1; end P;"
 )
 MESSAGES: dict[str, tuple[str, str]] = {
+    "a variable of a bus without a source": (
+        model("B bus; G g;", "connect(bus.x, g.u);", BUS),
+        "Nothing gives bus.x a value.\n  in a.mo:5 `connect(bus.x, g.u);`\n"
+        "Connect exactly one output with a variable of a bus.",
+    ),
+    "a variable of a bus with two sources": (
+        model("B bus; S r, s;", "connect(bus.x, r.y);\nconnect(s.y, bus.x);", BUS),
+        "r.y and s.y give bus.x a value.\n  in a.mo:5 `connect(bus.x, r.y);`\n  in a.mo:6 `connect(s.y, bus.x);`\n"
+        "Connect exactly one output with a variable of a bus.",
+    ),
+    "a bus and a signal": (
+        model("B bus; G g;", "connect(bus, g.u);", BUS),
+        "bus is a bus, and g.u is none.\n  in a.mo:5 `connect(bus, g.u);`\nConnect a variable of the bus.",
+    ),
+    "a bus in a bus that is nowhere": (
+        model("B bus; S s;", "connect(bus.sub.x, s.y);", BUS),
+        "There is no connector bus.sub.\n  in a.mo:5 `connect(bus.sub.x, s.y);`\n"
+        "Declare it in the class of the bus, or join it with a connector.",
+    ),
     "no end": ("model A\n  Real x;\n", "model A of line 1 has no 'end A;'.\n  in a.mo:3"),
     "wrong end": ("model A\n  Real x;\nend B;\n", "model A of line 1 ends with 'end B'.\n  in a.mo:3 `end B;`"),
     "no semicolon": (model("Real x", "x = 1;"), "Expected ';' before 'equation'.\n  in a.mo:4 `equation`"),

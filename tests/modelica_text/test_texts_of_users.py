@@ -364,7 +364,7 @@ def test_what_a_netlist_cannot_say_of_an_own_class_is_refused(text_file: Any) ->
         _as_netlist(text_file(CONTROLLED), "P.Other")
     assert str(caught.value).replace(str(text_file(CONTROLLED)), "a.mo") == (
         "brake has other equations than its class P.Brake: it is given what a netlist cannot say, such as a Boolean, "
-        "an Integer, an enumeration, a table or another class.\n"
+        "an Integer, an enumeration, a table, another class or the variables of a bus.\n"
         "  in a.mo:17 `replaceable Brake brake(k = 4);`\n"
         "Give what it is a name of its own in the text and use that: `model Mine extends P.Brake(…); end Mine;`."
     )

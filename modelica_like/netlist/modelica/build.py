@@ -210,6 +210,8 @@ class _Builder:
                 check_attributes(f"{name}.{field_name}", Basic("Real", entry, frozenset()), member.text)
             return connector
         if part.text.kind == "connector":
+            if part.text.expandable:
+                return _Builder(part, self.notes).run()
             if is_causal(part):
                 part.lent |= {variable.name for variable in variables(part) if not variable.continuous}
                 part.balance += sum(variable.continuous for variable in variables(part))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from modelica_like.errors import Source
-from modelica_like.language import boolean
+from modelica_like.language import Component, boolean
 from modelica_like.language.assembly import declare
 from modelica_like.language.fields import Discrete, Input, Output
 from modelica_like.language.inside import inside
@@ -55,7 +55,9 @@ class Carried:
     def _at(self, end: str) -> tuple[Written | None, str]:
         """Return the component that has a signal, None if it is not a written one, and the name in it."""
         path, _, name = end.rpartition(".")
-        part = self.component.parts.get(path) if path else self.component
+        part: Component | None = self.component
+        for head in path.split(".") if path else ():
+            part = part.parts.get(head) if part is not None else None
         return part if isinstance(part, Written) else None, name
 
     def _is_instant(self, source: str) -> bool:

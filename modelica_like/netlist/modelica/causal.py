@@ -9,7 +9,7 @@ from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.lifting import above
-from modelica_like.netlist.modelica.members import elements_of, exists, part_of, sizes
+from modelica_like.netlist.modelica.members import elements_of, exists, named_array, part_at, part_of, sizes
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
 from modelica_like.netlist.modelica.types import Basic, basic_type
@@ -34,7 +34,7 @@ class Variable:
 
 def is_causal(part: object) -> bool:
     """Tell whether a part is a connector with inputs and outputs among its variables."""
-    if not isinstance(part, Instance) or part.text.kind != "connector":
+    if not isinstance(part, Instance) or part.text.kind != "connector" or part.text.expandable:
         return False
     return any({"input", "output"} & member.declaration.prefixes for member in part.members.values())
 
@@ -61,32 +61,25 @@ def variables(connector: Instance) -> list[Variable]:
 
 def declared_at(instance: Instance, path: str) -> tuple[Instance, Member] | None:
     """Return the declaration of a variable of an instance, or of a causal connector in it; None if it is neither."""
-    *heads, last = path.split(".")
-    for head in heads:
-        name, _, index = head.partition("[")
-        member = instance.members.get(name)
-        if member is None or basic_type(instance, member) is not None or not exists(instance, member):
-            return None
-        part = part_of(instance, member, int(index.rstrip("]")) if index else 0)
-        if not isinstance(part, Instance):
-            return None
-        instance = part
-    member = instance.members.get(last.partition("[")[0])
-    return None if member is None or (heads and not is_causal(instance)) else (instance, member)
+    heads, _, last = path.rpartition(".")
+    part = part_at(instance, heads) if heads else instance
+    member = part.members.get(last.partition("[")[0]) if isinstance(part, Instance) else None
+    if member is None or not isinstance(part, Instance) or (heads and not is_causal(part)):
+        return None
+    return part, member
+
+
+def variable_at(instance: Instance, path: str) -> Expr:
+    """Return a variable of an instance, or of a connector in it."""
+    place = declared_at(instance, path)
+    basic = basic_type(*place) if place is not None else None
+    return named_array(path, (), basic.kind if basic is not None else "Real")
 
 
 def connector_at(instance: Instance, path: str) -> Instance | None:
     """Return the causal connector at a path, None if something else is there."""
-    for head in path.split("."):
-        name, _, index = head.partition("[")
-        member = instance.members.get(name)
-        if member is None or basic_type(instance, member) is not None or not exists(instance, member):
-            return None
-        part = part_of(instance, member, int(index.partition("]")[0]) if index else 0)
-        if not isinstance(part, Instance):
-            return None
-        instance = part
-    return instance if is_causal(instance) else None
+    part = part_at(instance, path)
+    return part if isinstance(part, Instance) and is_causal(part) else None
 
 
 def connections(instance: Instance) -> list[Pair]:
@@ -94,7 +87,7 @@ def connections(instance: Instance) -> list[Pair]:
     if instance.pairs is None:
         instance.pairs = [pair for pair in _own(instance) if _outer(instance, pair) is None]
         if any("inner" in member.declaration.prefixes for member in instance.members.values()):
-            instance.pairs += [pair for part, way in _parts_in(instance) for pair in _adopted(part, instance, way)]
+            instance.pairs += [pair for part, way in parts_in(instance) for pair in _adopted(part, instance, way)]
     return instance.pairs
 
 
@@ -104,11 +97,27 @@ def _adopted(part: Instance, above_it: Instance, levels: int) -> Iterator[Pair]:
         if _outer(part, pair) is above_it:
             seen = above(part, levels)
             left, right = (end if _is_outer(part, end) else seen(end) for end in pair[:2])
-            if connector_at(above_it, left) is None or connector_at(above_it, right) is None:
+            if not _bus_in(above_it, left, right) and None in (connector_at(above_it, end) for end in (left, right)):
                 what = f"A connection with {left if _is_outer(part, pair[0]) else right}, which is outer"
                 advice = "Connect it where the inner part is; equations may use its variables."
                 raise ModelicaTextError(f"{what}: that is not supported here.", where=pair[2], advice=advice)
             yield left, right, pair[2]
+
+
+def _bus_in(instance: Instance, *ends: str) -> bool:
+    return any(bus_of(instance, end) for end in ends)
+
+
+def bus_of(instance: Instance, end: str) -> str:
+    """Return the path of the expandable connector that an end is, or that it is in; empty if it is in none."""
+    names = end.split(".")
+    for depth in range(1, len(names) + 1):
+        part = part_at(instance, ".".join(names[:depth]))
+        if not isinstance(part, Instance):
+            return ""
+        if part.text.expandable:
+            return ".".join(names[:depth])
+    return ""
 
 
 def _is_outer(instance: Instance, end: str) -> bool:
@@ -179,7 +188,7 @@ def _connects(body: Iterable[Statement]) -> bool:
     )
 
 
-def _parts_in(instance: Instance, levels: int = 1) -> Iterator[tuple[Instance, int]]:
+def parts_in(instance: Instance, levels: int = 1) -> Iterator[tuple[Instance, int]]:
     """Yield the parts in an instance, with the levels from them up to it."""
     for name, member in instance.members.items():
         if member.declaration.is_outer or basic_type(instance, member) is not None or not exists(instance, member):
@@ -189,7 +198,7 @@ def _parts_in(instance: Instance, levels: int = 1) -> Iterator[tuple[Instance, i
             part = part_of(instance, member, index)
             if isinstance(part, Instance) and part.text.kind != "connector":
                 yield part, levels
-                yield from _parts_in(part, levels + 1)
+                yield from parts_in(part, levels + 1)
 
 
 def cardinality(resolver: Resolver, argument: Expr) -> Expr:

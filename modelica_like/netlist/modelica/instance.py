@@ -132,6 +132,8 @@ class Instance:
         pairs: likewise, without those of `outer` parts, with those of parts with its `inner` ones.
         lent: own discrete variables whose equations stand in an instance above.
         driving: protected signals that drive parts.
+        bus_wires: connections of variables of buses that go no further up.
+        bus_equations: own signals that are equal to variables of buses.
         balance: equations of continuous variables that are lent, less those that are adopted.
     """
 
@@ -152,6 +154,8 @@ class Instance:
         self.lent: set[str] = set()
         self.balance = 0
         self.driving: set[str] = set()
+        self.bus_wires: list[tuple[tuple[str, ...], Source]] = []
+        self.bus_equations: list[tuple[str, str, Source]] = []
         self._replaced = {name: entry for name, entry in given.inner.items() if isinstance(entry.redeclared, ClassText)}
         self._demand(given, self._collect(text, given, 0), text)
 

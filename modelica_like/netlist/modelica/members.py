@@ -262,6 +262,23 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
     return member.part
 
 
+def part_at(instance: Instance, path: str) -> Instance | Known | str | None:
+    """Return what the part at a path is, None if there is none, or if it is a variable."""
+    part: Instance | Known | str | None = instance
+    for head in path.split("."):
+        name, _, index = head.partition("[")
+        member = part.members.get(name) if isinstance(part, Instance) else None
+        if member is None or not isinstance(part, Instance) or basic_type(part, member) is not None:
+            return None
+        if not exists(part, member):
+            return None
+        shape = sizes(part, member)
+        if bool(index) is not bool(shape):
+            return None
+        part = part_of(part, member, int(index.partition("]")[0]) if index else 0)
+    return part
+
+
 def _instances(owner: Instance, member: Member, text: ClassText) -> Instance | list[Instance]:
     """Create the instance of a part, or those of an array of parts."""
     declared, count = member.declaration, sizes(owner, member)

@@ -223,7 +223,7 @@ class _Form:
             return
         raise ModelicaTextError(
             f"{path} has other equations than its class {record.text}: it is given what a netlist cannot say, such as "
-            "a Boolean, an Integer, an enumeration, a table or another class.",
+            "a Boolean, an Integer, an enumeration, a table, another class or the variables of a bus.",
             where=part.place_of(),
             advice="Give what it is a name of its own in the text and use that: "
             f"`model Mine extends {record.text}(…); end Mine;`.",

@@ -75,12 +75,12 @@ class _Parser(Expressions):
         return self.tokens[at][0] in KINDS
 
     def class_text(self, owner: ClassText | None, within: str = "") -> ClassText:
-        line, partial, unsupported = self.line, False, []
+        line, partial, expandable, unsupported = self.line, False, False, []
         self.deeper()
         while self.text in _BEFORE_KIND:
             word = self.take(self.kind)
-            partial = partial or word == "partial"
-            if word in ("expandable", "inner", "outer"):
+            partial, expandable = partial or word == "partial", expandable or word == "expandable"
+            if word in ("inner", "outer"):
                 unsupported.append((f"'{word}'", line))
         kind = self.take(*KINDS) or self.refuse(f"Expected a class before '{self.text}'.", self.line)
         if kind == "operator":
@@ -90,7 +90,7 @@ class _Parser(Expressions):
         name = self.need("name")
         class_text = ClassText(
             name, kind, line, self.file, owner, within, partial, redeclares=inherits, inherits=inherits,
-            unsupported=unsupported, lines=self.lines,
+            expandable=expandable, unsupported=unsupported, lines=self.lines,
         )  # fmt: skip
         around, self.current = self.current, class_text
         if self.take("="):

@@ -7,6 +7,7 @@ from pathlib import Path
 from modelica_like.errors import ModelicaLikeError, ModelicaTextError
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.build import build_component
+from modelica_like.netlist.modelica.buses import join_buses
 from modelica_like.netlist.modelica.classes import Classes, given_libraries
 from modelica_like.netlist.modelica.instance import Given, Instance
 from modelica_like.netlist.modelica.tree import ClassText
@@ -59,7 +60,9 @@ def _built(classes: Classes, text: ClassText) -> tuple[Written, Notes]:
     while True:
         notes, untabled = Notes(), set(classes.untabled)
         try:
-            return build_component(Instance(classes, text, Given()), notes), notes
+            instance = Instance(classes, text, Given())
+            join_buses(instance)
+            return build_component(instance, notes), notes
         except RecursionError:
             raise ModelicaTextError(
                 "Classes, functions or formulas are nested too deeply.", where=text.place(text.line)

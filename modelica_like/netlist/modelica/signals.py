@@ -11,7 +11,7 @@ from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Instance, Member
 from modelica_like.netlist.modelica.library import Known
-from modelica_like.netlist.modelica.members import exists, part_of
+from modelica_like.netlist.modelica.members import exists, part_at
 from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.tree import Expr, calls_in
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_signal
@@ -46,7 +46,7 @@ def inner_signals(instance: Instance, wires: list[Wire]) -> Inner:
             result.wires.append(wire)
             continue
         others = [end for end in ends if end not in inner]
-        source = next((end for end in others if _drives(instance, end)), "")
+        source = next((end for end in others if drives(instance, end)), "")
         if source:
             result.equal += [(_named(end), _named(source), wire.source) for end in inner]
         else:
@@ -84,17 +84,13 @@ def _is_there(instance: Instance, end: str) -> bool:
     return member is None or exists(instance, member)
 
 
-def _drives(instance: Instance, end: str) -> bool:
+def drives(instance: Instance, end: str) -> bool:
     """Tell whether an end gives a value: an input of the class, or an output of a part."""
     path, dot, last = end.rpartition(".")
-    own = own_signal(instance, end)
     if not dot:
+        own = own_signal(instance, end)
         return own is not None and "input" in own[1].prefixes
-    head, _, index = path.partition("[")
-    member = instance.members.get(head)
-    if member is None or "." in path:
-        return False
-    part = part_of(instance, member, int(index.rstrip("]")) if index else 0)
+    part = part_at(instance, path)
     if isinstance(part, Known):
         return isinstance(declarations(part.type).fields.get(last), Output)
     below = own_signal(part, last) if isinstance(part, Instance) else None

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.before import Before, begin_late, begun
-from modelica_like.netlist.modelica.causal import Joints, declared_at
+from modelica_like.netlist.modelica.buses import bus_equations
+from modelica_like.netlist.modelica.causal import Joints, declared_at, variable_at
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.lifting import above, height, levels_between, outside, owner_above, renamed
-from modelica_like.netlist.modelica.members import element, exists, named_array, part_of, sizes
+from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.sections import Section
 from modelica_like.netlist.modelica.signals import Memories, inner_signals
@@ -82,12 +83,16 @@ class Statements(Whens):
         """Make equations of connections within the instance."""
         joints = Joints(self.instance)
         inner = inner_signals(self.instance, groups(joints.others))
-        self.wires = inner.wires
+        self.wires = inner.wires + [Wire([*ends], source) for ends, source in self.instance.bus_wires]
         resolver = Resolver(self.instance, self.instance.text)
         for path, terms, source in joints.equations():
-            items = [fold.operation("neg", (self._variable(p),), 0) if s < 0 else self._variable(p) for s, p in terms]
-            self.equations.append((self._variable(path), fold.total(items, 0), source))
+            items = [variable_at(self.instance, name) for _, name in terms]
+            items = [
+                fold.operation("neg", (v,), 0) if sign < 0 else v for (sign, _), v in zip(terms, items, strict=True)
+            ]
+            self.equations.append((variable_at(self.instance, path), fold.total(items, 0), source))
         self.instance.balance -= joints.taken()
+        self.equations += bus_equations(self.instance)
         for left, right, source in inner.equal:
             before = len(self.equations)
             self.equate(resolver(left), resolver(right), self.instance.text, 0)
@@ -134,14 +139,8 @@ class Statements(Whens):
         """Take variables of a `when` that never happens: they stay what they are at the start."""
         self.assigned |= {*names}
         for name in names:
-            variable = self._variable(name)
+            variable = variable_at(self.instance, name)
             self.equations.append((variable, fold.call("pre", (variable,), 0), source))
-
-    def _variable(self, path: str) -> Expr:
-        """Return a variable of the instance, or of a connector in it."""
-        place = declared_at(self.instance, path)
-        basic = basic_type(*place) if place is not None else None
-        return named_array(path, (), basic.kind if basic is not None else "Real")
 
     def _orient(self) -> None:
         """Turn `a = b` of discrete variables where another equation gives `a` its value, and none `b`."""

@@ -167,6 +167,7 @@ class ClassText:
         file: it was read from.
         owner: enclosing class; at the outermost level None.
         within: name of the package around the outermost class.
+        expandable: of a connector, connections decide which of its variables there are.
         redeclares: it takes the place of an inherited class.
         inherits: it extends the inherited class of its name, `redeclare model extends Law`.
         heir: package that inherits it; its constants and classes come before those around it.
@@ -193,6 +194,7 @@ class ClassText:
     experiment: dict[str, float] = field(default_factory=dict)
     external: str = ""
     dimensions: tuple[Expr, ...] = ()
+    expandable: bool = False
     redeclares: bool = False
     inherits: bool = False
     heir: ClassText | None = None

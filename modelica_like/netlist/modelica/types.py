@@ -90,8 +90,8 @@ def is_bound_outside(instance: Instance, member: Member, basic: Basic | None) ->
 
 def is_signal(instance: Instance, member: Member, basic: Basic) -> bool:
     """Return whether a member is an input or output to connect: an input with an equation of its own class is none."""
-    if instance.text.kind == "connector":  # a part of variables, see causal.py
-        return False
+    if instance.text.kind == "connector":  # a part of variables, see causal.py; a bus has signals only
+        return instance.text.expandable
     connector = not {"input", "output"} & member.declaration.prefixes
     if connector and "protected" in member.declaration.prefixes:
         return member.declaration.name in instance.driving

@@ -83,6 +83,8 @@ def pairs_of(left: Expr, right: Expr, instance: Instance, source: Source) -> lis
 def _ends(end: Expr, instance: Instance) -> list[str]:
     """Return the paths of an end; several for an array."""
     (name, subscripts), rest = end.args[0], end.args[1:]
+    if (inside := _of_bus(end, instance)) is not None:
+        return inside
     if (bundle := _of_bundle(end, instance)) is not None:
         return bundle
     member = instance.members.get(name)
@@ -111,6 +113,29 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
     return [f"{head}.{name}" for head in heads for name in inner]
 
 
+def _of_bus(end: Expr, instance: Instance) -> list[str] | None:
+    """Return the paths of what an end means in an expandable connector, declared or not; None if it is in none."""
+    heads, owner = [""], instance
+    for depth, (name, subscripts) in enumerate(end.args):
+        member = owner.members.get(name)
+        is_part = member is not None and basic_type(owner, member) is None and exists(owner, member)
+        if owner.text.expandable and not (is_part and member is not None):
+            shape, rest = sizes(owner, member) if member is not None else (), end.args[depth + 1 :]
+            below = [f"{name}{index}" for index in _indices(subscripts, shape, instance, end.line)]
+            last = [f".{path}" for path in _inside(rest, instance, end.line)] if rest else [""]
+            return [f"{head}.{first}{path}".replace("][", ",") for head, first, path in product(heads, below, last)]
+        if not is_part or member is None:
+            return None
+        shape = sizes(owner, member)
+        indices = _indices(subscripts, shape, instance, end.line)
+        heads = [f"{head}.{name}{index}".lstrip(".") for head in heads for index in indices]
+        part = part_of(owner, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0) if indices else None
+        if not isinstance(part, Instance):
+            return None
+        owner = part
+    return heads if owner.text.expandable else None
+
+
 def _of_bundle(end: Expr, instance: Instance) -> list[str] | None:
     """Return the paths of the connectors within a connector that an end means, None if it means none."""
     owner, path = instance, ""
@@ -135,7 +160,9 @@ def _of_bundle(end: Expr, instance: Instance) -> list[str] | None:
 
 
 def bundled(connector: Instance) -> list[str]:
-    """Return the names of the connectors within a connector."""
+    """Return the names of the connectors within a connector, none of those of an expandable one."""
+    if connector.text.expandable:
+        return []
     inner = {
         name: sizes(connector, member)
         for name, member in connector.members.items()
