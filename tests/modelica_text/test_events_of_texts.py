@@ -168,3 +168,29 @@ def test_what_decides_equations_follows_from_an_initial_algorithm(tmp_path):
     """Without the limit of power: one switch, from the current's limit to the voltage's."""
     result = run(tmp_path, SUPPLY.replace("P0 = 1200", "P0 = 4000"), 0.3)
     assert result.events[0].time == pytest.approx(result.events[-1].time, abs=1e-9)
+
+
+LIMITED = """
+model A
+  parameter Real k = 1;
+  parameter Real most = 1;
+  Real y(start = 0, fixed = true);
+  Real u = k*cos(time);
+equation
+  der(y) = if y < -most and u < 0 or y > most and u > 0 then 0 else u;
+end A;
+"""
+
+
+@pytest.mark.parametrize("solver", ["native", "idas"])
+@pytest.mark.parametrize("size", [1.0, 7.3, 1e-3])
+def test_what_rests_at_a_limit_stays_there(tmp_path: Path, solver: Any, size: float) -> None:
+    """A quarter of the period leads to the limit; where the speed turns, it goes back, and to the other limit."""
+    (tmp_path / "a.mo").write_text(LIMITED)
+    model = load(tmp_path / "a.mo")
+    for part in (0.11, 0.37, 0.5, 0.701, 0.93):
+        model.give("k", size)
+        model.give("most", part * size)
+        result = simulate(model, 2 * math.pi, rtol=1e-9, atol=1e-12 * size, solver=solver)
+        for time, wanted in ((math.pi / 2, part), (math.pi, max(part - 1, -part)), (2 * math.pi, min(1 - part, part))):
+            assert result.at(time)["y"] == pytest.approx(wanted * size, abs=1e-7 * size)
