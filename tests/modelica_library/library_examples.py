@@ -58,7 +58,7 @@ def run_example(name: str) -> Outcome:
     except ModelicaLikeError as error:
         return Outcome("refused", str(error).splitlines()[0])
     comparison = compare(name, run, times, columns)
-    if comparison.right:
+    if comparison.right or not columns:  # three surfaces have a reference with times only: they just have to run
         return Outcome("right")
     outside = {column: distance for column, distance in comparison.worst.items() if distance}
     return Outcome("wrong", f"{outside or ''} {comparison.missing or ''}".strip())

@@ -31,7 +31,7 @@ def read_reference(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return times and columns."""
     with path.open(encoding="utf-8") as file:
         names = [name.strip().strip('"') for name in _split(file.readline().strip())]
-    data = np.atleast_2d(np.loadtxt(path, delimiter=",", skiprows=1))
+    data = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     return data[:, 0], {name: data[:, k] for k, name in enumerate(names) if k}
 
 

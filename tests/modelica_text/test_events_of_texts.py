@@ -194,3 +194,28 @@ def test_what_rests_at_a_limit_stays_there(tmp_path: Path, solver: Any, size: fl
         result = simulate(model, 2 * math.pi, rtol=1e-9, atol=1e-12 * size, solver=solver)
         for time, wanted in ((math.pi / 2, part), (math.pi, max(part - 1, -part)), (2 * math.pi, min(1 - part, part))):
             assert result.at(time)["y"] == pytest.approx(wanted * size, abs=1e-7 * size)
+
+
+def test_what_changes_all_the_time_has_a_value_before_an_event(tmp_path: Path) -> None:
+    """A slope begins anew from where the one before has come to, also where that was not at its end."""
+    result = run(tmp_path, """
+model A
+  parameter Real rate = 2;
+  discrete Real begun(start = 0, fixed = true), from(start = 1, fixed = true), to(start = 1, fixed = true);
+  Real size = if time < begun + 0.5 then from + (to - from)*(time - begun)*rate else to;
+  Real y = 3*size + x;
+  Real x(start = 0, fixed = true);
+equation
+  der(x) = 1;
+  when {time > 0.25, time > 0.5, time > 1.5} then
+    from = pre(size);
+    to = pre(y);
+    begun = time;
+  end when;
+end A;
+""", 3.0)  # fmt: skip
+    first = 1.0, 3.25  # at 0.25 s: size is 1, y is 3 + 0.25
+    second = first[0] + (first[1] - first[0]) * 0.25 * 2
+    third = 3 * second + 0.5  # what it has come to until 1.5 s
+    assert result.at(1.5)["size"] == pytest.approx(third, abs=1e-9)
+    assert (result.final["from"], result.final["to"]) == pytest.approx((third, 3 * third + 1.5), abs=1e-9)
