@@ -115,16 +115,28 @@ static int start_is_met(const Instance *c) {
     return 1;
 }
 
-/* Newton's method on the equations between free states, the variables that follow from them, and start values. */
-static Result solve_start_system(Instance *c) {
+/* Where the search begins: free states, and zeros for the variables that follow from them, or what follows. Each pass
+ * gives the next of these its value. */
+static void place_start(Instance *c, int follow) {
+    const Model *m = c->model;
+    double *y = c->slots + m->slot_y;
+    memcpy(c->x, c->first, (size_t)m->n_unknowns * sizeof(double));
+    memset(y, 0, m->n_y * sizeof(double));
+    for (int pass = 0, changed = follow; pass <= m->n_y && changed; pass++) {
+        evaluate_now(c, &m->tapes.start_system, c->start_residual);
+        changed = 0;
+        for (int k = 0; k < m->n_y; k++)
+            if (isfinite(c->start_residual[k]) && c->start_residual[k] != 0) y[k] -= c->start_residual[k], changed = 1;
+    }
+}
+
+/* Newton's method on the equations between free states, the variables that follow from them, and start values. Tells
+ * whether it came to rest. */
+static int newton_start(Instance *c) {
     const Model *m = c->model;
     int n = m->n_start_unknowns, met = 1;
     double *step = c->start_unknowns, *error = c->start_errors, *sizes = c->start_sizes;
-    if (n == 0) return RESULT_OK;
-    memset(c->slots + m->slot_y, 0, m->n_y * sizeof(double));
     memset(sizes, 0, (size_t)n * sizeof(double));
-    for (int k = 0; k < m->n_start_zero; k++) c->x[m->start_zero[k]] = 0;
-    memcpy(c->first, c->x, (size_t)m->n_unknowns * sizeof(double));
     for (int round = 0; round < MAX_NEWTON; round++) {
         double change = 0;
         int rounding = 1;
@@ -146,11 +158,21 @@ static Result solve_start_system(Instance *c) {
         measure_rows(c, sizes);
         if (change <= 1e-13) break;
     }
-    if (met && start_is_met(c)) return RESULT_OK;
-    memset(c->slots + m->slot_y, 0, m->n_y * sizeof(double));
-    memcpy(c->x, c->first, (size_t)m->n_unknowns * sizeof(double));
-    if (damp_start(c) && start_is_met(c)) return RESULT_OK;
-    memcpy(c->x, c->first, (size_t)m->n_unknowns * sizeof(double)); /* where it began, for the message */
+    return met;
+}
+
+static Result solve_start_system(Instance *c) {
+    const Model *m = c->model;
+    if (m->n_start_unknowns == 0) return RESULT_OK;
+    for (int k = 0; k < m->n_start_zero; k++) c->x[m->start_zero[k]] = 0;
+    memcpy(c->first, c->x, (size_t)m->n_unknowns * sizeof(double));
+    for (int follow = 0; follow < 2; follow++) {
+        place_start(c, follow);
+        if (newton_start(c) && start_is_met(c)) return RESULT_OK;
+        place_start(c, follow);
+        if (damp_start(c) && start_is_met(c)) return RESULT_OK;
+    }
+    place_start(c, 0); /* for the message */
     return fail(c, START_NOT_FOUND, 0);
 }
 

@@ -24,6 +24,11 @@ CASES: dict[str, tuple[str, dict[str, float]]] = {
         "Real x(start = 3.9); initial equation der(x) = 0; equation der(x) = x^2 - 5*x + 4;",
         {"x": 4},
     ),
+    "with coefficients that equations give: with zeros in their place no state has an influence": (
+        "Real a, b, x, v; initial equation der(x) = 0; der(v) = 0; "
+        "equation a = 3; b = a*a + 1; der(x) = v; der(v) = a^2*b*(0.5 - x) - 2*a*v;",
+        {"x": 0.5, "v": 0},
+    ),
     "in parts, by a parameter of theirs and from outside": (
         "model B parameter Real x0 = 3.9; Real x(start = x0); equation der(x) = x^2 - 5*x + 4; end B; "
         "B a, b(x0 = 0.5), c(x(start = 3.9)); initial equation der(a.x) = 0; der(b.x) = 0; der(c.x) = 0;",
