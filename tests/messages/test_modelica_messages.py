@@ -39,6 +39,7 @@ BUS = (
 )
 ENDLESS = "while true loop y := 1; end while"
 GROWING = "function f input Real u; output Real y; algorithm y := u; for i in 1:60 loop y := y*y + y; end for; end f;"
+DRAWN = 'function f input Integer a[:]; output Real y; external "C" y = ModelicaRandom_{}(a); end f;'
 TYPES = (
     "type M = enumeration(a, b); type N = enumeration(a, b); model B parameter Real k = 1; end B; "
     "record P parameter Real u = 1; parameter Real v = 1; end P;"
@@ -405,6 +406,16 @@ MESSAGES: dict[str, tuple[str, str]] = {
     "an order of two enumerations": (
         model("parameter M m = M.a; Real x;", "x = (if m < N.b then 1 else 0);", TYPES),
         "M.a and N.b have no order here: compare them by == or <>.\n  in a.mo:5 `x = (if m < N.b then 1 else 0);`",
+    ),
+    "a state of random numbers that is too short": (
+        model("Real x;", "x = f({1, 2});", DRAWN.format("xorshift128plus")),
+        "The state of xorshift128plus has 4 whole numbers, not 2.\n  in a.mo:5 `x = f({1, 2});`",
+    ),
+    "random numbers with a hidden state": (
+        model("Real x;", "x = f({1, 2});", DRAWN.format("impureRandom_xorshift1024star")),
+        "Random numbers whose state is hidden are not supported: draw them by "
+        "Modelica.Math.Random.Generators.Xorshift1024star.random, with a state of your own.\n"
+        "  in a.mo:5 `x = f({1, 2});`",
     ),
     "a large array": (
         model("Real v[100000000];"),

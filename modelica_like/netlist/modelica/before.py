@@ -39,6 +39,7 @@ class Before:
         self.others: list[Equation] = []
         self.sets: list[set[Node]] = []
         values: list[Equation] = []
+        begun_with = set[str]()
         for left, right, _ in (*equations, *initial):
             nodes = [node for node in (self._node(left), self._node(right)) if node is not None]
             if len(nodes) == 2:
@@ -55,27 +56,38 @@ class Before:
             names = self._befores(node) if node is not None else []
             if not names and is_discrete(left) and not uses_time(right):
                 names = [left.args[0][0]]
+                begun_with.update(names)
             if not names:
                 self.others.append((left, right, source))
             for name in names:
                 if self.memory.setdefault(name, right) != right:
                     raise ModelicaTextError(f"Initial equations give {name} two values.", where=source)
         for _ in self.memory:  # one may need that of another
-            self.memory = {name: self._known(value) for name, value in self.memory.items()}
-        self.memory = {name: value if uses_time(value) else evaluated(value) for name, value in self.memory.items()}
+            known = {name: self._known(value, begun_with) for name, value in self.memory.items()}
+            self.memory = {name: value if uses_time(value) else evaluated(value) for name, value in known.items()}
         self.late = {name: value for name, value in self.memory.items() if value.kind not in fold.KNOWN}
         self.memory = {name: value for name, value in self.memory.items() if name not in self.late}
 
-    def _known(self, value: Expr) -> Expr:
-        """Return a value with those before the start that are known in place of `pre(…)`."""
-        if value.kind == "call" and value.args[0] == "pre":
-            known = self.memory.get(value.args[1][0].args[0][0], value)
+    def _known(self, value: Expr, begun_with: set[str]) -> Expr:
+        """Return a value with those before the start that are known in place of `pre(…)`, and what begins with them."""
+        if value.kind == "native":
+            return fold.native(
+                value.args[0], tuple(self._known(each, begun_with) for each in value.args[1:]), value.line
+            )
+        before = value.kind == "call" and value.args[0] == "pre"
+        variable = value.args[1][0] if before else value
+        if before or (value.kind in ("name", "condition") and value.args[0][0] in begun_with):
+            known = self.memory.get(variable.args[0][0], value)
             return known if known.kind in fold.KNOWN else value
-        if value.kind in (*fold.KNOWN, "name", "condition", "call", "curve", "object"):
+        if value.kind in (*fold.KNOWN, "name", "condition", "call", "object"):
             return value
-        return (
-            fold.operation(value.kind, tuple(map(self._known, value.args)), value.line) if value.kind != "if" else value
-        )
+
+        def inner(operands: tuple[Expr, ...]) -> tuple[Expr, ...]:
+            return tuple(self._known(operand, begun_with) for operand in operands)
+
+        if value.kind == "shared":
+            return Expr("shared", (value.args[0], *inner(value.args[1:])), value.line)
+        return fold.operation(value.kind, inner(value.args), value.line) if value.kind != "if" else value
 
     def _befores(self, node: Node) -> list[str]:
         """Return the variables whose value before the start a node is."""

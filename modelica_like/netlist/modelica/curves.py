@@ -201,6 +201,7 @@ class Curve:
 
     table: Table
     values: Rows = field(repr=False)
+    whole = False
 
     def __call__(self, *inputs: Any) -> Any:
         """Return the value at inputs, which are numbers or in symbols."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from modelica_like.netlist.modelica.tree import Expr, joined, with_operands
@@ -38,6 +39,27 @@ LONGEST = 100_000
 """Elements of an array, and steps of an algorithm."""
 
 
+SLOT = "#"
+"""Before the number of an argument in the law of a function."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """The result of a function of arguments: an expression of slots."""
+
+    result: Expr
+
+    def of(self, arguments: tuple[Expr, ...]) -> Expr:
+        """Return the expression with arguments in the slots."""
+
+        def filled(node: Expr) -> Expr:
+            if node.kind in ("name", "condition"):
+                return arguments[int(node.args[0][0].removeprefix(SLOT))]
+            return with_operands(node, filled)
+
+        return filled(self.result)
+
+
 class Unfit(ValueError):
     """Operands do not fit, in words."""
 
@@ -49,6 +71,11 @@ def known(expression: Expr) -> Expr:
         taken = (value for condition, value in zip(args[:-1:2], args[1::2], strict=True) if condition.args[0])
         return next(taken, args[-1])
     return expression if expression.kind in KNOWN else operation(expression.kind, args, expression.line)
+
+
+def slot(place: int, condition: bool, line: int) -> Expr:
+    """Return what stands for an argument in a law."""
+    return Expr("condition" if condition else "name", ((f"{SLOT}{place}", ()),), line)
 
 
 def jumps(expression: Expr) -> bool:
@@ -154,6 +181,8 @@ def is_condition(expression: Expr) -> bool:
     """Whether a resolved expression is Boolean; all others are numbers, texts, arrays or choices."""
     if expression.kind == "if":
         return is_condition(expression.args[1])
+    if expression.kind == "shared":
+        return is_condition(expression.args[0].result)
     if expression.kind == "call":
         name, args, _ = expression.args
         same = name in _SAME_TYPE or (name == "sample" and len(args) == 1)
@@ -335,6 +364,13 @@ def each(name: str, args: tuple[Expr, ...], line: int, make: Callable[[tuple[Exp
 
 def _all_known(args: tuple[Expr, ...]) -> bool:
     return all(arg.kind == "number" for arg in args)
+
+
+def native(compute: Callable[..., Any], args: tuple[Expr, ...], line: int) -> Expr:
+    """Return what a function of Python makes of numbers: a number, or an expression that a run computes."""
+    if _all_known(args):
+        return number(float(compute(*(argument.args[0] for argument in args))), line)
+    return Expr("native", (compute, *args), line)
 
 
 def call(name: str, args: tuple[Expr, ...], line: int) -> Expr:

@@ -10,13 +10,15 @@ from modelica_like.netlist.modelica.algorithms import Algorithm
 from modelica_like.netlist.modelica.instance import GIVE, Given, Instance, refused
 from modelica_like.netlist.modelica.members import value_of
 from modelica_like.netlist.modelica.natives import NATIVE
-from modelica_like.netlist.modelica.tree import ClassText, Empty, Expr
+from modelica_like.netlist.modelica.tree import ClassText, Empty, Expr, with_operands
 from modelica_like.netlist.modelica.types import basic_type, is_external_object, misfit
 
 if TYPE_CHECKING:
     from modelica_like.netlist.modelica.resolve import Resolver
 
 _DEEPEST = 30
+_LARGE = 1000
+"""Numbers, names and operations of a result; a larger one is written once for all that use it."""
 
 
 def _filled(value: Expr, shape: tuple[Expr, ...], line: int) -> Expr:
@@ -187,8 +189,31 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
         return _record(resolver, text, given, named)
     if resolver.depth > _DEEPEST:
         raise refused(f"{name}, which calls itself,", resolver.text, line)
-    result = _Call(resolver, text).result(given, named, line)
-    return fold.quiet(result)
+    result = fold.quiet(_Call(resolver, text).result(given, named, line))
+    return result if result.size <= _LARGE else _shared(resolver, text, given, named, line)
+
+
+def _shared(resolver: Resolver, text: ClassText, given: tuple[Expr, ...], named: Mapping[str, Expr], line: int) -> Expr:
+    """Return the result of a function whose law is large: its arguments stand beside it, once each."""
+    arguments: list[Expr] = []
+
+    def opened(value: Expr) -> Expr:
+        if value.kind == "array":
+            return Expr("array", tuple(map(opened, value.args)), value.line)
+        if value.kind in (*fold.KNOWN, "record", "object"):
+            return value
+        arguments.append(value)
+        return fold.slot(len(arguments) - 1, fold.is_condition(value), value.line)
+
+    values, others = tuple(map(opened, given)), {key: opened(value) for key, value in named.items()}
+    law = fold.quiet(_Call(resolver, text).result(values, others, line))
+
+    def closed(value: Expr) -> Expr:
+        if value.kind in ("array", "tuple", "record"):
+            return with_operands(value, closed)
+        return value if value.kind in fold.KNOWN else Expr("shared", (fold.Law(value), *arguments), line)
+
+    return closed(law)
 
 
 def _record(resolver: Resolver, text: ClassText, given: tuple[Expr, ...], named: Mapping[str, Expr]) -> Expr:
@@ -206,7 +231,7 @@ def _eventful(argument: Expr) -> Expr:
     """Return an argument as it is inlined: its own relations make the events that they make outside."""
     if argument.kind == "array":
         return Expr("array", tuple(map(_eventful, argument.args)), argument.line)
-    kept = argument.kind in ("record", "object", "curve") or not fold.jumps(argument)
+    kept = argument.kind in ("record", "object", "native") or not fold.jumps(argument)
     return argument if kept else fold.call(fold.ARGUMENT, (argument,), argument.line)
 
 

@@ -165,6 +165,11 @@ class Instance:
         before = self.owner.path if self.owner else ""
         return f"{before}.{self.name}" if before else self.name
 
+    @property
+    def full_name(self) -> str:
+        """Name of the model, and the path of the instance in it."""
+        return f"{self.owner.full_name}.{self.name}" if self.owner else self.text.name
+
     def find(self, name: str, text: ClassText) -> Found | None:
         """Return the class that a name means, with classes that were redeclared."""
         head, _, rest = name.partition(".")

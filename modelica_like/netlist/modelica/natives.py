@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import secrets
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.curves import CONSTANT, LINEAR, NEVER, Axis, Table, read_rows
 from modelica_like.netlist.modelica.fold import Unfit
 from modelica_like.netlist.modelica.tree import ClassText, Expr
+from modelica_like.netlist.modelica.xorshift import NAMES, draw
 
 if TYPE_CHECKING:
     from modelica_like.netlist.modelica.classes import Classes
@@ -72,9 +74,7 @@ def _value(*inputs: str) -> Native:
             raise Unfit("A table without extrapolation is not supported: choose what holds beyond its ends")
         output = int(given["icol"].args[0]) if "icol" in given else 0
         curve, values = table.curve(output), [given[name] for name in inputs]
-        if all(value.kind == "number" for value in values):
-            return fold.number(float(curve(*(value.args[0] for value in values))), line)
-        return Expr("curve", (curve, *values), line)
+        return fold.native(curve, tuple(values), line)
 
     return make
 
@@ -112,12 +112,38 @@ def _of_texts(compute: Callable[..., Any]) -> Native:
     return make
 
 
+def _drawn(name: str) -> Native:
+    return lambda classes, given, line: draw(name, next(iter(given.values())), line)
+
+
+def _hidden(classes: Classes, given: Arguments, line: int) -> Expr:
+    raise Unfit(
+        "Random numbers whose state is hidden are not supported: "
+        "draw them by Modelica.Math.Random.Generators.Xorshift1024star.random, with a state of your own"
+    )
+
+
+def _hash(string: str) -> int:
+    """Return the hash of a text after Partow (2002), as a whole number of 32 bits with a sign."""
+    value = 0xAAAAAAAA
+    for k, byte in enumerate(string.encode()):
+        mixed = ~((value << 11) + (byte ^ value >> 5)) if k % 2 else value << 7 ^ byte * (value >> 3)
+        value = (value ^ mixed) & 0xFFFFFFFF
+    return value - (value >> 31 << 32)
+
+
+def _seed(classes: Classes, given: Arguments, line: int) -> Expr:
+    """Return a seed that differs from reading to reading."""
+    return fold.number(1 + secrets.randbelow(2**31 - 1), line)
+
+
 def _cased(text: str, caseSensitive: bool) -> str:
     return text if caseSensitive else text.lower()
 
 
 _STRINGS = "Modelica.Utilities.Strings."
 _TABLES = "ModelicaStandardTables_"
+_RANDOM = "ModelicaRandom_"
 NATIVE: dict[str, Native] = {
     f"{_TABLES}CombiTimeTable_init3": _table(True, 1),
     f"{_TABLES}CombiTable1D_init3": _table(False, 1),
@@ -128,6 +154,10 @@ NATIVE: dict[str, Native] = {
     f"{_TABLES}CombiTimeTable_nextTimeEvent": lambda classes, given, line: fold.number(_LAST, line),
     f"{_TABLES}CombiTimeTable_minimumTime": _end(0), f"{_TABLES}CombiTimeTable_maximumTime": _end(-1),
     f"{_TABLES}CombiTable1D_minimumAbscissa": _end(0), f"{_TABLES}CombiTable1D_maximumAbscissa": _end(-1),
+    **{f"{_RANDOM}{name}": _drawn(name) for name in NAMES},
+    f"{_RANDOM}setInternalState_xorshift1024star": lambda classes, given, line: Expr("tuple", (), line),
+    f"{_RANDOM}impureRandom_xorshift1024star": _hidden, f"{_RANDOM}automaticGlobalSeed": _seed,
+    "ModelicaStrings_hashString": _of_texts(_hash),
     "Modelica.Utilities.Files.loadResource": _path,
     "ModelicaServices.ExternalReferences.loadResource": _path,
     f"{_STRINGS}length": _of_texts(lambda string: len(string)),

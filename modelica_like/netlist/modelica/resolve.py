@@ -53,6 +53,12 @@ class Resolver:
             return self._name(Expr("name", args, line))
         if kind == "call":
             return self._call(expression)
+        if kind == "native":
+            return fold.native(args[0], tuple(map(self, args[1:])), line)
+        if kind == "shared":
+            values = tuple(map(self, args[1:]))
+            known = all(value.kind in fold.KNOWN for value in values)
+            return self(args[0].of(values)) if known else Expr("shared", (args[0], *values), line)
         if kind == "part":  # of a record that an expression gives
             whole = self(args[0])
             if whole.kind != "record" or args[1] not in whole.args[0]:
@@ -362,6 +368,11 @@ class Resolver:
             raise ModelicaTextError(what, where=self.text.place(line))
         if named and short in {*ARGUMENTS, *KEPT, *functions.OF_ARRAYS, *ELEMENTARY}:
             raise ModelicaTextError(f"{short}(…) has no argument '{named[0][0]}'.", where=self.text.place(line))
+        if short in (fold.SILENT, fold.ARGUMENT):
+            value = self(given[0])
+            return value if value.kind in fold.KNOWN else fold.call(short, (value,), line)
+        if short == "getInstanceName" and self.instance is not None:
+            return Expr("string", (self.instance.full_name,), line)
         if short == "homotopy":
             others = dict(named)
             return self._homotopy([*given, *(others[key] for key in ("actual", "simplified") if key in others)], line)

@@ -12,8 +12,8 @@ from modelica_like.netlist.modelica.tree import ClassText, Expr, Extends
 
 SCALARS = ("Real", "Integer", "Boolean", "String")
 _FIT = {
-    "Real": ("number", "+", "-", "*", "/", "^", "neg", "curve"),
-    "Integer": ("number", "+", "-", "*", "/", "^", "neg"),
+    "Real": ("number", "+", "-", "*", "/", "^", "neg", "native"),
+    "Integer": ("number", "+", "-", "*", "/", "^", "neg", "native"),
     "Boolean": (),
     "String": ("string",),
     "enumeration": ("literal",),
@@ -120,6 +120,8 @@ def misfit(value: Expr, basic: Basic) -> str:
             other = not condition if basic.kind == "Boolean" else leaf.kind not in _FIT[basic.kind]
         if basic.kind == "Integer" and leaf.kind == "number":
             other = leaf.args[0] != math.floor(leaf.args[0])
+        if basic.kind == "Integer" and leaf.kind == "native":
+            other = not leaf.args[0].whole
         if leaf.kind == "literal" and not other:
             kind = str(leaf.args[0]).rpartition(".")[0]
             other = kind != basic.enumeration
@@ -131,7 +133,9 @@ def misfit(value: Expr, basic: Basic) -> str:
 def _leaves(value: Expr) -> Iterator[Expr]:
     """Yield the elements of arrays, and the values of the branches of an `if`."""
     inner = {"array": value.args, "if": (*value.args[1::2], value.args[-1])} if value.args else {}
-    if value.kind not in ("array", "if"):
+    if value.kind == "shared":
+        yield from _leaves(value.args[0].result)
+    elif value.kind not in ("array", "if"):
         yield value
     for item in inner.get(value.kind, ()):
         yield from _leaves(item)

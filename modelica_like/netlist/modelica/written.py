@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -42,7 +42,7 @@ from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import InsideAssembly, inside
-from modelica_like.netlist.modelica.fold import SILENT
+from modelica_like.netlist.modelica.fold import SILENT, SLOT
 from modelica_like.netlist.modelica.tree import Expr as Node
 
 MEMORY = "_condition"
@@ -89,6 +89,7 @@ class InsideWritten(InsideAssembly):
         initial: likewise, of its initial equations.
         happenings: its whens and assertions.
         instants: Boolean signals that are true for instants only.
+        slots: arguments, in symbols, of the laws of functions that are being written.
     """
 
     text: str = ""
@@ -96,6 +97,7 @@ class InsideWritten(InsideAssembly):
     initial: tuple[tuple[Node, Node, Source], ...] = ()
     happenings: tuple[Happening, ...] = ()
     instants: frozenset[str] = frozenset()
+    slots: list[list[Any]] = field(default_factory=list[list[Any]])
 
 
 class Written(Assembly):
@@ -184,13 +186,20 @@ class Written(Assembly):
             return ca.SX(args[0])
         if kind == "boolean":
             return ca.SX(1.0 if args[0] else 0.0)
+        if kind in ("name", "condition") and args[0][0].startswith(SLOT):
+            return self._inside.slots[-1][int(args[0][0].removeprefix(SLOT))]
+        if kind == "shared":
+            self._inside.slots.append([self.symbolic(argument, events) for argument in args[1:]])
+            result = self.symbolic(args[0].result, events)
+            self._inside.slots.pop()
+            return result
         if kind == "name":
             return self._symbol(args[0][0])
         if kind == "condition":
             symbol = self._remembered(args[0][0])
             discrete = isinstance(symbol.owner.fields[symbol.name], Discrete)
             return symbol if discrete else ca.SX(symbol) > 0.5
-        if kind == "curve":
+        if kind == "native":
             return args[0](*(self.symbolic(argument, events) for argument in args[1:]))
         if kind == "if":
             result = self.symbolic(args[-1], events)
