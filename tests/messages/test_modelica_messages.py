@@ -8,6 +8,7 @@ from modelica_like import build, export_html, load, simulate, split
 from modelica_like.errors import (
     ComponentUnbalanced,
     ExportError,
+    LanguageError,
     ModelicaLikeError,
     ModelicaTextError,
     SingularAtStart,
@@ -612,6 +613,17 @@ def test_a_formula_with_names_inside_and_outside_of_a_class(tmp_path: Path, chec
         "Give it a number."
     )
     check_message(ModelicaTextError, lambda: modelica_text(load(tmp_path / "drive.toml")), told)
+
+
+def test_a_parameter_of_which_arrays_are_made(tmp_path: Path, check_message) -> None:
+    (tmp_path / "a.mo").write_text(model("parameter Real a = 1; parameter Real v[2] = {a, 2*a}; Real x = v[2];"))
+    (tmp_path / "drive.toml").write_text('[parts]\nb = { is = "./a.mo:A", a = 3 }\n')
+    told = (
+        "A.a was read as a number, of which others were made, and cannot change afterwards.\n"
+        '  in drive.toml:2 `b = { is = "./a.mo:A", a = 3 }`\n'
+        "Change it in the text, or extend the class with this value under a name of its own."
+    )
+    check_message(LanguageError, lambda: load(tmp_path / "drive.toml"), told)
 
 
 def test_parameters_for_which_other_equations_hold(tmp_path: Path, check_message) -> None:

@@ -17,6 +17,14 @@ if TYPE_CHECKING:
 Branches = list[tuple[Expr | None, list[Statement]]]
 
 
+class OpenLoop(ModelicaTextError):
+    """How often a loop runs is not known when the text is read."""
+
+
+def _open(what: str, text: ClassText, line: int) -> OpenLoop:
+    return OpenLoop(refused(what, text, line).what, where=text.place(line))
+
+
 class Algorithm:
     """Statements and what they know.
 
@@ -95,7 +103,7 @@ class Algorithm:
         """Whether a loop goes on; that must be known when the text is read."""
         holds = self.here()(loop.parts[0])
         if holds.kind != "boolean":
-            raise refused("a 'while' whose end only a run knows", self.text, loop.line)
+            raise _open("a 'while' whose end only a run knows", self.text, loop.line)
         return holds.args[0]
 
     def insist(self, statement: Statement) -> None:
@@ -180,7 +188,7 @@ class Algorithm:
         if holds.kind == "boolean":
             return self.run(statements) if holds.args[0] else self.branch(branches[1:], line)
         if self.loops and any(_leaves(body) for _, body in branches):
-            raise refused("a loop that ends where only a run knows", self.text, line)
+            raise _open("a loop that ends where only a run knows", self.text, line)
         before = dict(self.local)
         self.run(statements)
         taken, self.local = self.local, before

@@ -255,7 +255,12 @@ class _Builder:
         # What depends on a parameter of the initial equations is another one, by an equation of its own.
         follows = fixed and not outside and formula is not None and bool(undetermined(self.instance, formula))
         parameter = param(
-            unit_of(basic, self.notes), member.declaration.description, min=low, max=high, fixed=fixed and not follows
+            unit_of(basic, self.notes),
+            member.declaration.description,
+            min=low,
+            max=high,
+            fixed=fixed and not follows,
+            tunable=name not in self.instance.frozen,
         )
         if follows and formula is not None:
             place = member.text.place(member.declaration.line)
@@ -263,6 +268,8 @@ class _Builder:
         elif given.value is not None and not outside:
             parameter.default = self._value(given, self.instance, "")
         parameter.nominal = nominal_of(basic)
+        if isinstance(parameter, Parameter):
+            self.instance.parameters[name] = parameter
         declare(self.component, name, parameter)
         if given.value is not None and outside:
             demand_determined(f"{self.instance.path}.{name}".lstrip("."), given)

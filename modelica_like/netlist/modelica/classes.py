@@ -99,6 +99,16 @@ class Classes:
         self.steps = 0
         self.lacking: dict[str, str] = {}
         self.untabled: set[str] = set()
+        self.only_said = False
+
+    @contextmanager
+    def saying(self) -> Generator[None]:
+        """Read values that only describe, such as units and limits: parameters in them may change afterwards."""
+        before, self.only_said = self.only_said, True
+        try:
+            yield
+        finally:
+            self.only_said = before
 
     def chosen(self, name: str = "") -> ClassText:
         """Return the class to read: the one of this name, or the last model of the file.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from modelica_like.errors import ModelicaTextError, Source, UnknownName, did_you_mean
+from modelica_like.language.fields import Parameter
 from modelica_like.netlist.modelica.classes import Classes, Found
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.tree import (
@@ -130,6 +131,8 @@ class Instance:
         adopted: equations of parts that use what is in this instance.
         own_pairs: ends that its equations connect, once they are known.
         pairs: likewise, without those of `outer` parts, with those of parts with its `inner` ones.
+        frozen: parameters whose values are in what was read.
+        parameters: of its component.
         lent: own discrete variables whose equations stand in an instance above.
         driving: protected signals that drive parts.
         bus_wires: connections of variables of buses that go no further up.
@@ -148,6 +151,8 @@ class Instance:
         self.folded: set[str] = set()
         self.free: dict[str, str] = {}
         self.values: dict[str, Expr] = {}
+        self.frozen: set[str] = set()
+        self.parameters: dict[str, Parameter] = {}
         self.adopted: list[tuple[Expr, Expr, Source]] = []
         self.own_pairs: list[tuple[str, str, Source]] | None = None
         self.pairs: list[tuple[str, str, Source]] | None = None
@@ -164,6 +169,13 @@ class Instance:
         """Dotted name from the outermost instance."""
         before = self.owner.path if self.owner else ""
         return f"{before}.{self.name}" if before else self.name
+
+    def freeze(self, name: str) -> None:
+        """Note that what was read has the value of a parameter: it cannot change afterwards."""
+        if not self.classes.only_said:
+            self.frozen.add(name)
+            if name in self.parameters:
+                self.parameters[name].tunable = False
 
     @property
     def full_name(self) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from modelica_like.errors import ModelicaTextError, did_you_mean
 from modelica_like.language.inside import declarations
-from modelica_like.netlist.modelica import constants, fold, members
+from modelica_like.netlist.modelica import algorithms, constants, fold, members
 from modelica_like.netlist.modelica.calls import ARGUMENTS, ELEMENTARY, KEPT, REFUSED
 from modelica_like.netlist.modelica.classes import Classes
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
@@ -286,6 +286,8 @@ class Resolver:
         declared = member.declaration
         fixed = {"parameter", "constant"} & declared.prefixes
         if fixed and (self.numeric or basic.kind != "Real" or declared.dimensions or "constant" in fixed):
+            if self.numeric:
+                owner.freeze(declared.name)
             return self.indexed(members.value_of(owner, declared.name, self.text, line), subscripts, line)
         if not declared.dimensions:
             if subscripts:
@@ -396,7 +398,14 @@ class Resolver:
         if short in ELEMENTARY:
             return self._told(lambda: fold.function(short, values, line), line)
         others = {key: self(argument) for key, argument in named}
-        return self._told(lambda: functions.called(self, expression, values, others), line)
+        try:
+            return self._told(lambda: functions.called(self, expression, values, others), line)
+        except algorithms.OpenLoop as error:
+            if self.instance is None:
+                raise
+            if self.numeric:
+                raise ModelicaTextError(error.what, where=error.where) from None
+            return self.known()(expression)  # parameters are numbers then, and cannot change afterwards
 
     def _homotopy(self, given: list[Expr], line: int) -> Expr:
         """Resolve a homotopy; one of arrays element by element."""

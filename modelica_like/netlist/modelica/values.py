@@ -36,7 +36,10 @@ def value_of(given: Given | None) -> Expr | None:
 
 def known(given: Given | None) -> Any:
     """Return the value of an attribute, None if it has none."""
-    value = value_of(given)
+    if given is None or given.scope is None:
+        return None
+    with given.scope[0].classes.saying():
+        value = value_of(given)
     return value.args[0] if value is not None and value.args else None
 
 
