@@ -11,6 +11,36 @@ Side = Literal["W", "E", "N", "S"]
 
 
 @dataclass(frozen=True, slots=True)
+class Figure:
+    """A coloured shape of a symbol, drawn for white paper, or a text.
+
+    Attributes:
+        data: SVG path data; of a text empty.
+        line: colour of the outline or of the letters, `#rrggbb`, empty for none.
+        fill: colour of the area, empty for none.
+        shade: `across` or `along` for an area that looks like a cylinder lying or standing, `round` like a ball: as
+            bright as `fill` in the middle, as dark as `line` outside.
+        width: of the outline.
+        dashes: lengths of dashes and gaps, empty for a solid line.
+        text: letters; `%name` of a parameter is its value.
+        at: middle of the text.
+        size: width and height that the text may have.
+        turn: degrees by which the text is turned clockwise.
+    """
+
+    data: str = ""
+    line: str = ""
+    fill: str = ""
+    shade: Literal["", "across", "along", "round"] = ""
+    width: float = 1.0
+    dashes: str = ""
+    text: str = ""
+    at: tuple[float, float] = (0.0, 0.0)
+    size: tuple[float, float] = (0.0, 0.0)
+    turn: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Icon:
     """The symbol of a component, around (0, 0), with y downwards, in units of 1/96 inch.
 
@@ -28,6 +58,8 @@ class Icon:
         key: parameters; the first given one is written below the name.
         named: whether names are written at the ports.
         at_ports: whether the symbol is drawn at each connected connector, like a ground, instead of as a part.
+        figures: coloured shapes, in this order.
+        tips: where the lines of ports end inside, if not at the side.
     """
 
     width: float
@@ -41,6 +73,8 @@ class Icon:
     key: tuple[str, ...] = ()
     named: bool = False
     at_ports: bool = False
+    figures: tuple[Figure, ...] = ()
+    tips: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
 
 
 @dataclass(frozen=True, slots=True)

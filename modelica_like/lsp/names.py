@@ -38,6 +38,7 @@ class Owner:
         about: name and description.
         fields: by name, as the connectors and parts.
         values: schemas of what a part can be given, by name.
+        part: an assembly of a file itself.
     """
 
     kind: type[Component]
@@ -46,6 +47,7 @@ class Owner:
     connectors: Mapping[str, Connector]
     parts: Mapping[str, Component | list[Component]]
     values: Mapping[str, Mapping[str, Any]]
+    part: Component | None = None
 
     def ends(self) -> dict[str, str]:
         """Return descriptions of connectors and signals by name."""
@@ -67,7 +69,7 @@ def owner_of(part: type[Component] | Component) -> Owner:
         about = f"{inside(part).name}\n\n{inside(part).description}"
         values = {name: {"description": field.description, "default": _written(field)} for name, field in
                   part.fields.items()}  # fmt: skip
-        return Owner(kind, about.strip(), part.fields, part.connectors, part.parts, values)
+        return Owner(kind, about.strip(), part.fields, part.connectors, part.parts, values, part)
     known = declarations(kind)
     return Owner(kind, about_type(kind), known.fields, known.connectors, known.parts, properties_of(kind))
 

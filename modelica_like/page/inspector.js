@@ -153,7 +153,8 @@ function titleOf(name, kind, known) {
   const about = first ? [rest.join("").trim() ? element("details", { className: "about" }, element("summary", {},
     first), element("pre", {}, rest.join("\n").trim()))
     : element("p", { className: "about" }, first)] : [];
-  return [title, element("div", { className: "row" }, element("span", { className: "kind" }, kind), button("Replace …",
+  return [title, element("div", { className: "row" }, ...(known?.symbol ? [pictureOf(known.symbol)] : []),
+    element("span", { className: "kind" }, kind), button("Replace …",
     () => replacing(head(name)), "Another type"),
     ...(known && !openable(name) ? [button("Page", () => showPage(kind), "All about the type, with its equations")] : []),
     button("Duplicate", duplicateChosen, "Ctrl+D"), ...(openable(name) ? [button("Open", () => openPart(name),

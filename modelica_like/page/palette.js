@@ -17,10 +17,15 @@ async function search(words = at("search").value.trim()) {
   at("found").replaceChildren(...entries, ...groups, ...more);
 }
 
-function entryOf({ kind, group, about, symbol }) {
+function pictureOf(symbol) {
   const picture = element("span", { className: "symbol" });
   if (symbol) picture.append(document.adoptNode(new DOMParser().parseFromString(symbol,
     "image/svg+xml").documentElement));
+  return picture;
+}
+
+function entryOf({ kind, group, about, symbol }) {
+  const picture = pictureOf(symbol);
   const button = element("button", { className: "entry", title: `${kind} (${group})\n${about}` }, picture,
     element("span", {}, element("b", {}, kind.replace("./", "").replace(/([a-z])([A-Z])/g, "$1\u200b$2")),
       element("small", {}, about)));

@@ -98,7 +98,7 @@ def described(owner: Owner) -> dict[str, Any]:
     Returns:
         `about`, its text; `values`, rows with `name`, `about`, `unit` and `units` like it, `default`, `least`, `most`,
         `choices`, `sort` (parameter, input, start, mode, structure, table) and, of tables, `columns`; `ends` with
-        their descriptions; `parts`, names of the parts inside.
+        their descriptions; `parts`, names of the parts inside; `symbol`, of a class of Modelica text that draws one.
     """
     known, schemas = declarations(owner.kind), owner.values
     values: list[dict[str, Any]] = []
@@ -118,7 +118,8 @@ def described(owner: Owner) -> dict[str, Any]:
             "columns": _columns(schema) if name in known.tables else [],
         })  # fmt: skip
     inner = [name for name in owner.parts if known.parts or not name.endswith("]")]
-    return {"about": owner.about, "values": values, "ends": owner.ends(), "parts": inner}
+    drawn = {"symbol": symbol(owner.part)} if owner.part is not None and owner.part.icon is not None else {}
+    return {"about": owner.about, "values": values, "ends": owner.ends(), "parts": inner} | drawn
 
 
 def class_page(kind: type[Component]) -> dict[str, str]:

@@ -35,6 +35,7 @@ from modelica_like.netlist.modelica.carried import Carried
 from modelica_like.netlist.modelica.causal import is_causal, variables
 from modelica_like.netlist.modelica.connectors import bundle, connector_of, lend
 from modelica_like.netlist.modelica.fold import numbered
+from modelica_like.netlist.modelica.icons import icon_of
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
 from modelica_like.netlist.modelica.library import Known, connector_type
@@ -117,7 +118,7 @@ class _Builder:
             self.carried.along(wire)
         record, statements = inside(component), self.statements
         equations = (*statements.equations, *self.instance.adopted, *self.carried.equations)
-        record.text, record.statements = text.path, equations
+        record.text, record.statements, record.icon = text.path, equations, icon_of(self.instance)
         record.elsewhere, record.lent = frozenset(self.instance.lent), self.instance.balance
         record.initial, record.happenings = tuple(statements.initial), tuple(statements.happenings)
         record.instants = frozenset(name for name, (_, instant) in statements.outputs.items() if instant)

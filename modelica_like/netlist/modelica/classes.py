@@ -96,6 +96,7 @@ class Classes:
         self.found: dict[tuple[int, str], Found | None] = {}
         self.inherited: dict[tuple[int, int], ClassText] = {}
         self.holders: dict[int, Any] = {}
+        self.drawn: dict[tuple[int, ...], Any] = {}
         self.steps = 0
         self.lacking: dict[str, str] = {}
         self.untabled: set[str] = set()

@@ -138,6 +138,7 @@ class Instance:
         bus_wires: connections of variables of buses that go no further up.
         bus_equations: own signals that are equal to variables of buses.
         balance: equations of continuous variables that are lent, less those that are adopted.
+        lineage: its class and the bases, these first.
     """
 
     def __init__(
@@ -158,6 +159,7 @@ class Instance:
         self.pairs: list[tuple[str, str, Source]] | None = None
         self.lent: set[str] = set()
         self.balance = 0
+        self.lineage: list[ClassText] = []
         self.driving: set[str] = set()
         self.bus_wires: list[tuple[tuple[str, ...], Source]] = []
         self.bus_equations: list[tuple[str, str, Source]] = []
@@ -246,6 +248,7 @@ class Instance:
                 names |= self._extend(element, text, outer, depth)
             elif not isinstance(element, Import) and "redeclare" not in element.prefixes:
                 self._declare(element, text, outer)
+        self.lineage.append(text)
         self.equations += [(equation, text) for equation in text.equations]
         self.initial_equations += [(equation, text) for equation in text.initial_equations]
         self.algorithm += [(statement, text) for statement in text.algorithm]

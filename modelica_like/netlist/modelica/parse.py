@@ -6,7 +6,7 @@ from typing import Any
 
 from modelica_like.errors import ModelicaTextError
 from modelica_like.netlist.modelica.expressions import Expressions
-from modelica_like.netlist.modelica.tokens import KINDS, SECTIONS
+from modelica_like.netlist.modelica.tokens import KINDS, SECTIONS, Token
 from modelica_like.netlist.modelica.tree import (
     Argument,
     ClassText,
@@ -39,6 +39,17 @@ def parse_modelica(text: str, file: str) -> list[ClassText]:
     except ModelicaTextError as error:
         located = error if error.where else parser.error(error.what, parser.line)
         raise located.with_traceback(None) from None  # hundreds of frames are no help, and too many for pickle
+
+
+def parse_tokens(tokens: list[Token]) -> Expr:
+    """Read one expression of tokens: what a part of an annotation says, as a call.
+
+    Raises:
+        ModelicaTextError: they are no expression.
+    """
+    parser = _Parser("", "")
+    parser.tokens = [*tokens, ("end of file", "", 0)]
+    return parser.expression()
 
 
 def parse_expression(text: str) -> Expr:
@@ -120,7 +131,7 @@ class _Parser(Expressions):
             while self.kind == "name":
                 literals.append(self.take("name"))
                 self.strings()
-                self.annotation(None)
+                self.annotation()
                 self.take(",")
             if self.take(":"):
                 class_text.unsupported.append(("an enumeration that is open", self.line))
@@ -138,7 +149,7 @@ class _Parser(Expressions):
             class_text.dimensions = self.subscripts() if self.kind == "[" else ()
             class_text.short = Extends(base, self.modification(), line)
         class_text.description = self.strings()
-        self.annotation(class_text)
+        self._about(class_text)
 
     def _composition(self, class_text: ClassText) -> None:
         hidden = False
@@ -147,7 +158,7 @@ class _Parser(Expressions):
             if word := self.take("public", "protected"):
                 hidden = word == "protected"
             elif self.kind == "annotation":
-                self.annotation(class_text)
+                self._about(class_text)
                 self.need(";")
             elif self.kind in ("initial", "equation", "algorithm"):
                 initial = bool(self.take("initial"))
@@ -176,10 +187,10 @@ class _Parser(Expressions):
         left = self.simple() if self.kind == "name" else Expr("all", (), line)
         right = self.expression() if self.take("=") else left
         class_text.external = right.args[0] if right.kind == "call" else class_text.name
-        self.annotation(None)
+        self.annotation()
         self.need(";")
         if self.kind == "annotation":
-            self.annotation(class_text)
+            self._about(class_text)
             self.need(";")
 
     def _element(self, class_text: ClassText, hidden: bool) -> None:
@@ -194,7 +205,7 @@ class _Parser(Expressions):
             return
         else:
             class_text.elements += self.declarations(hidden)
-        self.annotation(None)
+        self.annotation()
 
     def _is_element_class(self) -> bool:
         at = self.at
@@ -219,7 +230,7 @@ class _Parser(Expressions):
         self.dotted()
         modification = self.modification()
         self.strings()
-        self.annotation(None)
+        self.annotation()
         return modification
 
     def _import(self) -> Import:
@@ -267,7 +278,7 @@ class _Parser(Expressions):
         modification = self.modification()
         condition = self.expression() if self.take("if") else None
         declaration = Declaration(prefixes, type_name, name, dimensions, modification, condition, self.strings(), line)
-        self.annotation(None)
+        declaration.placement = self.part(self.annotation(), "Placement")
         return declaration
 
     # -- modifications -----------------------------------------------------------------------------------------------
@@ -298,28 +309,17 @@ class _Parser(Expressions):
         redeclared = self._element_class(self.current) if self.is_class() else self.declarations(single=True)[0]
         return Argument(redeclared.name, Modification(), line, each, redeclared, final)
 
-    def annotation(self, class_text: ClassText | None) -> None:
-        """Skip an annotation; that of a class may say how long to simulate."""
-        if not self.take("annotation"):
-            return
-        depth = 0
-        while True:
-            kind, text, line = self.tokens[self.at]
-            if text == "experiment" and kind == "name" and depth == 1 and class_text is not None:
-                self.at += 1
-                for argument in self.modification().arguments:
-                    value, sign = argument.modification.value, 1.0
-                    if value is not None and value.kind == "neg":
-                        value, sign = value.args[0], -1.0
-                    if value is not None and value.kind == "number":
-                        class_text.experiment[argument.name] = sign * value.args[0]
-                continue
-            if kind == "end of file":
-                self.refuse("An annotation has no end.", line)
-            self.at += 1
-            depth += (kind == "(") - (kind == ")")
-            if depth == 0:
-                return
+    def _about(self, class_text: ClassText) -> None:
+        """Read what the annotation of a class says about its picture, and how long to simulate."""
+        parts = self.annotation()
+        class_text.icon = self.part(parts, "Icon") or class_text.icon
+        if "experiment" in parts:
+            end, self.at = self.at, parts["experiment"].start
+            for name, value in self.expression().args[2]:
+                number, sign = (value.args[0], -1.0) if value.kind == "neg" else (value, 1.0)
+                if number.kind == "number":
+                    class_text.experiment[name] = sign * number.args[0]
+            self.at = end
 
     # -- equations and statements ------------------------------------------------------------------------------------
 
@@ -328,7 +328,7 @@ class _Parser(Expressions):
         while self.kind not in ("else", "elseif", "elsewhen") and self.kind not in SECTIONS:
             statements.append(self._statement())
             self.strings()
-            self.annotation(None)
+            self.annotation()
             self.need(";")
         return statements
 

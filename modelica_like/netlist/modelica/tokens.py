@@ -26,6 +26,8 @@ _RESERVED = frozenset(
     impure in initial inner input loop model not operator or outer output package parameter partial protected public
     pure record redeclare replaceable return stream then true type when while within time""".split()  # noqa: SIM905
 )
+_PARTS = ("Icon", "Placement", "experiment")
+"""Of annotations, that are read."""
 Token = tuple[str, str, int]
 """Kind (a sign and a keyword are their own kind), text, line."""
 
@@ -134,3 +136,26 @@ class Tokens:
                 break
             self.take("+")
         return "".join(texts)
+
+    def annotation(self) -> dict[str, range]:
+        """Skip an annotation; return where its parts stand that are read, each from its name to its bracket."""
+        parts: dict[str, range] = {}
+        if not self.take("annotation"):
+            return parts
+        depth = begin = 0
+        while True:
+            kind, _, line = self.tokens[self.at]
+            if kind == "end of file":
+                self.refuse("An annotation has no end.", line)
+            if depth == 1 and kind == "name":
+                begin = self.at
+            self.at += 1
+            depth += (kind == "(") - (kind == ")")
+            if depth == 1 and kind == ")" and (name := self.tokens[begin][1]) in _PARTS:
+                parts[name] = range(begin, self.at)
+            if depth == 0:
+                return parts
+
+    def part(self, parts: dict[str, range], name: str) -> list[Token]:
+        """Return the tokens of a part of an annotation, none if it has no such part."""
+        return [self.tokens[k] for k in parts.get(name, ())]

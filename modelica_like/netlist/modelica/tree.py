@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from modelica_like.errors import ModelicaTextError, Source
+from modelica_like.netlist.modelica.tokens import Token
 
 _DEEPEST = 300
 """Levels of an expression: all that reads it goes down in it by a few calls a level, of 1,000 that Python allows."""
@@ -118,6 +119,7 @@ class Declaration:
         dimensions: of an array; empty for a scalar.
         condition: whether it exists.
         constrained: modification behind `constrainedby`; it holds for what is redeclared, too.
+        placement: tokens of its annotation `Placement(…)`.
     """
 
     prefixes: frozenset[str]
@@ -129,6 +131,7 @@ class Declaration:
     description: str
     line: int
     constrained: Modification | None = None
+    placement: list[Token] = field(default_factory=list[Token])
 
     @property
     def is_outer(self) -> bool:
@@ -163,6 +166,7 @@ class ClassText:
         constrained: modification behind `constrainedby`.
         external: name of the function of another language that does the work.
         dimensions: of a short definition of an array, `type Axis = Real[3]`.
+        icon: tokens of the annotation `Icon(…)`.
         experiment: numbers of the annotation `experiment`, such as `StopTime`.
         file: it was read from.
         owner: enclosing class; at the outermost level None.
@@ -192,6 +196,7 @@ class ClassText:
     initial_equations: list[Statement] = field(default_factory=list)
     algorithm: list[Statement] = field(default_factory=list)
     experiment: dict[str, float] = field(default_factory=dict)
+    icon: list[Token] = field(default_factory=list)
     external: str = ""
     dimensions: tuple[Expr, ...] = ()
     expandable: bool = False

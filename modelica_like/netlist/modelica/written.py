@@ -17,6 +17,7 @@ from modelica_like.language import (
     Equations,
     Events,
     Expr,
+    Icon,
     assert_,
     change,
     clock,
@@ -90,6 +91,7 @@ class InsideWritten(InsideAssembly):
         happenings: its whens and assertions.
         instants: Boolean signals that are true for instants only.
         slots: arguments, in symbols, of the laws of functions that are being written.
+        icon: its symbol, of the annotations of its class.
     """
 
     text: str = ""
@@ -98,6 +100,7 @@ class InsideWritten(InsideAssembly):
     happenings: tuple[Happening, ...] = ()
     instants: frozenset[str] = frozenset()
     slots: list[list[Any]] = field(default_factory=list[list[Any]])
+    icon: Icon | None = None
 
 
 class Written(Assembly):
@@ -141,6 +144,11 @@ class Written(Assembly):
                 "of which others were made, and cannot change afterwards.",
                 advice="Change it in the text, or extend the class with this value under a name of its own.",
             )
+
+    @property
+    def icon(self) -> Icon | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The symbol that its class draws."""
+        return self._inside.icon
 
     def equations(self) -> Equations:
         """Yield the connections and the equations, each with its place in the text."""

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import cast
+from typing import TypeVar, cast
 
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.equation import Connection
 from modelica_like.language.expr import Symbol
-from modelica_like.language.fields import Input, Output
+from modelica_like.language.fields import Field, Input, Output
 from modelica_like.language.icon import PLAIN, SIGNAL, Icon, Side, Stroke
 from modelica_like.language.inside import declarations, inside
 from modelica_like.language.places import located
@@ -21,6 +22,7 @@ _USUAL: dict[str, Side] = {
 }  # fmt: skip
 _BESIDE = 9.0
 """Distance of ports at one place of a symbol, in 1/96 inch."""
+_Entry = TypeVar("_Entry")
 Notes = Callable[[Component], Sequence[str]]
 _OPPOSITE: dict[Side, Side] = {"W": "E", "E": "W", "N": "N", "S": "S"}
 
@@ -174,22 +176,29 @@ def _at_ports(node: Node) -> bool:
     return node.icon is not None and node.icon.at_ports
 
 
-def alone(kind: type[Component]) -> Node:
-    """Return a component type as a node, with the connectors that it always has and its signals as ports."""
-    node = Node("", None, kind.icon)
-    for name, connector in declarations(kind).connectors.items():
-        if not connector.optional:
-            side, along = _place(kind.icon, name, 0)
-            node.ports[name] = Port(name, node, side, along, connector.stroke or PLAIN)
-    for name, entry in declarations(kind).fields.items():
-        if isinstance(entry, Input | Output):
-            drives = 1 if isinstance(entry, Output) else -1
-            side, along = _place(kind.icon, name, drives)
-            node.ports[name] = Port(name, node, side, along, SIGNAL, drives)
+def alone(part: type[Component] | Component) -> Node:
+    """Return a component type, or a part, as a node without a name, with the ends that it always has as ports."""
+    if isinstance(part, Component):
+        node = Node("", part, part.icon)
+        ends = ends_of(node)
+    else:
+        known, node = declarations(part), Node("", None, part.icon)
+        ends = _ends_always(known.connectors, known.fields)
+    for name, stroke, drives in ends:
+        node.ports[name] = Port(name, node, *_place(node.icon, name, drives), stroke, drives)
     if node.icon is None:
         _box(node)
     _spread(node)
     return node
+
+
+def _ends_always(connectors: Mapping[str, Connector], fields: Mapping[str, Field]) -> Iterator[tuple[str, Stroke, int]]:
+    yield from (
+        (name, connector.stroke or PLAIN, 0) for name, connector in connectors.items() if not connector.optional
+    )
+    for name, entry in fields.items():
+        if isinstance(entry, Input | Output):
+            yield name, SIGNAL, 1 if isinstance(entry, Output) else -1
 
 
 def _opens(part: Component, depth: int) -> bool:
@@ -233,8 +242,13 @@ def _port(end: Connector | Symbol, scope: Component, nodes: dict[str, Node], out
     return node.ports[name]
 
 
+def find_entry(entries: Mapping[str, _Entry], name: str) -> _Entry | None:
+    """Return what a symbol says about a port; elements of an array, and ends within one, have the place of that."""
+    return entries.get(name) or entries.get(re.split(r"[\[.]", name)[0])
+
+
 def _place(icon: Icon | None, name: str, drives: int) -> tuple[Side, float]:
-    given = icon.ports.get(name) if icon else None
+    given = find_entry(icon.ports, name) if icon else None
     if given is not None:
         return (given, 0.0) if isinstance(given, str) else given
     return _USUAL.get(name, "E" if drives > 0 else "W"), 0.0

@@ -58,12 +58,13 @@ def labels(node: Node) -> list[tuple[str, float]]:
         for key in node.icon.key:
             value = node.component.value(key) if key in node.component.fields else None
             if value is not None and value.number is not None:
-                written.append((_shortened(f"{key} = {_told(value.given)}"), VALUE))
+                written.append((_shortened(f"{key} = {told(value.given)}"), VALUE))
                 break
     return written
 
 
-def _told(given: object) -> str:
+def told(given: object) -> str:
+    """Return a given value as it stands in pictures."""
     number, _, unit = str(given).partition(" ")
     try:
         text = f"{float(number):.5g} {unit}".rstrip()

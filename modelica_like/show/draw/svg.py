@@ -6,8 +6,10 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from xml.sax import saxutils
 
+from modelica_like.language.component import Component
 from modelica_like.language.icon import Icon, Stroke
-from modelica_like.show.draw.diagram import Port
+from modelica_like.show.draw.diagram import Port, find_entry
+from modelica_like.show.draw.figures import DARK, figures
 from modelica_like.show.draw.handles import end_handles, line_handle, part_attributes
 from modelica_like.show.draw.labels import NAME, VALUE, Text, meet
 from modelica_like.show.draw.running import HELD, OPEN, SLIDES, Running
@@ -50,6 +52,8 @@ def svg(
     strokes = {item.stroke.name: item.stroke for _, item in drawn.everything() if isinstance(item, Line)}
     dark = _DARK | {name: colour for name, (_, colour) in _LOOKS.items() if run.modes}
     rules = [f".{key}{{fill:{colour}}}.{key}-line{{stroke:{colour}}}" for key, colour in dark.items()]
+    icons = [item.node.icon for _, item in drawn.everything() if isinstance(item, Placed)]
+    rules += [DARK] if any(icon and icon.figures for icon in icons) else []
     rules += [f".{_css(s)}{{stroke:{s.dark}}}.{_css(s)}-dot{{fill:{s.dark}}}" for s in strokes.values()]
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{_n(width)}" height="{_n(height)}" '
@@ -136,19 +140,42 @@ def _part(at: Point, part: Placed, run: Running, joined: Collection[Port] | None
     if node.icon and (looks := run.modes.get(node)):
         yield from _looks(node.icon, looks, run, half_y, turned=node.turned)
     elif node.icon:
-        yield from icon_shapes(node.icon, turned=node.turned)
+        yield from icon_shapes(node.icon, turned=node.turned, component=node.component)
     elif not part.sheet:
         yield (
             f'<rect class="paper ink-line" x="{_n(-half_x)}" y="{_n(-half_y)}" width="{_n(2 * half_x)}" '
             f'height="{_n(2 * half_y)}" rx="4" fill="{_PAPER}" stroke="{_INK}" stroke-width="1.5"/>'
         )
     for port in node.ports.values():
+        yield from _inwards(part, port)
         if port.mark:
             yield from _mark(part, port.side, port.along, port.mark, port.stroke)
     for text in texts(part):
         yield _text(text)
     yield from end_handles(part, joined) if joined is not None else ()
     yield "</g>"
+
+
+def _inwards(part: Placed, port: Port) -> Iterator[str]:
+    """The line of a port from the side of its symbol to where it ends inside."""
+    node = part.node
+    tip = find_entry(node.icon.tips, port.name) if node.icon else None
+    if tip is None or (node.turned and port.signal):
+        return
+    (half_x, half_y), x, y = part.half, -tip[0] if node.turned else tip[0], tip[1]
+    begin = {
+        "W": (-half_x, port.along),
+        "E": (half_x, port.along),
+        "N": (port.along, -half_y),
+        "S": (port.along, half_y),
+    }
+    (x0, y0), stroke = begin[port.side], port.stroke
+    corner = (x, y0) if port.side in ("W", "E") else (x0, y)
+    if (x0, y0) != (x, y):
+        yield (
+            f'<path class="{_css(stroke)}" d="M{_n(x0)} {_n(y0)} L{_n(corner[0])} {_n(corner[1])} L{_n(x)} {_n(y)}" '
+            f'fill="none" stroke="{stroke.colour}" stroke-width="{_n(stroke.width)}"/>'
+        )
 
 
 def _shape(shape: Shape, top: float, width: float) -> Iterator[str]:
@@ -226,13 +253,16 @@ def _clock(width: float, height: float, run: Running) -> Iterator[str]:
     yield _text(Text(f"{run.end:.4g} s", (width - _MARGIN, y), VALUE, "end"))
 
 
-def icon_shapes(icon: Icon, *, turned: bool = False, ink: str = "ink") -> Iterator[str]:
+def icon_shapes(
+    icon: Icon, *, turned: bool = False, ink: str = "ink", component: Component | None = None
+) -> Iterator[str]:
     """Yield the shapes of an icon around (0, 0).
 
     Args:
         icon: the icon.
         turned: whether west and east are exchanged.
         ink: `ink`, or how a mode looks.
+        component: whose values the texts of its figures show.
     """
     colour = _LOOKS.get(ink, (_INK, ""))[0]
     turn = ' transform="scale(-1 1)"' if turned else ""
@@ -247,5 +277,7 @@ def icon_shapes(icon: Icon, *, turned: bool = False, ink: str = "ink") -> Iterat
                 f'<path class="{classes}" d="{data}" fill="{fill}" stroke="{colour}" stroke-width="{width}" '
                 f'stroke-linecap="round" stroke-linejoin="round"{turn}/>'
             )
+    if icon.figures:
+        yield from figures(icon.figures, component, turned=turned)
     if icon.text:
         yield _text(Text(icon.text, (0.0, 5.0), 14.0))

@@ -12,13 +12,13 @@ _LEAD = 13.0
 """Length of a lead, which lies in the margin of the drawing."""
 
 
-def symbol(kind: type[Component]) -> str:
+def symbol(kind: type[Component] | Component) -> str:
     """Draw the symbol of a component type as SVG, with a lead for each connector and signal that every instance has.
 
     The same type gives the same bytes on every machine.
 
     Args:
-        kind: the type.
+        kind: the type, or a part whose class is a text.
     """
     node = alone(kind)
     icon = node.icon
@@ -29,7 +29,9 @@ def symbol(kind: type[Component]) -> str:
     middle = (half[0] + beside, 0.0 if icon and icon.at_ports else half[1])
     part = Placed(node, half, (0.0, 0.0, 0.0, 0.0), {}, at=middle)
     lines = [_lead(part, port, _LEAD + beside) for port in node.ports.values()]
-    return svg(Sheet([part], lines, 2 * middle[0], 2 * half[1]), kind.__name__)
+    return svg(
+        Sheet([part], lines, 2 * middle[0], 2 * half[1]), (kind if isinstance(kind, type) else type(kind)).__name__
+    )
 
 
 def _lead(part: Placed, port: Port, long: float) -> Line:
