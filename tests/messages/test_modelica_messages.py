@@ -45,6 +45,10 @@ TYPES = (
     "type M = enumeration(a, b); type N = enumeration(a, b); model B parameter Real k = 1; end B; "
     "record P parameter Real u = 1; parameter Real v = 1; end P;"
 )
+SIGNALS = (
+    'block P Modelica.Blocks.Interfaces.RealOutput y(unit = "kW") = 3; end P; '
+    'block Q Modelica.Blocks.Interfaces.RealInput u(unit = "W"); end Q;'
+)
 MESSAGES: dict[str, tuple[str, str]] = {
     "a variable of a bus without a source": (
         model("B bus; G g;", "connect(bus.x, g.u);", BUS),
@@ -64,6 +68,12 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("B bus; S s;", "connect(bus.sub.x, s.y);", BUS),
         "There is no connector bus.sub.\n  in a.mo:5 `connect(bus.sub.x, s.y);`\n"
         "Declare it in the class of the bus, or join it with a connector.",
+    ),
+    "units of a connection": (
+        model("P p; Q q;", "connect(p.y, q.u);", before=SIGNALS),
+        "p.y is in kW, and q.u in W.\n  in a.mo:5 `connect(p.y, q.u);`\n"
+        f"  in a.mo:1 `{SIGNALS}`\n  in a.mo:1 `{SIGNALS}`\n"
+        "Declare both in one unit, or convert between them: a connection does not.",
     ),
     "no end": ("model A\n  Real x;\n", "model A of line 1 has no 'end A;'.\n  in a.mo:3"),
     "wrong end": ("model A\n  Real x;\nend B;\n", "model A of line 1 ends with 'end B'.\n  in a.mo:3 `end B;`"),

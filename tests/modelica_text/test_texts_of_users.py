@@ -354,9 +354,11 @@ def test_signals_without_units_of_an_own_class_take_any_in_a_netlist(text_file: 
 
 
 def test_a_signal_with_a_unit_of_an_own_class_is_checked_in_a_netlist(text_file: Any) -> None:
-    text = CONTROLLED.replace("RealInput w;", 'RealInput w(unit = "m/s");')
+    model, notes = read_modelica(text_file(CONTROLLED), "P.Drive")
+    netlist = netlist_text(model, text_file(CONTROLLED).parent, notes)
+    file = text_file(CONTROLLED.replace("RealInput w;", 'RealInput w(unit = "m/s");'))
     with pytest.raises(WrongConnection, match=r"sensor\.w is in rad/s, brake\.w expects m/s\."):
-        simulate(_as_netlist(text_file(text), "P.Drive"))
+        simulate(loads(netlist, str(file.parent / "a.toml")))
 
 
 def test_what_a_netlist_cannot_say_of_an_own_class_is_refused(text_file: Any) -> None:

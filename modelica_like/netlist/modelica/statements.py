@@ -8,7 +8,7 @@ from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.before import Before, begin_late, begun
 from modelica_like.netlist.modelica.buses import bus_equations
-from modelica_like.netlist.modelica.causal import Joints, declared_at, variable_at
+from modelica_like.netlist.modelica.causal import Joints, connections, declared_at, variable_at
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.left_limits import LeftLimits
 from modelica_like.netlist.modelica.library import Known
@@ -19,6 +19,7 @@ from modelica_like.netlist.modelica.sections import Section
 from modelica_like.netlist.modelica.signals import Memories, inner_signals
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement, calls_in
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside, is_signal
+from modelica_like.netlist.modelica.units import check_units
 from modelica_like.netlist.modelica.whens import Whens, as_condition, if_taken, is_demand, is_ending
 from modelica_like.netlist.modelica.wiring import Wire, groups
 from modelica_like.netlist.modelica.written import ASSERT, MEMORY, Happening
@@ -85,6 +86,7 @@ class Statements(Whens):
     def _join(self) -> None:
         """Make equations of connections within the instance."""
         joints = Joints(self.instance)
+        check_units(self.instance, connections(self.instance))
         inner = inner_signals(self.instance, groups(joints.others))
         self.wires = inner.wires + [Wire([*ends], source) for ends, source in self.instance.bus_wires]
         resolver = Resolver(self.instance, self.instance.text)
