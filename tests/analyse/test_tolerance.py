@@ -117,6 +117,12 @@ def test_another_sequence_of_modes_is_told() -> None:
     """A weak clutch slips until the end of the run."""
     result = tolerance(DIRECT, "table.s", {"clutch.capacity": "uniform(20 N.m, 140 N.m)"})
     assert any("has another sequence of modes." in note for note in result.notes)
+    (other,) = result.sequences
+    exact = (J * W / 0.4 + LOAD - 20.0) / 120.0
+    assert other.what == "as mode change 1, 'clutch.mode: backward → stuck' is missing"
+    assert other.low < exact < other.high
+    assert other.share == pytest.approx(exact, abs=0.01)
+    assert result.notes[-1].startswith("The mode sequence is another one than at the means in 25.8 % of runs: as mode")
 
 
 def test_importance_without_some_runs() -> None:

@@ -312,16 +312,20 @@ def _agree(some: Sensitivities, others: Sensitivities) -> bool:
     return bool(np.all(np.abs(first - second).max(axis=1) <= _AGREE * sizes))
 
 
-def _changed(expected: Sequence[Any], results: Sequence[Any], solution: Solution) -> NoGradient:
+def first_difference(expected: Sequence[Any], results: Sequence[Any]) -> tuple[int, str]:
+    """Return which mode change of two sequences differs first, counted from 1, and how."""
     pairs = zip_longest(expected, results)
-    same, (before, now) = next((k, pair) for k, pair in enumerate(pairs) if pair[0] != pair[1])
+    place, (before, now) = next((k, pair) for k, pair in enumerate(pairs, 1) if pair[0] != pair[1])
     before, now = (f"'{result[0]}: {result[1]} → {result[2]}'" if result else "" for result in (before, now))
-    what = f"{now} happens additionally" if now else f"{before} is missing"
     if now and before:
-        what = f"{now} happens instead of {before}"
+        return place, f"{now} happens instead of {before}"
+    return place, f"{now} happens additionally" if now else f"{before} is missing"
+
+
+def _changed(expected: Sequence[Any], results: Sequence[Any], solution: Solution) -> NoGradient:
+    place, what = first_difference(expected, results)
     return NoGradient(
-        f"{solution.model.name} has another mode sequence at these parameter values: "
-        f"as mode change {same + 1}, {what}.",
+        f"{solution.model.name} has another mode sequence at these parameter values: as mode change {place}, {what}.",
         why="A function with a fixed mode sequence has derivatives only as long as the sequence stays.",
         advice="Bound the parameters, start elsewhere, or allow it with any_sequence=True.",
     )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from modelica_like.analyse.tolerance.scatter import Scatter
+from modelica_like.analyse.tolerance.sequences import OtherSequence
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.language.units import Unit
@@ -86,6 +87,7 @@ class Tolerances(Shown):
         runs: number of simulations.
         samples: outputs of all runs, shape (runs, outputs).
         variances: Sobol's indices `S1` and `ST` with `S1_conf`, `ST_conf`, shape (outputs, parameters); if asked for.
+        sequences: mode changes that runs have and the one at all means has not, the most frequent first.
         notes: sentences: runs without a value, differences of sampling and first order.
     """
 
@@ -96,6 +98,7 @@ class Tolerances(Shown):
     runs: int
     samples: Vector = field(repr=False)
     variances: Mapping[str, Vector] = field(default_factory=dict, repr=False)
+    sequences: tuple[OtherSequence, ...] = ()
     notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Spread:

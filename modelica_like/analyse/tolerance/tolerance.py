@@ -16,13 +16,15 @@ from modelica_like.analyse.sensitivity.function import mode_sequence
 from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.analyse.sweeps.plan import Samples, Sobol
 from modelica_like.analyse.sweeps.sweep import sweep
+from modelica_like.analyse.tolerance.intervals import clopper_pearson, half_width
 from modelica_like.analyse.tolerance.result import Probability, Spread, Tolerances
 from modelica_like.analyse.tolerance.scatter import Population, read_population
+from modelica_like.analyse.tolerance.sequences import LOOKED, other_sequences, sentences
 from modelica_like.analyse.written import placed
 from modelica_like.arguments import checked
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import NoGradient, ValueOutOfRange, extra_module
+from modelica_like.errors import NoGradient, ValueOutOfRange
 from modelica_like.language import Assembly, Component
 from modelica_like.language.inside import inside
 from modelica_like.language.units import Unit
@@ -86,8 +88,9 @@ def tolerance(
     limits = read_limits(lambda name: _unit(model, sized, name), texts)
     names = [of] if isinstance(of, str) else list(of)
     return spread(
-        model, population, names, limits, run, sized, precision, most, shares=shares, seed=seed, processes=processes
-    )
+        model, population, names, limits, run, sized, precision, most, shares=shares, sequences=True, seed=seed,
+        processes=processes,
+    )  # fmt: skip
 
 
 def _unit(model: CompiledDae, sized: Sized, name: str) -> Unit:
@@ -109,10 +112,13 @@ def scatter_of(
 
 def spread(
     model: CompiledDae, population: Population, of: Sequence[str], limits: Sequence[Limit], run: Mapping[str, Any],
-    sized: Sized, precision: float, most: int = _MOST, *, shares: bool = False, seed: int = 0,
+    sized: Sized, precision: float, most: int = _MOST, *, shares: bool = False, sequences: bool = False, seed: int = 0,
     processes: int | None = None,
 ) -> Tolerances:  # fmt: skip
-    """Return what a population of parameters does; see `tolerance`. `sized` knows the lines of design checks."""
+    """Return what a population of parameters does; see `tolerance`.
+
+    `sized` knows the lines of design checks; `sequences` asks how often runs have other mode changes.
+    """
     chance = next((limit.text for limit in limits if limit.probability < 1.0), None)
     if chance is not None:
         raise ValueOutOfRange(
@@ -126,7 +132,7 @@ def spread(
             f"and {most}."
         )
     study = _Study(model, population, names, units, limits, run, Outputs(names, sized), seed, processes)
-    return study.result(precision, most, shares)
+    return study.result(precision, most, shares, sequences)
 
 
 class _Study:
@@ -139,7 +145,7 @@ class _Study:
         self.run, self.seed, self.processes = run, seed, processes
         self.notices: dict[str, None] = {}
 
-    def result(self, precision: float, most: int, shares: bool) -> Tolerances:
+    def result(self, precision: float, most: int, shares: bool, sequences: bool) -> Tolerances:
         """Return the whole answer."""
         linear, why = self._linear()
         points, values = self._sampled(precision, most)
@@ -147,11 +153,17 @@ class _Study:
         chances = tuple(self._chance(limit, values[..., self.names.index(limit.name)]) for limit in self.limits)
         variances = self._shares() if shares else {}
         flat = values.reshape(-1, len(self.names))
-        notes = [*why, *self._missing(flat), *self._differences(linear, spreads, points, flat), *self.notices]
+        others = other_sequences(self._sequence, self._middle, points[:LOOKED]) if sequences else []
+        differences = self._differences(linear, spreads, points, flat)
+        notes = [*why, *self._missing(flat), *differences, *sentences(others), *self.notices]
         return Tolerances(
             self.model.name, self.population.scatters, spreads, chances, len(points) + variances.pop("runs", 0),
-            flat, variances, tuple(notes),
+            flat, variances, tuple(others), tuple(notes),
         )  # fmt: skip
+
+    @property
+    def _middle(self) -> Vector:
+        return np.array([scatter.mean for scatter in self.population.scatters])
 
     def _linear(self) -> tuple[Sensitivities | None, list[str]]:
         """Return the derivatives at the middle of the distributions."""
@@ -207,11 +219,11 @@ class _Study:
             sigma = float(np.nanstd(column))
             if (
                 sigma > _NOTHING * abs(float(np.nanmean(column)))
-                and _half_width(np.nanmean(column, axis=1)) > precision * sigma
+                and half_width(np.nanmean(column, axis=1)) > precision * sigma
             ):
                 return False
         return all(
-            _half_width(self._broken(limit, values[..., self.names.index(limit.name)]).mean(axis=1)) <= precision
+            half_width(self._broken(limit, values[..., self.names.index(limit.name)]).mean(axis=1)) <= precision
             for limit in self.limits
         )
 
@@ -230,7 +242,7 @@ class _Study:
         return Spread(
             self.names[k], self.units[k],
             float(linear.outputs[k].value) if linear is not None else np.nan, float(np.sqrt(variance)),
-            float(np.nanmean(column)), _half_width(np.nanmean(column, axis=1)), float(np.nanstd(column)),
+            float(np.nanmean(column)), half_width(np.nanmean(column, axis=1)), float(np.nanstd(column)),
             tuple(map(float, quantiles)), parts / variance if variance > 0.0 else np.zeros(len(row)), low, high,
         )  # fmt: skip
 
@@ -246,10 +258,10 @@ class _Study:
 
     def _chance(self, limit: Limit, column: Vector) -> Probability:
         means, runs = self._broken(limit, column).mean(axis=1), column.size
-        value, half = float(means.mean()), _half_width(means)
+        value, half = float(means.mean()), half_width(means)
         if _RARE <= value * runs <= runs - _RARE:
             return Probability(limit.text, value, max(value - half, 0.0), min(value + half, 1.0))
-        return Probability(limit.text, value, *_clopper_pearson(value * runs, runs))
+        return Probability(limit.text, value, *clopper_pearson(value * runs, runs))
 
     def _missing(self, values: Vector) -> Iterator[str]:
         for k, name in enumerate(self.names):
@@ -263,7 +275,7 @@ class _Study:
         """Tell where sampling and first order differ, and whether the mode sequence does in the farthest run."""
         if linear is None:
             return
-        middle = np.array([scatter.mean for scatter in self.population.scatters])
+        middle = self._middle
         for k, spread in enumerate(spreads):
             size = spread.linear_sigma
             apart = max(abs(spread.sigma - size), abs(spread.mean - spread.nominal))
@@ -295,17 +307,3 @@ class _Study:
         measures, runs, notes = ranked("sobol", names, runs_at, self.names, self.seed)
         self.notices |= dict.fromkeys(notes)
         return {**measures, "runs": runs}
-
-
-def _half_width(means: Vector) -> float:
-    """Return the half width of the 95 % interval of the mean of independent means."""
-    t = extra_module("scipy.stats", "analyse").t
-    return float(t.ppf(0.975, len(means) - 1) * np.std(means, ddof=1) / np.sqrt(len(means)))
-
-
-def _clopper_pearson(count: float, runs: int) -> tuple[float, float]:
-    """Return the 95 % interval of a probability (C. J. Clopper, E. S. Pearson, 1934), right for no event, too."""
-    beta = extra_module("scipy.stats", "analyse").beta
-    low = float(beta.ppf(0.025, count, runs - count + 1)) if count > 0 else 0.0
-    high = float(beta.ppf(0.975, count + 1, runs - count)) if count < runs else 1.0
-    return low, high
