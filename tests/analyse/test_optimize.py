@@ -163,6 +163,53 @@ def test_what_is_chosen_is_tried() -> None:
     assert len(best.combinations) == 3
 
 
+STOP = """
+[parts]
+wheel = { is = "Inertia", J = "2 kg.m2", phi = 0, w = "20 rad/s" }
+brake = { is = "Brake", capacity = "20 N.m" }
+[series]
+drive = ["wheel", "brake"]
+[simulate]
+until = "50 s"
+"""
+CHOSEN = {"wheel.J": range(1, 26), "brake.capacity": range(1, 26)}
+BRAKED = {"minimize": "brake.capacity", "subject_to": ["brake.loss_energy >= 500 J", "brake.lock_time <= 4.01 s"]}
+
+
+def test_nothing_need_be_free_where_something_is_chosen() -> None:
+    """500 J at 20 rad/s need 2.5 kg.m2, so 3, which stop within 4 s by 15 N.m."""
+    best = optimum(loads(STOP), choose={"wheel.J": [2, 3, 4], "brake.capacity": [14, 15, 16]}, **BRAKED)
+    assert best.chosen == {"wheel.J": 3, "brake.capacity": 15}
+    assert best.feasible
+    assert best["brake.lock_time"] == pytest.approx(4.0, rel=1e-6)
+    assert len(best.combinations) == 9
+
+
+def test_what_cannot_be_met_by_any_choice_is_told() -> None:
+    best = optimum(loads(STOP), choose={"wheel.J": [1, 2], "brake.capacity": [14, 15]}, **BRAKED)
+    assert not best.feasible
+    assert "The limits cannot all be met" in str(best)
+
+
+def test_of_many_combinations_some_are_tried() -> None:
+    best = optimum(loads(STOP), choose={path: [*values] for path, values in CHOSEN.items()}, **BRAKED)
+    assert best.chosen == {"wheel.J": 3, "brake.capacity": 15}
+    assert best.runs < 625
+    assert "Of 625 combinations Optuna tried" in str(best)
+
+
+@pytest.mark.slow
+def test_many_combinations_with_something_free() -> None:
+    """M = J w/4 s is least for 3 kg.m2 at 19 rad/s, of all whole numbers with J w² of at least 1000 J."""
+    choose = {"wheel.J": [*range(1, 26)], "wheel.w": [*range(1, 21)]}
+    limits = ["brake.loss_energy >= 500 J", "brake.lock_time <= 4 s"]
+    best = optimum(
+        loads(STOP), minimize="brake.capacity", free={"brake.capacity": [1, 30]}, choose=choose, subject_to=limits
+    )
+    assert best.chosen == {"wheel.J": 3, "wheel.w": 19}
+    assert best["brake.capacity"] == pytest.approx(3 * 19 / 4.0, rel=1e-6)
+
+
 def test_rows_of_a_table_and_the_netlist_of_the_best(tmp_path: Path) -> None:
     (tmp_path / "hubs.csv").write_text("name,J\nlarge,0.01\nsmall,0.001\n")
     text = DIRECT.read_text().replace('sizing = "sizing/machine_table.toml"\n', "")

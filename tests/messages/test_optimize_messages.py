@@ -1,6 +1,7 @@
 # ruff: noqa: E501 messages stand here as they are told
 """What is said where an optimisation is not asked for rightly."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,15 @@ import pytest
 
 from modelica_like import build, optimize
 from modelica_like.analyse.sweeps.ranges import read_bounds
-from modelica_like.errors import LanguageError, ModelicaLikeError, NetlistError, UnitError, UnknownName, ValueOutOfRange
+from modelica_like.errors import (
+    LanguageError,
+    MissingExtra,
+    ModelicaLikeError,
+    NetlistError,
+    UnitError,
+    UnknownName,
+    ValueOutOfRange,
+)
 from modelica_like.netlist import loads
 
 D = Path(__file__).parents[2] / "examples" / "machine_table_direct.toml"
@@ -38,6 +47,13 @@ until = "20 s"
 [optimize]
 """
 FREE = 'minimize = "brake.lock_time"\nfree = { "brake.capacity" = ["5 N.m", "100 N.m"] }\n'
+
+
+def without(package: str, action: Callable[[], object]) -> object:
+    """Act as if a package were not installed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, package, None)
+        return action()
 
 
 CALLS: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
@@ -149,11 +165,11 @@ Take it from the results.""",
         """choose: the table 'hubs.csv' for hub does not exist.
 Its place is beside the netlist; write a list for values of one parameter.""",
     ),
-    "too many combinations": (
-        ValueOutOfRange,
-        lambda: optimize(D, free=F, choose={"hub.J": [*range(1, 300)]}, **M),
-        """There are 299 combinations of what is chosen, more than 200.
-Choose among fewer, in several steps.""",
+    "many combinations without Optuna": (
+        MissingExtra,
+        lambda: without("optuna", lambda: optimize(D, free=F, choose={"hub.J": [*range(1, 300)]}, **M)),
+        """optuna is not installed.
+Install it with: pip install "modelica-like[choose]\"""",
     ),
     "choices of a compiled model": (
         LanguageError,

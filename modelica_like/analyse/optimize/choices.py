@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import copy
 import csv
-import itertools
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from modelica_like.errors import NetlistError, Source, ValueOutOfRange
 from modelica_like.language import Assembly, Component
 from modelica_like.language.inside import inside
 
-MOST = 200
+ENUMERATED = 200
 """Combinations: each is an optimisation of its own."""
 
 
@@ -26,8 +25,8 @@ class Choice:
     values: Mapping[str, Any]
 
 
-def combinations(drive: Component, choose: Mapping[str, Any]) -> list[Choice]:
-    """Return all combinations of choices.
+def options_of(drive: Component, choose: Mapping[str, Any]) -> list[list[Choice]]:
+    """Return what there is to choose from, by path.
 
     Args:
         drive: a component; tables are looked for beside its netlist.
@@ -36,7 +35,7 @@ def combinations(drive: Component, choose: Mapping[str, Any]) -> list[Choice]:
 
     Raises:
         NetlistError: a table cannot be read.
-        ValueOutOfRange: there is nothing to choose from, or too much.
+        ValueOutOfRange: there is nothing to choose from.
     """
     for path, given in choose.items():
         if not isinstance(given, str | list | tuple) or not given:
@@ -45,23 +44,30 @@ def combinations(drive: Component, choose: Mapping[str, Any]) -> list[Choice]:
                 advice='Write {"clutch.plates": [2, 4, 6]}, or {"motor": "motors.csv"}.',
             )
     folder = Path(inside(drive).origin).parent if isinstance(drive, Assembly) else Path()
-    options = [
+    return [
         _rows(path, folder / given) if isinstance(given, str) else [Choice({path: v}, {path: v}) for v in given]
         for path, given in choose.items()
     ]
-    count = math.prod(map(len, options))
-    if count > MOST:
-        raise ValueOutOfRange(
-            f"There are {count} combinations of what is chosen, more than {MOST}.",
-            advice="Choose among fewer, in several steps.",
-        )
-    return [
-        Choice(
-            {path: label for choice in several for path, label in choice.labels.items()},
-            {path: value for choice in several for path, value in choice.values.items()},
-        )
-        for several in itertools.product(*options)
-    ]
+
+
+def together(several: Sequence[Choice]) -> Choice:
+    """Return what is chosen from each list as one choice."""
+    return Choice(
+        {path: label for choice in several for path, label in choice.labels.items()},
+        {path: value for choice in several for path, value in choice.values.items()},
+    )
+
+
+def with_choice(drive: Component, choice: Choice) -> Component:
+    """Return a copy of a drive with what is chosen.
+
+    Raises:
+        ModelicaLikeError: the drive has no such parameter, or it cannot have such a value.
+    """
+    drive = copy.deepcopy(drive)
+    for path, value in choice.values.items():
+        drive.set(path, value)
+    return drive
 
 
 def _rows(path: str, file: Path) -> list[Choice]:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import copy
 import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from modelica_like.analyse.optimize.chance import Chances
-from modelica_like.analyse.optimize.choices import Choice, combinations
+from modelica_like.analyse.optimize.choices import ENUMERATED, Choice, options_of, together, with_choice
 from modelica_like.analyse.optimize.problem import Question, make_problem
+from modelica_like.analyse.optimize.promising import FINISHED, TRIALS, promising
 from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optimum
 from modelica_like.analyse.optimize.runs import Runs
 from modelica_like.analyse.optimize.solve import FEASIBLE, MOST_STEPS, Outcome, Search
@@ -25,7 +27,7 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, ModelicaLikeError, ValueOutOfRange
 from modelica_like.language import Assembly, Component
 from modelica_like.language.inside import inside
-from modelica_like.simulation import Model, loaded
+from modelica_like.simulation import Model, loaded, simulate
 from modelica_like.solve.initialize import StartKind
 
 Progress = Callable[[int, int], None]
@@ -60,7 +62,8 @@ def optimize(
             some of those it has.
         subject_to: limits of outputs, `clutch.lock_time <= 0.4 s`, with <=, >= or ==.
         choose: values by path, `{"clutch.plates": [2, 4, 6]}`, or for a part a CSV table beside the netlist with a
-            row for each kind, a column for each parameter, and `name`. All combinations are tried.
+            row for each kind, a column for each parameter, and `name`. Up to 200 combinations are all tried; of more
+            Optuna finds the most promising ones. Then nothing need be free.
         cases: load cases, tables of other parameter values with a `name`: limits hold in each, and the worst counts.
         until: end time, as in `simulate`.
         parameters: other values of parameters, in all cases.
@@ -84,13 +87,13 @@ def optimize(
     scatter, pairs, folder = scatter_of(drive, tolerances, correlated)
     asked = {"minimize": _listed(minimize), "maximize": _listed(maximize)}
     aims = asked if any(asked.values()) else {key: tuple(written.get(key, ())) for key in asked}
+    choices = choose if choose is not None else written.get("choose", {})
     question = Question(
-        **aims, free=free if free is not None else written.get("free"),
+        aims["minimize"], aims["maximize"], free=free if free is not None else written.get("free"),
         subject_to=_listed(subject_to) or tuple(written.get("subject_to", ())),
         cases=tuple(cases) or tuple(written.get("for", ())), parameters=parameters, until=until, start=start,
-        tolerances=scatter, correlated=pairs, folder=folder,
+        tolerances=scatter, correlated=pairs, folder=folder, chosen=bool(choices),
     )  # fmt: skip
-    choices = choose if choose is not None else written.get("choose", {})
     return _answer(
         drive, question, choices, starts or written.get("starts", 1), points or written.get("points", _POINTS), seed,
         progress,
@@ -115,16 +118,23 @@ def _answer(
             "A compiled model has nothing to choose.", advice="Give the netlist or the component itself."
         )
     with placed(drive, "optimize.choose"):
-        options = combinations(drive, choices)
-    return _best_choice(drive, question, options, number, seed, _told(progress, number * len(options)))
+        options = options_of(drive, choices)
+    count = math.prod(map(len, options))
+    if count <= ENUMERATED:
+        every = [together(several) for several in itertools.product(*options)]
+        return _best_choice(drive, question, every, number, seed, _told(progress, number * count))
+    told = _told(progress, number * FINISHED, TRIALS)
+    some, note = promising(drive, question, options, seed, told)
+    best = _best_choice(drive, question, some, number, seed, told)
+    return replace(best, runs=best.runs + note.runs, notes=(*best.notes, str(note)))
 
 
-def _told(progress: Progress | None, searches: int) -> Callable[[], None]:
+def _told(progress: Progress | None, searches: int, more: int = 0) -> Callable[[], None]:
     """Return what counts designs."""
     designs = itertools.count(1)
     if progress is None:
         return lambda: None
-    return lambda: progress(next(designs), MOST_STEPS * searches)
+    return lambda: progress(next(designs), MOST_STEPS * searches + more)
 
 
 def _listed(texts: str | Sequence[str]) -> tuple[str, ...]:
@@ -210,10 +220,9 @@ class _Study:
     def _checked(self, values: Mapping[str, float], design: Any) -> tuple[Vector, list[str]]:
         """Return the outputs of a design in runs of their own, by IDAS, and what differs."""
         problem = self.problem
-        rows: list[Vector] = []
+        rows, by_idas = list[Vector](), partial(simulate, solver="idas")
         for case in problem.cases:
-            given = {**case.values, **values}
-            rows.append(self.runs.by_idas(given))
+            rows.append(self.runs.alone.at({**case.values, **values}, by_idas))
         after = np.array(rows)
         if design is None:
             return after, []
@@ -288,10 +297,8 @@ def _best_choice(
     results: list[tuple[Choice, Optimum]] = []
     failures: list[tuple[Choice, ModelicaLikeError]] = []
     for choice in options:
-        variant = copy.deepcopy(drive)
         with placed(drive, "optimize.choose"):
-            for path, value in choice.values.items():
-                variant.set(path, value)
+            variant = with_choice(drive, choice)
         try:
             study = _Study(variant, question, seed, told)
             result = study.best(starts, _POINTS)

@@ -56,6 +56,7 @@ class Question:
         tolerances: how parameters scatter, for limits with a probability.
         correlated: which scatter together.
         folder: of files with measured values.
+        chosen: whether something is chosen, so that nothing need be free.
     """
 
     minimize: tuple[str, ...] = ()
@@ -69,6 +70,7 @@ class Question:
     tolerances: Mapping[str, Any] | None = None
     correlated: tuple[Mapping[str, Any], ...] = ()
     folder: Path = Path()
+    chosen: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +143,7 @@ def make_problem(
         scattering = [*(question.tolerances or {})]
         model = build(drive, free=[*plain, *scattering], tables=[path.replace("[", "[[]") for path in profiles])
         model = model.with_parameters(dict(question.parameters or {}))
-        free = read_free(model, plain | cells)
+        free = read_free(model, plain | cells) if question.free or not question.chosen else ()
     with placed("minimize" if question.minimize else "maximize"):
         sized = Sized(drive, model, lambda: quick_run(model, question.until, start=question.start))
         unit_of = _units(model, sized)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from modelica_like.analyse.optimize.sized import Outputs
 from modelica_like.analyse.sensitivity.function import SimulationFunction
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import ModelicaLikeError
-from modelica_like.simulation import simulate
+from modelica_like.runs.readings import does_not_happen
+from modelica_like.runs.solution import Solution
+from modelica_like.simulation import quick_run
 
 PRECISION = 1e-7
 """Of the derivatives: the values of limits are as precise as a tenth of a thousandth of a thousandth."""
@@ -34,6 +37,40 @@ class Design:
     slopes: Vector = field(repr=False)
 
 
+class Values:
+    """Outputs of single runs of a problem, without derivatives.
+
+    Attributes:
+        modal: outputs of the linearized drive.
+        read: what is read off a run.
+        of_runs: outputs of that.
+        places: where the outputs of the problem are, after those of runs those of the linearized drive.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.modal = [name for name in problem.outputs if is_modal(name)]
+        runs = [name for name in problem.outputs if name not in self.modal]
+        self.of_runs = Outputs(runs, problem.sized)
+        self.read = self.of_runs.read
+        order = [*runs, *self.modal]
+        self.places = [order.index(name) for name in problem.outputs]
+
+    def at(self, parameters: Mapping[str, Any], run: Callable[..., Solution] = quick_run) -> Vector:
+        """Return the outputs with values of parameters, shape (outputs,).
+
+        Raises:
+            ModelicaLikeError: the drive cannot be run.
+        """
+        question, problem, values = self.problem.question, self.problem, np.zeros((1, 0))
+        given = dict(parameters)
+        if self.read:
+            solution = run(problem.model, question.until, parameters=given, start=question.start, readings=self.read)
+            values = self.of_runs.values(np.array(solution.read(*self.read), float).reshape(1, -1))
+        modes = modal_values(problem.model.with_parameters(given), self.modal, question.start) if self.modal else []
+        return np.array([*values[0], *modes], float)[self.places]
+
+
 class Runs:
     """Runs designs, each once.
 
@@ -51,13 +88,10 @@ class Runs:
         self.problem, self._told = problem, told
         question, names = problem.question, [parameter.name for parameter in problem.free]
         self.functions: list[SimulationFunction] = []
-        self.modal = [name for name in problem.outputs if is_modal(name)]
-        runs = [name for name in problem.outputs if name not in self.modal]
-        self._of_runs = Outputs(runs, problem.sized)
-        self.read = self._of_runs.read
-        order = [*runs, *self.modal]
-        self._places = [order.index(name) for name in problem.outputs]
-        for case in problem.cases if self.read else ():
+        self.alone = Values(problem)
+        self.modal, self.read, self._of_runs = self.alone.modal, self.alone.read, self.alone.of_runs
+        self._places, self._single = self.alone.places, 0
+        for case in problem.cases if self.read and names else ():
             run = {"until": question.until, "start": question.start, "parameters": dict(case.values), "options": None}
             try:
                 function = SimulationFunction(
@@ -75,7 +109,7 @@ class Runs:
     @property
     def count(self) -> int:
         """Number of runs so far."""
-        return sum(function.runs + 1 for function in self.functions)
+        return self._single + sum(function.runs + 1 for function in self.functions)
 
     def at(self, x: Vector) -> Design | None:
         """Return the design at values of what is free with its derivatives, None where a run is refused."""
@@ -86,6 +120,8 @@ class Runs:
 
     def _run(self, x: Vector) -> Design | ModelicaLikeError:
         try:
+            if not len(x):
+                return self._as_it_is(x)
             parts = [self._modes(x, slopes=True)]
             if self.read:
                 results = [function.at(x) for function in self.functions]
@@ -97,7 +133,17 @@ class Runs:
             self.refusals.append((x.copy(), error))
             return error
         values, slopes = (np.concatenate(part, axis=1)[:, self._places] for part in zip(*parts, strict=True))
-        design = Design(x.copy(), values, slopes)
+        return self._kept(Design(x.copy(), values, slopes))
+
+    def _as_it_is(self, x: Vector) -> Design:
+        """Return the only design where nothing is free."""
+        self._single = len(self.problem.cases) if self.read else 0
+        values = np.array([self.alone.at(case.values) for case in self.problem.cases])
+        if not np.all(np.isfinite(values)):
+            raise does_not_happen(self.problem.outputs[int(np.argmin(np.isfinite(values).all(axis=0)))])
+        return self._kept(Design(x, values, np.zeros((*values.shape, 0))))
+
+    def _kept(self, design: Design) -> Design:
         self.designs.append(design)
         self._told()
         return design
@@ -138,16 +184,3 @@ class Runs:
                     model, self.modal, problem.question.start, given, problem.low, problem.span
                 )
         return values, derivatives
-
-    def by_idas(self, parameters: Mapping[str, float]) -> Vector:
-        """Return the outputs of a run by IDAS, shape (outputs,)."""
-        question, problem = self.problem.question, self.problem
-        values = np.zeros((1, 0))
-        if self.read:
-            run = simulate(
-                problem.model, question.until, parameters=dict(parameters), start=question.start, solver="idas"
-            )
-            values = self._of_runs.values(np.array(run.read(*self.read), float).reshape(1, -1))
-        model = problem.model.with_parameters(dict(parameters))
-        modes = modal_values(model, self.modal, question.start) if self.modal else []
-        return np.array([*values[0], *modes], float)[self._places]

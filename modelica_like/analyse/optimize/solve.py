@@ -65,30 +65,29 @@ class Outcome:
     status: str
 
 
-class Search:
-    """The search for one objective, from one design.
+class Scale:
+    """What is to be small and what is limited, over their sizes.
 
     Args:
         problem: the problem.
-        runs: of its load cases.
+        begin: outputs of the drive as it is, shape (cases, outputs); None where it does not run.
         aim: position of the objective.
         more: further limits, those of a point on a Pareto front.
+
+    Attributes:
+        sizes: of the outputs, at the beginning or as limited, shape (outputs,).
     """
 
-    def __init__(self, problem: Problem, runs: Runs, aim: int = 0, more: tuple[Row, ...] = ()) -> None:
-        self.problem, self.runs = problem, runs
-        self.aim_rows = problem.aims[aim].rows
+    def __init__(self, problem: Problem, begin: Vector | None, aim: int = 0, more: tuple[Row, ...] = ()) -> None:
+        self.aim = problem.numbers(problem.aims[aim].rows)
         self.rows = (*(row for limit in problem.limits for row in limit.rows()), *more)
-        self.aim, self.limits = problem.numbers(self.aim_rows), problem.numbers(self.rows)
-        begin = runs.at(problem.begin)
-        values = np.abs(begin.values).max(axis=0) if begin is not None else np.zeros(len(problem.outputs))
-        sizes = np.where(values > 0, values, 1.0)
-        places, _, most = self.limits
-        np.maximum.at(sizes, places, np.abs(most))
-        self.sizes = sizes
+        places, _, most = problem.numbers(self.rows)
+        values = np.abs(begin).max(axis=0) if begin is not None else np.zeros(len(problem.outputs))
+        self.sizes = np.where(values > 0, values, 1.0)
+        np.maximum.at(self.sizes, places, np.abs(most))
         self.rows += problem.within
         self.limits = problem.numbers(self.rows)
-        self.aim_size = float(sizes[self.aim[0]].max())
+        self.aim_size = float(self.sizes[self.aim[0]].max())
 
     @property
     def aim_scale(self) -> float:
@@ -99,14 +98,34 @@ class Search:
         """Return the objective and the largest excess of values, shape (cases, outputs), both over their sizes."""
         places, signs, _ = self.aim
         objective = (signs * values[:, places]).max() / self.aim_size
-        return float(objective), float(max(0.0, self._excess(values).max(initial=0.0)))
+        return float(objective), float(max(0.0, self.excess(values).max(initial=0.0)))
 
-    def _excess(self, values: Vector) -> Vector:
+    def excess(self, values: Vector) -> Vector:
+        """Return by how much limits are exceeded, over their sizes, shape (cases, limits)."""
         places, signs, most = self.limits
         return (signs * values[:, places] - most) / self.sizes[places]
 
+
+class Search(Scale):
+    """The search for one objective, from one design.
+
+    Args:
+        problem: the problem.
+        runs: of its load cases.
+        aim: position of the objective.
+        more: further limits, those of a point on a Pareto front.
+    """
+
+    def __init__(self, problem: Problem, runs: Runs, aim: int = 0, more: tuple[Row, ...] = ()) -> None:
+        begin = runs.at(problem.begin)
+        super().__init__(problem, begin.values if begin is not None else None, aim, more)
+        self.problem, self.runs = problem, runs
+
     def from_design(self, x: Vector) -> Outcome:
-        """Search from a design."""
+        """Search from a design; where nothing is free it is the best one."""
+        if not self.problem.free:
+            prices = np.zeros((len(self.problem.cases), len(self.rows)))
+            return Outcome(x, *self.measures(self._values(x)), prices, True, "")
         try:
             outcome = self._from(x)
             if outcome.optimal and not self.runs.certain(outcome.x):
@@ -218,7 +237,7 @@ class Search:
 
         limits: list[Any] = []
         if self.rows:
-            limits.append(optimize.NonlinearConstraint(lambda q: self._excess(values(q)).ravel(), -np.inf, 0.0))
+            limits.append(optimize.NonlinearConstraint(lambda q: self.excess(values(q)).ravel(), -np.inf, 0.0))
         for low, high, factor, shift in self._order():
             row = np.zeros(len(begin))
             row[low], row[high] = factor, -1.0

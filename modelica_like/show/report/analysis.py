@@ -170,7 +170,8 @@ def optimum_report(result: Optimum | Front) -> RenderableType:
         parts += [table("chosen", "name", "value", rows=[(k, str(v)) for k, v in result.chosen.items()]), ""]
     case = ["case"] if cases else []
     outputs = table("outputs", "name", *case, "before>.6g", "best>.6g", "unit", "limit", "", rows=rows)
-    parts += [table("free", *columns, rows=free), "", outputs, ""]
+    parts += [table("free", *columns, rows=free), ""] if free else []
+    parts += [outputs, ""]
     parts += [escape(sentence) for sentence in result.sentences()]
     return Group(*parts)
 
