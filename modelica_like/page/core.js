@@ -10,7 +10,7 @@ const kinds = new Map(); // what a part of a type can be given, once it was aske
 let asking = 0; // requests that have no answer yet, but for the look at the file
 
 async function post(what, content = {}, signal = undefined) {
-  const headers = { "X-Token": PAGE.token }, body = JSON.stringify(content), counted = what === "watch" ? 0 : 1;
+  const headers = { "X-Token": PAGE.token }, body = JSON.stringify(content), counted = ["watch", "progress"].includes(what) ? 0 : 1;
   document.body.classList.toggle("busy", (asking += counted) > 0);
   const answer = await fetch(`/${what}`, { method: "POST", headers, body, signal }).catch((error) => {
     throw signal?.aborted ? error : new Error("Nobody answers. Start `modelica-like edit` again; the text is still here.");

@@ -1,4 +1,5 @@
-/* A measured file is handed to calibrate: which values are to be found, between which bounds, and what came out. */
+/* A measured file is handed to calibrate: which values are to be found, between which bounds, and what came out; and
+ * the best design that the netlist asks for. */
 const MOST_ROWS = 500; // of a file: each is an output that is differentiated
 
 function calibrateWith(one) {
@@ -78,3 +79,44 @@ async function takeOver(one) {
   const steps = [...one.change].map(([path, text]) => ({ op: "set", path, value: meantBy(text) }));
   if (steps.length) await apply({ op: "together", steps });
 }
+
+/* ---- the best design ---- */
+const LOOK = 300; // ms between two looks how many designs the search has tried
+
+/* Searches, with a button that stops it; the values stand in the netlist then, and undo brings the others back. */
+async function bestDesign() {
+  if (results.revision < 0) return say("It must be possible to run the drive before its best design is sought.", "refused");
+  const stop = new AbortController(), begin = page.text, bar = element("progress", { max: 1, value: 0 });
+  const counted = element("p", { className: "about" }, "Searching …"), cancel = element("button", {}, "Cancel");
+  const look = async () => {
+    const [designs, most] = await ask("progress", {}, stop.signal).catch(() => [0, 1]);
+    Object.assign(bar, { max: most, value: designs });
+    if (designs) counted.textContent = `${designs} designs tried, at most about ${most}.`;
+  };
+  cancel.onclick = () => at("dialog").close();
+  at("dialog").onclose = () => stop.abort();
+  at("dialog").replaceChildren(element("h2", {}, "Best design"), counted, bar, element("div", { className: "row" }, cancel));
+  at("dialog").showModal();
+  const timer = setInterval(look, LOOK);
+  const { revision, values } = present();
+  const answer = await ask("optimize", { revision, values }, stop.signal).catch((error) => ({ failed: error.message }));
+  clearInterval(timer);
+  if (stop.signal.aborted || !answer) return;
+  const changed = page.text !== begin, there = answer.text && !changed && answer.feasible;
+  if (there) await change("text", { text: answer.text }).catch(tell);
+  showBest(answer, there, !changed);
+}
+
+function showBest(answer, there, fits) {
+  const close = element("button", { className: "main" }, "Close"), shut = () => at("dialog").close();
+  const other = element("button", {}, there ? "Undo" : "Take into the netlist");
+  close.onclick = shut;
+  other.onclick = () => { shut(); change(...there ? ["undo", {}] : ["text", { text: answer.text }]).catch(tell); };
+  at("dialog").onclose = null;
+  const words = answer.failed ?? answer.about, stale = answer.text && !fits
+    ? [element("p", { className: "refused" }, "The netlist has changed since, and stays as it is.")] : [];
+  at("dialog").replaceChildren(element("h2", {}, "Best design"), element("pre", { className: "scroll" }, words), ...stale,
+    element("div", { className: "row" }, ...answer.text && fits ? [other] : [], close));
+}
+
+listeners.push(() => at("best").hidden = !Object.keys(section("optimize")).length);

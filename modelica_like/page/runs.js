@@ -150,6 +150,7 @@ async function columnsOf(one) {
 
 function listenToRuns() {
   at("keep").onclick = keepRun;
+  at("best").onclick = bestDesign;
   at("measure").onclick = () => at("csv").click();
   at("csv").onchange = () => { if (at("csv").files[0]) measured(at("csv").files[0]); at("csv").value = ""; };
   at("add").onchange = () => { const name = at("add").value.trim(); at("add").value = "";

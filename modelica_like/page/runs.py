@@ -12,10 +12,14 @@ import numpy as np
 
 from modelica_like.analyse.calibration.calibrate import calibrate
 from modelica_like.analyse.calibration.measurements import Measurement, Residuals, Trajectories
+from modelica_like.analyse.optimize.optimize import optimize
+from modelica_like.analyse.optimize.result import Front
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.edit.saving import rewritten
 from modelica_like.errors import Interrupted, ModelicaLikeError
 from modelica_like.language import Assembly
+from modelica_like.language.inside import inside
 from modelica_like.language.units import parse_unit, to_si
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.library import OK
@@ -250,6 +254,39 @@ class Runs:
             return None
         return {"values": [(name, float(value)) for name, value in zip(fit.names, fit.values, strict=True)],
                 "text": str(fit)}  # fmt: skip
+
+    def optimized(
+        self, values: Sequence[tuple[int, float]], wanted: Callable[[], bool], progress: Callable[[int, int], None]
+    ) -> dict[str, Any] | None:
+        """Find the best design that [optimize] of the netlist asks for.
+
+        Args:
+            values: value references of parameters and inputs, with what they are, in SI units.
+            wanted: tells whether the answer is still wanted.
+            progress: called after each design with the number of those tried, and about the most that there can be.
+
+        Returns:
+            `about`, the answer as text; `feasible`, whether all limits hold; `text`, the netlist with the best values,
+            empty for a front and where no netlist can have them. None: not wanted.
+
+        Raises:
+            ModelicaLikeError: there is none.
+        """
+
+        def told(designs: int, most: int) -> None:
+            progress(designs, most)
+            if not wanted():
+                raise Interrupted
+
+        try:
+            with self._analysing:
+                best = optimize(self.changed(values), progress=told)
+        except Interrupted:
+            return None
+        if isinstance(best, Front):
+            return {"about": str(best), "feasible": True, "text": ""}
+        text = rewritten(best.best_drive(), inside(self._drive).origin)
+        return {"about": str(best), "feasible": best.feasible, "text": text or ""}
 
     def starts(self) -> list[dict[str, Any]]:
         """Return start values in SI units, with their origins."""

@@ -173,8 +173,11 @@ class _Handler(BaseHTTPRequestHandler):
     _asked: ClassVar = frozenset((
         "state", "apply", "text", "undo", "redo", "model", "ranking", "starts", "instant", "palette", "kind", "page",
         "fits", "copy", "complete", "explain", "scale", "save", "export", "watch", "take", "trust", "open", "back",
+        "progress",
     ))  # fmt: skip
     """Methods of `Session` that a page may call."""
+    _awaited: ClassVar = frozenset(("calibrate", "optimize"))
+    """Those that end when nobody waits for them any more."""
 
     def setup(self) -> None:
         super().setup()
@@ -195,7 +198,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not self._known(self.headers.get("X-Token", "")):
             return
         what = self.path[1:]
-        if what not in (*self._asked, "run", "calibrate") or not size.isdecimal() or int(size) > _LARGEST:
+        if what not in (*self._asked, *self._awaited, "run") or not size.isdecimal() or int(size) > _LARGEST:
             self._answer(HTTPStatus.NOT_FOUND, b"There is nothing here.")
             return
         body = self.rfile.read(int(size))
@@ -205,7 +208,7 @@ class _Handler(BaseHTTPRequestHandler):
             if what == "run":
                 self._run(request)
                 return
-            awaited = (self._waits,) if what == "calibrate" else ()
+            awaited = (self._waits,) if what in self._awaited else ()
             answer = getattr(self.server.session, what)(request, *awaited)
             self._answer(HTTPStatus.OK, json.dumps(answer, default=str).encode(), "application/json")
         except ModelicaLikeError as error:

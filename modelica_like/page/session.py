@@ -59,6 +59,7 @@ class Session:
         self.trail.append(first.path.resolve())
         self._building = threading.Lock()
         self._built: tuple[Desk, int, Runs] | None = None
+        self._designs = 0, 1
 
     @property
     def desk(self) -> Desk:
@@ -170,6 +171,20 @@ class Session:
         columns = {str(name): [math.nan if one is None else number(one) for one in column]
                    for name, column in request["columns"]}  # fmt: skip
         return runs.calibrated(runs.values(request), time, columns, free, wanted)
+
+    def optimize(self, request: Request, wanted: Callable[[], bool]) -> dict[str, Any] | None:
+        """Return the best design that the netlist asks for; None if it is not wanted any more."""
+        runs = self.runs(request)
+        self._designs = 0, 1
+
+        def count(designs: int, most: int) -> None:
+            self._designs = designs, most
+
+        return runs.optimized(runs.values(request), wanted, count)
+
+    def progress(self, request: Request) -> tuple[int, int]:
+        """Return how many designs the search has tried, and about the most that it may try."""
+        return self._designs
 
     # -- what can be put there ---------------------------------------------------------------------------------------
 

@@ -167,3 +167,68 @@ def test_the_time_cursor_colours_the_picture_and_plays(hand: Hand) -> None:
     hand.page.keyboard.press("Escape")
     hand.wait()
     assert hand.browser.run(picture) == plain
+
+
+OPTIMIZE = """
+[optimize]
+minimize = "brake.capacity"
+free = { "brake.capacity" = ["5 N.m", "100 N.m"] }
+subject_to = ["brake.lock_time <= 3 s"]
+"""
+STOPS = TEXT.replace('"10 N.m"', '"40 N.m"')
+
+
+def locked_after(time: float) -> float:
+    """The torque M with which J dω/dt = −M − d ω stops the wheel after a time: w = (w + M/d) exp(−d t/J) − M/d."""
+    part = exp(-0.5 * time / 2)
+    return 50 * 0.5 * part / (1 - part)
+
+
+@pytest.mark.browser
+def test_the_best_design_stands_in_the_netlist_and_can_be_undone(hand: Hand) -> None:
+    assert hand.page.locator("#best").is_hidden()
+    given = STOPS + OPTIMIZE
+    hand.browser.run(f"change('text', {{ text: {given!r} }})")
+    hand.until("results.revision === page.revision")
+    hand.page.click("#best")
+    hand.page.get_by_role("button", name="Undo", exact=True).last.wait_for()
+    hand.wait()
+    assert "brake.lock_time <= 3 s' is active" in hand.page.inner_text("#dialog pre")
+    value, unit = hand.browser.run("page.data.parts.brake.capacity").split()
+    assert (float(value), unit) == (pytest.approx(locked_after(3.0), rel=1e-6), "N.m")
+    assert "# of the data sheet" in hand.text
+    hand.until("results.revision === page.revision")
+    slider = "results.content.sliders.find((one) => one.name === 'brake.capacity').value"
+    assert hand.browser.run(slider) == pytest.approx(locked_after(3.0), rel=1e-6)
+    hand.page.locator("#dialog button", has_text="Undo").click()
+    assert hand.text == given
+
+
+@pytest.mark.browser
+def test_a_search_shows_how_far_it_is_and_can_be_cancelled(hand: Hand) -> None:
+    given = STOPS + OPTIMIZE.replace("<= 3 s", "<= 1 ms") + "starts = 500\n"
+    hand.browser.run(f"change('text', {{ text: {given!r} }})")
+    hand.until("results.revision === page.revision")
+    hand.page.click("#best")
+    hand.until("/^[1-9][0-9]* designs tried, at most about 40000/.test(at('dialog').textContent.slice(11))")
+    hand.page.get_by_role("button", name="Cancel").click()
+    hand.wait()
+    assert hand.text == given
+    hand.page.click("#best")  # the search that nobody waits for has ended, or this one would wait for it
+    hand.until("/^[1-9][0-9]* designs tried/.test(at('dialog').textContent.slice(11))")
+    hand.page.get_by_role("button", name="Cancel").click()
+
+
+@pytest.mark.browser
+def test_limits_that_cannot_be_met_leave_the_netlist_until_it_is_asked_for(hand: Hand) -> None:
+    given = STOPS + OPTIMIZE.replace("<= 3 s", "<= 0.1 s")
+    hand.browser.run(f"change('text', {{ text: {given!r} }})")
+    hand.until("results.revision === page.revision")
+    hand.page.click("#best")
+    take = hand.page.get_by_role("button", name="Take into the netlist")
+    take.wait_for()
+    assert "The limits cannot all be met" in hand.page.inner_text("#dialog pre")
+    assert hand.text == given
+    take.click()
+    hand.wait()
+    assert hand.browser.run("page.data.parts.brake.capacity") == "100 N.m"
