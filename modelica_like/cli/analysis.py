@@ -268,7 +268,11 @@ def calibrate(
 
         known = by_name(map(read_assignment, uncertainty or ()), "--uncertainty")
         bounds = {name: (low, high) for name, (low, high) in by_name(map(read_bounds, free or ()), "--free").items()}
-        result = find(assembly, [Trajectories(file, known) for file in data or ()], bounds, starts=starts)
+        from modelica_like.show.report.progress import Bar
+
+        with Bar(title="designs") as bar:
+            measured = [Trajectories(file, known) for file in data or ()]
+            result = find(assembly, measured, bounds, starts=starts, progress=bar)
         page.print(calibration_report(result))
         if plot:
             save_plot(result.plot(), plot)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.calibration.calibrate import calibrate
-from modelica_like.analyse.calibration.measurements import Measurement, Residuals, Trajectories
+from modelica_like.analyse.calibration.measurements import Trajectories
 from modelica_like.analyse.optimize.optimize import optimize
 from modelica_like.analyse.optimize.result import Front
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
@@ -246,10 +246,10 @@ class Runs:
             there = np.isfinite(column) & (times >= 0.0)
             if there.any():  # one run for all columns with the same gaps
                 tables.setdefault(there.tobytes(), {"time": times[there]})[name] = np.array(column)[there]
-        data = [_Watched(Trajectories(table), wanted) for table in tables.values()]
+        data = [Trajectories(table) for table in tables.values()]
         try:
             with self._analysing:
-                fit = calibrate(self.changed(values), data, free)
+                fit = calibrate(self.changed(values), data, free, progress=_while(wanted))
         except Interrupted:
             return None
         return {"values": [(name, float(value)) for name, value in zip(fit.names, fit.values, strict=True)],
@@ -272,15 +272,9 @@ class Runs:
         Raises:
             ModelicaLikeError: there is none.
         """
-
-        def told(designs: int, most: int) -> None:
-            progress(designs, most)
-            if not wanted():
-                raise Interrupted
-
         try:
             with self._analysing:
-                best = optimize(self.changed(values), progress=told)
+                best = optimize(self.changed(values), progress=_while(wanted, progress))
         except Interrupted:
             return None
         if isinstance(best, Front):
@@ -295,19 +289,17 @@ class Runs:
         return [{"path": r.path, "value": float(r.value), "unit": r.unit, "origin": r.origin} for r in rows]
 
 
-class _Watched(Measurement):
-    """A measurement of a calibration that ends when nobody waits for it any more."""
+def _while(
+    wanted: Callable[[], bool], progress: Callable[[int, int], None] = lambda designs, most: None
+) -> Callable[[int, int], None]:
+    """Return a progress of searches that ends them when nobody waits for them any more."""
 
-    def __init__(self, measured: Measurement, wanted: Callable[[], bool]) -> None:
-        self._measured, self._wanted = measured, wanted
-
-    def check(self, names: Sequence[str]) -> None:
-        self._measured.check(names)
-
-    def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
-        if not self._wanted():
+    def told(designs: int, most: int) -> None:
+        progress(designs, most)
+        if not wanted():
             raise Interrupted
-        return self._measured.residuals(model, names)
+
+    return told
 
 
 def number(value: Any) -> float:

@@ -8,11 +8,12 @@ import pytest
 from scipy.optimize import least_squares
 
 from components import ConstantTorque, Damper, Fixed, HeatSource, Inertia, ThermalMass
-from modelica_like import build
+from modelica_like import build, load
 from modelica_like.analyse.calibration.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
 from modelica_like.analyse.calibration.measurements import read_table
 from modelica_like.errors import CalibrationFailed, NetlistError, UnknownName, ValueOutOfRange
 from modelica_like.language import Component, Equations, connect, series
+from modelica_like.netlist import loads
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TORQUES = np.linspace(0.0, 250.0, 26)
@@ -164,6 +165,47 @@ def test_as_many_numbers_as_parameters_have_the_interval_of_their_uncertainty(br
     found = calibrate(braked, measured, {"mass.J": (0.1, 5.0)})
     slope = 4 * np.exp(-0.5 * time / 0.8) * 0.5 * time / 0.8**2
     assert found.confidence == pytest.approx(1.959964 * sigma / slope, rel=1e-5)
+
+
+def test_a_value_that_cannot_be_run_shortens_the_step():
+    """Document 000: the clutch locks after J W/(M - 15 N.m). The first step from 250 N.m leads too far."""
+    W = 200.0 * np.pi
+    J = 0.004 + 0.016 + 500.0 * (0.015 / (2.0 * np.pi)) ** 2
+    drive = load(EXAMPLES / "machine_table_direct.toml")
+    guess = {"clutch.capacity": "250 N.m"}
+    found = calibrate(drive, Numbers({"clutch.lock_time": 0.39}), {"clutch.capacity": (5, 300)}, guess=guess)
+    assert found["clutch.capacity"] == pytest.approx(J * W / 0.39 + 15.0, rel=1e-6)
+    assert "1 design was left out: 'clutch.lock_time' does not happen" in str(found)
+
+
+FORCED = """
+[parts]
+profile = { is = "Table", table = [[0, 1], [2, 1]] }
+drive = { is = "Force" }
+mass = { is = "Mass", m = "1 kg", s = 0, v = 0 }
+[series]
+a = ["drive", "mass"]
+[connect]
+f = ["profile.y", "drive.f"]
+[simulate]
+until = "2 s"
+"""
+
+
+def test_values_of_a_table_are_found(tmp_path):
+    """v = f0 t + (f1 - f0) t²/4 and s = f0 t²/2 + (f1 - f0) t³/12, with 3 N at first and 0.6 N after 2 s."""
+    f0, f1 = 3.0, 0.6
+    data = Numbers({"mass.v": 2 * f0 + f1 - f0, "mass.s": 2 * f0 + (f1 - f0) * 2 / 3})
+    tried = []
+    found = calibrate(
+        loads(FORCED), data, {"profile.table": {"rows": [1, 2], "from": 0, "to": 5}},
+        progress=lambda designs, most: tried.append(designs),
+    )  # fmt: skip
+    np.testing.assert_allclose(found.values, [f0, f1], rtol=1e-6)
+    assert tried == list(range(1, len(tried) + 1))
+    found.save(tmp_path / "fitted.toml")
+    again = load(tmp_path / "fitted.toml")
+    np.testing.assert_allclose(np.array(again.profile.table)[:, 1], [f0, f1], rtol=1e-6)
 
 
 class Warm(Component):

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from modelica_like import build, optimize
+from modelica_like import build, calibrate, optimize
+from modelica_like.analyse.calibration.measurements import Numbers
 from modelica_like.analyse.sweeps.ranges import read_bounds
 from modelica_like.errors import (
     LanguageError,
@@ -164,6 +165,16 @@ Take it from the results.""",
         lambda: optimize(D, free=F, choose={"hub": "hubs.csv"}, **M),
         """choose: the table 'hubs.csv' for hub does not exist.
 Its place is beside the netlist; write a list for values of one parameter.""",
+    ),
+    "an order of what is calibrated": (
+        ValueOutOfRange,
+        lambda: calibrate(
+            loads(MOVED),
+            Numbers({"mass.s": 1.0}),
+            {"profile.table": {"rows": [1, 2], "from": 0, "to": 1, "rising": True}},
+        ),
+        """A calibration knows no order of values.
+Leave out `rising` and `falling`: the data tell.""",
     ),
     "many combinations without Optuna": (
         MissingExtra,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,10 @@ import numpy as np
 
 from modelica_like.analyse.calibration.measurements import Measurement, Numbers, OperatingPoints, Trajectories
 from modelica_like.analyse.calibration.pictures import ellipses
-from modelica_like.analyse.optimize.terms import read_free, starts_of
+from modelica_like.analyse.optimize.designs import Designs, Progress, better, counted
+from modelica_like.analyse.optimize.problem import build_free
+from modelica_like.analyse.optimize.squares import MOST, least_squares
+from modelica_like.analyse.optimize.terms import Free, starts_of
 from modelica_like.analyse.written import with_values
 from modelica_like.arguments import checked
 from modelica_like.compile.compiled import CompiledDae
@@ -23,10 +27,9 @@ from modelica_like.errors import (
     SolveError,
     UnknownName,
     ValueOutOfRange,
-    extra_module,
 )
 from modelica_like.language import Assembly, Component
-from modelica_like.simulation import Model, build, loaded
+from modelica_like.simulation import Model, loaded
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,6 +40,8 @@ Matrix = np.ndarray[Any, np.dtype[np.float64]]
 _RANK = 1e-8
 """Relative size of a singular value below which the data do not determine a combination of parameters."""
 _CONFIDENCE = 0.95
+_AT_BOUND = 1e-9
+"""Distance from a bound, relative to that of both: at it."""
 _SMALL = 1e-4
 """Of the bounds' distance: a parameter nearer to zero has no relative change that could say what data determine."""
 
@@ -62,6 +67,7 @@ class Calibration:
         at_bounds: parameters that stopped at a bound.
         starts: sum of squares reached from each start.
         drive: the drive as it was.
+        notes: sentences about the search.
     """
 
     model: CompiledDae = field(repr=False)
@@ -77,6 +83,7 @@ class Calibration:
     at_bounds: tuple[str, ...]
     starts: tuple[float, ...] = field(repr=False)
     drive: Component | None = field(default=None, repr=False)
+    notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> float:
         if name not in self.names:
@@ -147,13 +154,13 @@ class Calibration:
             lines.append(f"  The data do not determine this combination: {parts}.")
         worst = int(np.argmax(np.abs(self.residuals)))
         lines.append(f"  largest residual {self.residuals[worst]:+.3g} of its uncertainty: {self.labels[worst]}")
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
 
 @checked
 def calibrate(
-    drive: Model, data: Sequence[Measurement] | Measurement, parameters: Mapping[str, tuple[Any, Any]], *,
-    guess: Mapping[str, Any] | None = None, starts: int = 1, seed: int = 0,
+    drive: Model, data: Sequence[Measurement] | Measurement, parameters: Mapping[str, Any], *,
+    guess: Mapping[str, Any] | None = None, starts: int = 1, seed: int = 0, progress: Progress | None = None,
 ) -> Calibration:  # fmt: skip
     """Find the parameters that fit measurements best, by weighted least squares.
 
@@ -162,36 +169,36 @@ def calibrate(
     Args:
         drive: a component, a netlist file or a compiled model.
         data: measurements: `OperatingPoints`, `Trajectories`, `Numbers`.
-        parameters: path of each parameter with its lower and upper bound.
+        parameters: lower and upper bound by path, as `free` of `optimize`: of a table with two columns
+            `{"points": 5, "from": "0 N", "to": "9 kN"}` or `rows` of it.
         guess: start values; by default those of the model, moved into the bounds.
         starts: number of starts; all but the first from a Latin hypercube between the bounds. The best result is kept.
         seed: of the Latin hypercube.
+        progress: called after each design with the number of those tried, and the most that there can be.
 
     Raises:
         UnknownName: a name is not known.
         ValueOutOfRange: there are no data, they set what is to be found, or bounds are not in order.
+        KeyboardInterrupt: the search was interrupted; the note has the best values until then.
         CalibrationFailed: the model could not be solved from any start.
         MissingExtra: scipy is not installed.
     """
     drive = loaded(drive)
-    model = build(drive, free=parameters)
     measured = _measurements(data, parameters, starts)
-    problem = _Problem(model, measured, parameters, guess or {})
-    begins = problem.starts(starts, seed)
-    results: list[Any] = []
-    failures: list[InitializationError | SolveError] = []
-    for begin in begins:
-        try:
-            results.append(problem.solve(begin))
-        except (InitializationError, SolveError) as error:
-            failures.append(error)
-    if not results:
+    model, free, ordered = build_free(drive, parameters, guess or {}, moved=True)
+    if ordered:
+        raise ValueOutOfRange(
+            "A calibration knows no order of values.", advice="Leave out `rising` and `falling`: the data tell."
+        )
+    designs = _Deviations(model, free, measured, counted(progress, MOST * len(free) * starts))
+    try:
+        outcomes = designs.from_starts(starts_of(free, starts, seed), partial(least_squares, designs))
+    except (InitializationError, SolveError) as failure:
         raise CalibrationFailed(
-            f"{model.name} could not be calibrated: {failures[-1].what}", where=failures[-1].where,
+            f"{model.name} could not be calibrated: {failure.what}", where=failure.where,
             advice="Give a guess for which the model can be solved, or narrower bounds.",
-        )  # fmt: skip
-    best = min(results, key=lambda r: r.cost)
-    result = problem.result(best, tuple(2 * result.cost for result in results))
+        ) from None  # fmt: skip
+    result = designs.result(better(outcomes).x, tuple(outcome.objective for outcome in outcomes))
     return replace(result, drive=drive if isinstance(drive, Component) else None)
 
 
@@ -217,56 +224,30 @@ def _measurements(data: Any, parameters: Mapping[str, Any], starts: int) -> list
     return measured
 
 
-class _Problem:
-    """Residuals and their Jacobian in values scaled by the bounds."""
+class _Deviations(Designs):
+    """The deviations of a model from measurements, and their derivatives: experiments are the load cases."""
 
     def __init__(
-        self, model: CompiledDae, data: Sequence[Measurement], parameters: Mapping[str, tuple[Any, Any]],
-        guess: Mapping[str, Any],
+        self, model: CompiledDae, free: tuple[Free, ...], data: Sequence[Measurement], told: Callable[[], None]
     ) -> None:  # fmt: skip
-        self.model, self.data, self.names = model, data, tuple(parameters)
-        self.free = read_free(model.with_parameters(dict(guess)), parameters, moved=True)
-        self.units = tuple(str(parameter.unit) for parameter in self.free)
-        self.low = np.array([parameter.low for parameter in self.free])
-        self.span = np.array([parameter.span for parameter in self.free])
+        super().__init__(free, told)
+        self.model, self.data, self.names = model, data, tuple(parameter.name for parameter in free)
         self.labels: tuple[str, ...] = ()
-        self._at: tuple[bytes, Matrix, Matrix] | None = None
 
-    def starts(self, count: int, seed: int) -> list[Matrix]:
-        """Return starts in [0, 1]."""
-        return [(x - self.low) / self.span for x in starts_of(self.free, count, seed)]
+    def run(self, x: Matrix) -> tuple[Matrix, Matrix]:
+        """Return the deviations of all experiments as one row, and their derivatives."""
+        model = self.model.with_parameters(self.named(x))
+        residuals, slopes, labels = zip(*(one.residuals(model, self.names) for one in self.data), strict=True)
+        self.labels = tuple(chain(*labels))
+        return np.concatenate(residuals)[None, :], np.concatenate(slopes)[None, :, :]
 
-    def solve(self, begin: Matrix) -> Any:
-        """Run the least-squares solver from one start."""
-        return extra_module("scipy.optimize", "analyse").least_squares(
-            lambda q: self.evaluate(q)[0], begin, lambda q: self.evaluate(q)[1], bounds=(0.0, 1.0), x_scale="jac",
-            ftol=1e-14, xtol=1e-12, gtol=1e-12,
-        )  # fmt: skip
-
-    def evaluate(self, q: Matrix) -> tuple[Matrix, Matrix]:
-        """Return residuals and Jacobian; the solver asks for both at the same point."""
-        key = q.tobytes()
-        if self._at is None or self._at[0] != key:
-            model = self.at(q)
-            residuals, slopes, labels = zip(
-                *(measured.residuals(model, self.names) for measured in self.data), strict=True
-            )
-            self.labels = tuple(chain(*labels))
-            self._at = key, np.concatenate(residuals), np.concatenate(slopes) * self.span
-        return self._at[1], self._at[2]
-
-    def at(self, q: Matrix) -> CompiledDae:
-        values = self.low + self.span * q
-        return self.model.with_parameters(dict(zip(self.names, map(float, values), strict=True)))
-
-    def result(self, fit: Any, costs: tuple[float, ...]) -> Calibration:
+    def result(self, x: Matrix, costs: tuple[float, ...]) -> Calibration:
         """Compute covariance and rank at the solution."""
-        residuals, slopes = self.evaluate(fit.x)
-        values = self.low + self.span * fit.x
-        sizes = np.maximum(np.abs(values), _SMALL * self.span)
-        by_values = slopes / self.span
-        relative = by_values * sizes
-        _, singular, right = np.linalg.svd(relative, full_matrices=True)
+        best = self.at(x)
+        assert best is not None
+        residuals, by_values = best.values[0], best.slopes[0]
+        sizes = np.maximum(np.abs(x), _SMALL * self.span)
+        _, singular, right = np.linalg.svd(by_values * sizes, full_matrices=True)
         padded = np.concatenate([singular, np.zeros(len(self.names) - len(singular))])
         determined = padded > _RANK * padded.max(initial=1e-300)
         covariance = self._covariance(right, padded, determined, residuals, sizes)
@@ -274,10 +255,12 @@ class _Problem:
             {name: float(w) for name, w in zip(self.names, row, strict=True) if abs(w) > 1e-3}
             for row in right[~determined]
         )
-        edges = tuple(name for name, q in zip(self.names, fit.x, strict=True) if q <= 1e-9 or q >= 1 - 1e-9)
+        near = np.minimum(x - self.low, self.low + self.span - x) <= _AT_BOUND * self.span
+        edges = tuple(name for name, edge in zip(self.names, near, strict=True) if edge)
         return Calibration(
-            self.at(fit.x), self.names, values, self.units, residuals, self.labels, covariance,
-            by_values.T @ by_values, int(determined.sum()), lost, edges, costs,
+            self.model.with_parameters(self.named(x)), self.names, x, tuple(str(p.unit) for p in self.free), residuals,
+            self.labels, covariance, by_values.T @ by_values, int(determined.sum()), lost, edges, costs,
+            notes=tuple(self.remarks()),
         )  # fmt: skip
 
     def _covariance(self, right: Matrix, singular: Matrix, determined: Any, residuals: Matrix, sizes: Matrix) -> Matrix:

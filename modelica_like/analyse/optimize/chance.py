@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from modelica_like.analyse.optimize.designs import Outcome
 from modelica_like.analyse.optimize.problem import Problem
 from modelica_like.analyse.optimize.sized import Outputs
-from modelica_like.analyse.optimize.solve import Outcome
 from modelica_like.analyse.optimize.terms import Limit
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.analyse.tolerance.result import Probability
@@ -69,15 +69,12 @@ class Chances:
             limits[k] = replace(limits[k], value=limits[k].value - sign * float(margin))
         return replace(self.problem, limits=tuple(limits))
 
-    def _values(self, x: Vector) -> dict[str, float]:
-        return dict(zip((parameter.name for parameter in self.problem.free), map(float, x), strict=True))
-
     def _margins(self, x: Vector) -> Vector:
         """Return the distances at a design, the largest of all load cases."""
         problem, question = self.problem, self.problem.question
         rows: list[Vector] = []
         for case in problem.cases:
-            model = problem.model.with_parameters({**case.values, **self._values(x)})
+            model = problem.model.with_parameters({**case.values, **problem.named(x)})
             # What is free can scatter, too: about the value of the design.
             population = read_population(model, question.tolerances or {}, question.correlated, question.folder)
             to = [scatter.name for scatter in population.scatters]
@@ -95,7 +92,7 @@ class Chances:
         distances: list[Vector] = []
         results: list[Probability] = []
         for case in problem.cases:
-            model = problem.model.with_parameters({**case.values, **self._values(x)})
+            model = problem.model.with_parameters({**case.values, **problem.named(x)})
             population = read_population(model, question.tolerances or {}, question.correlated, question.folder)
             plain = [replace(limit, text=limit.inner, probability=1.0) for limit in limits]
             run = {"until": question.until, "start": question.start}

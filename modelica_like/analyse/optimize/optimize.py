@@ -13,11 +13,12 @@ import numpy as np
 
 from modelica_like.analyse.optimize.chance import Chances
 from modelica_like.analyse.optimize.choices import ENUMERATED, Choice, options_of, together, with_choice
+from modelica_like.analyse.optimize.designs import FEASIBLE, Outcome, Progress, better, counted
 from modelica_like.analyse.optimize.problem import Question, make_problem
 from modelica_like.analyse.optimize.promising import FINISHED, TRIALS, promising
 from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optimum
 from modelica_like.analyse.optimize.runs import Runs
-from modelica_like.analyse.optimize.solve import FEASIBLE, MOST_STEPS, Outcome, Search
+from modelica_like.analyse.optimize.solve import MOST_STEPS, Search
 from modelica_like.analyse.optimize.terms import Row, starts_of
 from modelica_like.analyse.tolerance.tolerance import scatter_of
 from modelica_like.analyse.written import placed
@@ -30,7 +31,6 @@ from modelica_like.language.inside import inside
 from modelica_like.simulation import Model, loaded, simulate
 from modelica_like.solve.initialize import StartKind
 
-Progress = Callable[[int, int], None]
 _POINTS = 20
 _SAME = 1e-5
 """Distance of two designs relative to the bounds: a design is known to about the root of the solver's tolerance."""
@@ -110,7 +110,7 @@ def _answer(
             "There may be one objective, or two for a front.", advice="Limit the others by subject_to."
         )
     if not choices:
-        return _Study(drive, question, seed, _told(progress, number)).best(number, points)
+        return _Study(drive, question, seed, counted(progress, MOST_STEPS * number)).best(number, points)
     if len(question.minimize) + len(question.maximize) > 1:
         raise ValueOutOfRange("A choice needs one objective.", advice="Limit the other one by subject_to.")
     if not isinstance(drive, Component):
@@ -122,19 +122,11 @@ def _answer(
     count = math.prod(map(len, options))
     if count <= ENUMERATED:
         every = [together(several) for several in itertools.product(*options)]
-        return _best_choice(drive, question, every, number, seed, _told(progress, number * count))
-    told = _told(progress, number * FINISHED, TRIALS)
+        return _best_choice(drive, question, every, number, seed, counted(progress, MOST_STEPS * number * count))
+    told = counted(progress, MOST_STEPS * number * FINISHED + TRIALS)
     some, note = promising(drive, question, options, seed, told)
     best = _best_choice(drive, question, some, number, seed, told)
     return replace(best, runs=best.runs + note.runs, notes=(*best.notes, str(note)))
-
-
-def _told(progress: Progress | None, searches: int, more: int = 0) -> Callable[[], None]:
-    """Return what counts designs."""
-    designs = itertools.count(1)
-    if progress is None:
-        return lambda: None
-    return lambda: progress(next(designs), MOST_STEPS * searches + more)
 
 
 def _listed(texts: str | Sequence[str]) -> tuple[str, ...]:
@@ -169,8 +161,7 @@ class _Study:
         return replace(result, notes=(*result.notes, *map(str, chances.results)))
 
     def _search(self, search: Search, starts: int) -> Outcome:
-        usable = [x for x in starts_of(self.problem.free, starts, self.seed) if self.runs.at(x) is not None]
-        return _better([search.from_design(x) for x in usable])
+        return better(self.runs.from_starts(starts_of(self.problem.free, starts, self.seed), search.from_design))
 
     def _front(self, starts: int, points: int) -> Front:
         if points < 2:
@@ -197,7 +188,7 @@ class _Study:
     def optimum(self, search: Search, outcome: Outcome) -> Optimum:
         """Return a result with its names, checked by IDAS."""
         problem, x = self.problem, outcome.x
-        values = dict(zip((parameter.name for parameter in problem.free), map(float, x), strict=True))
+        values = problem.named(x)
         before = self.runs.at(problem.begin)
         after, notes = self._checked(values, self.runs.at(x))
         first = before.values if before is not None else np.full(after.shape, np.nan)
@@ -270,14 +261,7 @@ class _Study:
             if after[:, self.problem.outputs.index(row.output)].max() < row.most * (1.0 - FEASIBLE):
                 continue
             yield f"{row.output} is at the end of the run: a longer run may have a better design."
-        refused = len(self.runs.refusals)
-        if refused:
-            reason = self.runs.refusals[0][1].what
-            yield f"{refused} designs were left out, the first because: {reason}"
-
-
-def _better(outcomes: Sequence[Outcome]) -> Outcome:
-    return min(outcomes, key=lambda outcome: (max(outcome.excess, FEASIBLE), outcome.objective))
+        yield from self.runs.remarks()
 
 
 def _different(points: Sequence[Optimum]) -> tuple[Optimum, ...]:

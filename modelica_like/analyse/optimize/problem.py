@@ -16,6 +16,7 @@ from modelica_like.analyse.optimize.modal import is_modal, modal_unit
 from modelica_like.analyse.optimize.sized import Sized
 from modelica_like.analyse.optimize.terms import (
     Aim,
+    Bounded,
     Case,
     Free,
     Limit,
@@ -74,7 +75,7 @@ class Question:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(Bounded):
     """A question about a compiled model.
 
     Attributes:
@@ -100,21 +101,6 @@ class Problem:
     within: tuple[Row, ...]
     sized: Sized
 
-    @property
-    def low(self) -> Vector:
-        """Lower bounds, shape (free,)."""
-        return np.array([parameter.low for parameter in self.free])
-
-    @property
-    def span(self) -> Vector:
-        """Distances of the bounds, shape (free,)."""
-        return np.array([parameter.span for parameter in self.free])
-
-    @property
-    def begin(self) -> Vector:
-        """Values of the drive, shape (free,)."""
-        return np.array([parameter.value for parameter in self.free])
-
     def numbers(self, rows: Sequence[Row]) -> tuple[list[int], Vector, Vector]:
         """Return positions of the outputs of rows, their signs and limits."""
         places = [self.outputs.index(row.output) for row in rows]
@@ -136,14 +122,11 @@ def make_problem(
         LanguageError: a table of a compiled model is to be free.
         ModelicaLikeError: the drive has an error.
     """
-    profiles = {path: given for path, given in (question.free or {}).items() if isinstance(given, Mapping)}
-    plain = {path: given for path, given in (question.free or {}).items() if path not in profiles}
     with placed("free"):
-        drive, cells, ordered = _with_profiles(loaded(drive), profiles)
         scattering = [*(question.tolerances or {})]
-        model = build(drive, free=[*plain, *scattering], tables=[path.replace("[", "[[]") for path in profiles])
-        model = model.with_parameters(dict(question.parameters or {}))
-        free = read_free(model, plain | cells) if question.free or not question.chosen else ()
+        model, free, ordered = build_free(
+            drive, question.free or {}, question.parameters or {}, scattering, none=question.chosen
+        )
     with placed("minimize" if question.minimize else "maximize"):
         sized = Sized(drive, model, lambda: quick_run(model, question.until, start=question.start))
         unit_of = _units(model, sized)
@@ -160,6 +143,36 @@ def make_problem(
     read = [name for name in outputs if not is_modal(name) and not sized.has(name)]
     within = _within_the_run(model, question, read, limits)
     return Problem(question, model, free, aims, limits, cases, order, outputs, within, sized)
+
+
+def build_free(
+    drive: Model, given: Mapping[str, Any], parameters: Mapping[str, Any], others: Sequence[str] = (), *,
+    none: bool = False, moved: bool = False,
+) -> tuple[CompiledDae, tuple[Free, ...], list[tuple[str, str]]]:  # fmt: skip
+    """Build a drive so that what is free can change.
+
+    Args:
+        drive: the drive.
+        given: bounds by path, or `points`, `rows`, … of a table.
+        parameters: other values of parameters.
+        others: parameters that are to change besides.
+        none: whether nothing need be free.
+        moved: whether a value of the drive that is not between its bounds moves to the next one.
+
+    Returns:
+        The model, what is free, and pairs of names: the first one's value is at most that of the second one.
+
+    Raises:
+        UnknownName, ValueOutOfRange, UnitError: bounds do not fit the drive.
+        LanguageError: a table of a compiled model is to be free.
+        ModelicaLikeError: the drive has an error.
+    """
+    profiles = {path: bounds for path, bounds in given.items() if isinstance(bounds, Mapping)}
+    plain = {path: bounds for path, bounds in given.items() if path not in profiles}
+    drive, cells, ordered = _with_profiles(loaded(drive), profiles)
+    model = build(drive, free=[*plain, *others], tables=[path.replace("[", "[[]") for path in profiles])
+    model = model.with_parameters(dict(parameters))
+    return model, () if none and not given else read_free(model, plain | cells, moved=moved), ordered
 
 
 def _within_the_run(

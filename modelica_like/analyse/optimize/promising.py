@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.optimize.choices import Choice, together, with_choice
+from modelica_like.analyse.optimize.designs import FEASIBLE
 from modelica_like.analyse.optimize.problem import Problem, Question, make_problem
 from modelica_like.analyse.optimize.runs import Values
-from modelica_like.analyse.optimize.solve import FEASIBLE, Scale
+from modelica_like.analyse.optimize.solve import Scale
 from modelica_like.analyse.written import placed
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import ModelicaLikeError, extra_module
@@ -131,7 +132,7 @@ class _Trials:
         choice = self.choice(places)
         problem, values = (self.problem, choice.values) if self._one_model else (self._of(places, choice), {})
         x = problem.low + problem.span * free
-        given = {**values, **dict(zip((p.name for p in problem.free), map(float, x), strict=True))}
+        given = {**values, **problem.named(x)}
         alone = Values(problem)
         self.runs += len(problem.cases)
         outputs = np.array([alone.at({**case.values, **given}) for case in problem.cases])

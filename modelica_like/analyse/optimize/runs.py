@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from modelica_like.analyse.optimize.designs import Design, Designs
 from modelica_like.analyse.optimize.modal import is_modal, modal_slopes, modal_values
 from modelica_like.analyse.optimize.problem import Problem
 from modelica_like.analyse.optimize.sized import Outputs
@@ -20,21 +20,6 @@ from modelica_like.simulation import quick_run
 
 PRECISION = 1e-7
 """Of the derivatives: the values of limits are as precise as a tenth of a thousandth of a thousandth."""
-
-
-@dataclass(frozen=True, eq=False)
-class Design:
-    """A design that was run.
-
-    Attributes:
-        x: values of what is free in SI units, shape (free,).
-        values: shape (cases, outputs).
-        slopes: derivatives by x, shape (cases, outputs, free); empty if only values were asked for.
-    """
-
-    x: Vector
-    values: Vector
-    slopes: Vector = field(repr=False)
 
 
 class Values:
@@ -71,21 +56,17 @@ class Values:
         return np.array([*values[0], *modes], float)[self.places]
 
 
-class Runs:
-    """Runs designs, each once.
+class Runs(Designs):
+    """Runs designs in all load cases, each once.
 
     Args:
         problem: the problem.
         told: called after each design.
-
-    Attributes:
-        count: number of runs so far.
-        designs: in the order in which they were tried.
-        refusals: designs at which a run fails or has no derivative, and the reasons.
     """
 
     def __init__(self, problem: Problem, told: Callable[[], None]) -> None:
-        self.problem, self._told = problem, told
+        super().__init__(problem.free, told)
+        self.problem = problem
         question, names = problem.question, [parameter.name for parameter in problem.free]
         self.functions: list[SimulationFunction] = []
         self.alone = Values(problem)
@@ -102,51 +83,33 @@ class Runs:
                 error.add_note(f"This is the drive as it is{place}, where the optimisation begins.")
                 raise
             self.functions.append(function)
-        self.designs: list[Design] = []
-        self.refusals: list[tuple[Vector, ModelicaLikeError]] = []
-        self._known: dict[bytes, Design | ModelicaLikeError] = {}
 
     @property
     def count(self) -> int:
         """Number of runs so far."""
         return self._single + sum(function.runs + 1 for function in self.functions)
 
-    def at(self, x: Vector) -> Design | None:
-        """Return the design at values of what is free with its derivatives, None where a run is refused."""
-        known = self._known.get(x.tobytes())
-        if known is None:
-            known = self._known[x.tobytes()] = self._run(x)
-        return known if isinstance(known, Design) else None
-
-    def _run(self, x: Vector) -> Design | ModelicaLikeError:
-        try:
-            if not len(x):
-                return self._as_it_is(x)
-            parts = [self._modes(x, slopes=True)]
-            if self.read:
-                results = [function.at(x) for function in self.functions]
-                values = np.array([[output.value for output in result.outputs] for result in results])
-                slopes = np.array([result.derivatives for result in results])
-                of_runs = [self._of_runs.slopes(*pair) for pair in zip(values, slopes, strict=True)]
-                parts = [(self._of_runs.values(values), np.array(of_runs)), *parts]
-        except ModelicaLikeError as error:
-            self.refusals.append((x.copy(), error))
-            return error
+    def run(self, x: Vector) -> tuple[Vector, Vector]:
+        """Return values and derivatives, as `Designs` says."""
+        if not self.free:
+            return self._as_it_is()
+        parts = [self._modes(x, slopes=True)]
+        if self.read:
+            results = [function.at(x) for function in self.functions]
+            values = np.array([[output.value for output in result.outputs] for result in results])
+            slopes = np.array([result.derivatives for result in results])
+            of_runs = [self._of_runs.slopes(*pair) for pair in zip(values, slopes, strict=True)]
+            parts = [(self._of_runs.values(values), np.array(of_runs)), *parts]
         values, slopes = (np.concatenate(part, axis=1)[:, self._places] for part in zip(*parts, strict=True))
-        return self._kept(Design(x.copy(), values, slopes))
+        return values, slopes
 
-    def _as_it_is(self, x: Vector) -> Design:
-        """Return the only design where nothing is free."""
+    def _as_it_is(self) -> tuple[Vector, Vector]:
+        """Return the values of the only design where nothing is free."""
         self._single = len(self.problem.cases) if self.read else 0
         values = np.array([self.alone.at(case.values) for case in self.problem.cases])
         if not np.all(np.isfinite(values)):
             raise does_not_happen(self.problem.outputs[int(np.argmin(np.isfinite(values).all(axis=0)))])
-        return self._kept(Design(x, values, np.zeros((*values.shape, 0))))
-
-    def _kept(self, design: Design) -> Design:
-        self.designs.append(design)
-        self._told()
-        return design
+        return values, np.zeros((*values.shape, 0))
 
     def certain(self, x: Vector) -> bool:
         """Return whether the replay has the same derivatives at a design; if not, it gives those of all designs now."""
@@ -172,10 +135,10 @@ class Runs:
 
     def _modes(self, x: Vector, *, slopes: bool) -> tuple[Vector, Vector]:
         """Return outputs of modes, shape (cases, outputs), and their derivatives by x."""
-        problem, names = self.problem, [parameter.name for parameter in self.problem.free]
+        problem = self.problem
         values = np.zeros((len(problem.cases), len(self.modal)))
         derivatives = np.zeros((*values.shape, len(x)))
-        given = dict(zip(names, map(float, x), strict=True))
+        given = self.named(x)
         for c, case in enumerate(problem.cases if self.modal else ()):
             model = problem.model.with_parameters({**case.values, **given})
             values[c] = modal_values(model, self.modal, problem.question.start)

@@ -10,12 +10,12 @@ derivatives.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.optimize.designs import FEASIBLE, Outcome
 from modelica_like.analyse.optimize.problem import Problem
 from modelica_like.analyse.optimize.runs import Runs
 from modelica_like.analyse.optimize.terms import Row
@@ -23,8 +23,6 @@ from modelica_like.analyse.sensitivity.callback import NamedCallback
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import extra_module
 
-FEASIBLE = 1e-6
-"""Excess of a limit, relative to the size of its output, that counts as none: ten times the precision of gradients."""
 MOST_STEPS = 80
 """Of IPOPT: what converges does so within half of them."""
 _OPTIONS = {
@@ -42,27 +40,6 @@ _FIRST, _LAST = 1e-2, 1e-7
 """Radii of COBYQA's trust region, relative to the bounds."""
 _TRIALS = 40
 """Its runs per free parameter."""
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """Where a search ended.
-
-    Attributes:
-        x: values of what is free, in SI units.
-        objective: the worst of all load cases, times its sign and over its size.
-        excess: the largest excess of a limit over its size.
-        prices: how much the objective changes by a limit's value, in SI units of both; shape (cases, limit rows).
-        optimal: whether the conditions of an optimum hold.
-        status: of the solver.
-    """
-
-    x: Vector
-    objective: float
-    excess: float
-    prices: Vector
-    optimal: bool
-    status: str
 
 
 class Scale:
@@ -126,26 +103,11 @@ class Search(Scale):
         if not self.problem.free:
             prices = np.zeros((len(self.problem.cases), len(self.rows)))
             return Outcome(x, *self.measures(self._values(x)), prices, True, "")
-        try:
+        with self.runs.interruptible(self.measures, self.aim_scale):
             outcome = self._from(x)
             if outcome.optimal and not self.runs.certain(outcome.x):
                 return self._from(outcome.x)
             return outcome
-        except KeyboardInterrupt as interrupt:
-            interrupt.add_note(self._best_so_far())
-            raise
-
-    def _best_so_far(self) -> str:
-        """Return a sentence about the best design tried."""
-        measured = [(*self.measures(design.values), design.x) for design in self.runs.designs]
-        if not measured:
-            return "No design was finished."
-        objective, excess, x = min(measured, key=lambda item: (max(item[1], FEASIBLE), item[0]))
-        names = [parameter.name for parameter in self.problem.free]
-        values = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, x, strict=True))
-        within = "within all limits" if excess <= FEASIBLE else "exceeding a limit"
-        reached = objective * self.aim_scale
-        return f"The best of {len(measured)} designs, {within}: {values}; the objective is {reached:.6g}."
 
     def _from(self, x: Vector) -> Outcome:
         outcome = self._ipopt(x, elastic=False)

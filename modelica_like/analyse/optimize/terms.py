@@ -39,6 +39,35 @@ class Free:
         return self.high - self.low
 
 
+class Bounded:
+    """Something that has free parameters.
+
+    Attributes:
+        free: what may change.
+    """
+
+    free: tuple[Free, ...]
+
+    @property
+    def low(self) -> Vector:
+        """Lower bounds, shape (free,)."""
+        return np.array([parameter.low for parameter in self.free])
+
+    @property
+    def span(self) -> Vector:
+        """Distances of the bounds, shape (free,)."""
+        return np.array([parameter.span for parameter in self.free])
+
+    @property
+    def begin(self) -> Vector:
+        """Values of the drive, shape (free,)."""
+        return np.array([parameter.value for parameter in self.free])
+
+    def named(self, x: Vector) -> dict[str, float]:
+        """Return values of what is free by name."""
+        return dict(zip((parameter.name for parameter in self.free), map(float, x), strict=True))
+
+
 @dataclass(frozen=True)
 class Row:
     """A number of a run, times a sign: of an objective to be small, of a limit to be at most `most`, in SI units."""
