@@ -5,6 +5,7 @@
 
 #define MOST_EDGES 100  /* in a step: more are noise */
 #define MOST_ERROR 10   /* tolerances, as estimated, beside the largest effects on an output: results have less */
+#define SHORT 1e-11     /* of a piece that has landed on an edge: it ends behind that */
 #define MOST_HALVINGS 8 /* of a step: what begins on a kink is wrong in its first part only, of 4e-3 */
 
 /* Adds bars of states, parameters, inputs and d, which lie in `dots`, and of the time. */
@@ -153,7 +154,7 @@ static void smoothly_back(Instance *c, double begin, double end, int halvings) {
     const Model *m = c->model;
     double h = end - begin, *after = g->behind; /* not needed on pieces */
     size_t n = (size_t)m->n_unknowns;
-    if (!(h > 0)) return;
+    if (!(h > SHORT * (c->piece->end - c->piece->begin))) return;
     if (!prepare_step(c, begin, h)) lose_back(c);
     double error = slopes_of_integrands(c, begin, h);
     for (int v = 0; v < g->n_vectors; v++) {
@@ -219,7 +220,9 @@ void piece_back(Instance *c, const Record *along) {
     memcpy(c->piece, along->own, piece_size(c->model));
     do {
         begins[parts] = behind;
-        ends[parts] = parts < MOST_EDGES ? min_of(edge_ahead(c, begins[parts], &behind), along->end) : along->end;
+        int any = parts < MOST_EDGES && !along->edgeless;
+        ends[parts] = any ? min_of(edge_ahead(c, begins[parts], &behind), along->end) : along->end;
+        if (!any) behind = INFINITY;
     } while (parts++ < MOST_EDGES && behind <= along->end && behind < INFINITY);
     while (parts-- > 0) {
         for (double t; (t = seed_behind(c, begins[parts], 0)) > begins[parts];) {

@@ -11,12 +11,12 @@ enum { N_NODES = LAST_POINTS }; /* of stages: the last ones have one */
 
 typedef struct Record { /* a part of a piece along which the run has moved, or an instant */
     struct Record *previous;
-    Result (*pass)(Instance *c); /* an instant, or NULL */
-    int start, n_rounds;
-    void *before, *behind;       /* copies of the state; of a move: where parameters, inputs or d have changed */
-    const void *frame;           /* of a move: a copy with its parameters, inputs and d */
-    double begin, end, *own;     /* of a move: its piece */
-    const unsigned char *rounds; /* transitions that have fired at an instant, by rounds */
+    Result (*pass)(Instance *c);   /* an instant, or NULL */
+    int start, n_rounds, edgeless; /* edgeless: of a move; no edge is near its piece */
+    void *before, *behind;         /* copies of the state; of a move: where parameters, inputs or d have changed */
+    const void *frame;             /* of a move: a copy with its parameters, inputs and d */
+    double begin, end, *own;       /* of a move: its piece */
+    const unsigned char *rounds;   /* transitions that have fired at an instant, by rounds */
 } Record;
 
 typedef struct {
@@ -36,6 +36,10 @@ typedef struct {      /* a part of what is differentiated; those at a time come 
     double t, moving; /* that time; derivative by the time of the instant */
     const double *by; /* derivatives by states, parameters, inputs and d */
 } Seed;
+
+typedef struct {                      /* an operation of a tape that has one */
+    int operation, place, due, alone; /* alone: it has been felt, and is looked at by itself */
+} Kink;
 
 typedef struct {
     int64_t variable; /* is integrated over the run; -1: nothing */
@@ -67,11 +71,14 @@ struct Gradient {
     double singular_at, speed;   /* how fast the guard of an event comes to zero, where it matters; or 0 */
     Doubt doubts[MOST_DOUBTFUL];
     double *vectors, *behind; /* of outputs, then of doubts: derivatives by numbers of the state, and by the time */
-    double *sides, *slope, *moment, *rates, *work, *sizes, *motions, *largest;
+    double *sides, *slope, *way, *moment, *rates, *work, *sizes, *motions, *largest;
     double *points, *matrices, *stages, *node_bars; /* of a step */
     double *integrand_slopes, *integrand_bars;      /* by states and implicit unknowns, and by the rest, at the nodes */
     double *later, *lanes;                          /* derivatives by the time of an instant; bars of several vectors */
     double *rests; /* of operations, then of guards: since when they are at their kinks, on the way back, or nan */
+    Kink *kinked, **kinks; /* of the rates; those that matter in the present modes */
+    int n_kinked, n_kinks;
+    uint64_t kinks_by;    /* behind which count of `decided_by` these were found */
     unsigned char *still; /* vectors that a step leaves as they are */
     const Along *along;   /* or NULL; then outputs: */
     const uint32_t *of;
@@ -116,6 +123,8 @@ void add_bars(Instance *c, double *vector);
 void slope_of_output(Instance *c, const Tape *tape, int output, double *bars, double *slope);
 void piece_back(Instance *c, const Record *along);
 /* kinks.c */
+void find_kinked(Instance *c);
+void note_kinks(Instance *c);
 void check_kinks(Instance *c);
 void check_outputs(Instance *c);
 int begins_alike(Instance *c, const Record *at, int listed);

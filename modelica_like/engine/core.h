@@ -42,6 +42,7 @@ int output_place(const Tape *tape, const Tape *ran, int output);
 void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int period);
 void evaluate_part(Instance *c, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
+void mark_mattering(Instance *c, const Tape *tape);
 void forget_sets(Instance *c);
 /* linear.c */
 int qr_factor(const QrPattern *pattern, const double *values, Instance *c);

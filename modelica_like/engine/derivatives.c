@@ -34,15 +34,24 @@ Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
 /* Factorises the Jacobian of the implicit equations at the present point, with the slots of m->tapes.rates filled. */
 Result factor_implicit(Instance *c) {
     if (!settle(c)) return RESULT_ERROR;
-    evaluate_now(c, &c->model->tapes.alg_jacobian, c->dense_matrix);
+    if (c->model->n_z == 0) return RESULT_OK;
+    evaluate_special(c, &c->model->tapes.alg_jacobian, c->state.t, c->x, c->dense_matrix);
     if (!lu_factor(c->model->n_z, c->dense_matrix, c->order)) return fail(c, IMPLICIT_SINGULAR, c->state.t);
     return RESULT_OK;
 }
 
+/* Runs a tape at the present point and returns the one whose results are in the slots: a gradient needs derivatives by
+ * what it has been asked for only. */
+static const Tape *run_now(Instance *c, const Tape *tape, double *results) {
+    if (c->passing && (tape == &c->model->tapes.alg || tape == &c->model->tapes.rates))
+        return evaluate_on_tape(c, tape, c->state.t, c->x, results);
+    evaluate_now(c, tape, results);
+    return tape;
+}
+
 /* Derivatives of what a tape gives at the present point, with the dots of its arguments given. */
 void tangent_now(Instance *c, const Tape *tape, double *results) {
-    evaluate_now(c, tape, results);
-    tape_tangent(tape, c->slots, c->dots, results);
+    tape_tangent(run_now(c, tape, results), c->slots, c->dots, results);
 }
 
 /* With the dots of the arguments given, fills those of z. */
@@ -207,8 +216,8 @@ void adjoint_of_implicit(Instance *c, int regular) {
         least_squares(m->n_z, m->n_z, c->dense_matrix, c->residual, c->vector);
     }
     memset(c->dots + m->slot_z, 0, m->n_z * sizeof(double));
-    evaluate_now(c, &m->tapes.alg, c->residual);
-    tape_adjoint(&m->tapes.alg, c->slots, c->dots, c->vector);
+    tape_adjoint(run_now(c, &m->tapes.alg, c->residual), c->slots, c->dots, c->vector);
+    memset(c->dots + m->n_slots, 0, (size_t)c->known_used * sizeof(double)); /* does not move */
 }
 
 /* Leaves the bars of what is known at the present point, where factor_implicit has been called, in `dots`. */

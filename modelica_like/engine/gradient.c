@@ -94,6 +94,7 @@ void gradient_move(Instance *c, double end) {
     memcpy(record->own, c->piece, piece_size(c->model));
     record->begin = c->state.t;
     record->end = end;
+    record->edgeless = c->edgeless;
     if (changed && !state_copy_out(c, &record->before)) gradient_lose(c, FAILURE_LOST_BY_MEMORY);
     if (changed) g->frame = record->before;
     record->frame = g->frame;
@@ -136,25 +137,27 @@ static double *take_room(const Instance *c, size_t n_of) {
     Gradient *g = c->gradient;
     size_t n = c->n_smooth + 1, vectors = n_of + MOST_DOUBTFUL, n_y = (size_t)c->model->n_unknowns;
     size_t nonzeros = (size_t)c->model->step.n_nonzeros, integrals = g->along != NULL ? n_of * N_NODES : 0;
-    size_t rests = (size_t)(c->model->tapes.rates.n_operations + c->model->n_guards);
+    size_t operations = (size_t)c->model->tapes.rates.n_operations, rests = operations + (size_t)c->model->n_guards;
     const struct {
         double **array;
         size_t size;
     } parts[] = {{&g->vectors, vectors * n}, {&g->behind, vectors * n}, {&g->sides, 2 * n}, {&g->slope, n},
-        {&g->moment, n}, {&g->work, n + (N_NODES + 1) * n_y}, {&g->largest, n_of}, {&g->sizes, n}, {&g->motions, n},
-        {&g->rates, 2 * n_y}, {&g->points, N_NODES * n_y}, {&g->matrices, N_NODES * nonzeros},
+        {&g->way, n}, {&g->moment, n}, {&g->work, n + (N_NODES + 1) * n_y}, {&g->largest, n_of}, {&g->sizes, n},
+        {&g->motions, n}, {&g->rates, 2 * n_y}, {&g->points, N_NODES * n_y}, {&g->matrices, N_NODES * nonzeros},
         {&g->stages, (STAGES + 3) * n_y}, {&g->node_bars, vectors * N_NODES * n_y},
         {&g->integrand_slopes, integrals * n_y}, {&g->integrand_bars, integrals * n}, {&g->later, n_of},
         {&g->rests, rests}, {&g->lanes, (vectors < MOST_LANES ? vectors : MOST_LANES) * c->n_bars}};
     size_t total = 0;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) total += parts[k].size;
-    double *room = c->allocate(total + 2 * n + vectors, sizeof(double));
+    double *room = c->allocate(total + 2 * n + vectors + 3 * operations, sizeof(double));
     double *next = room;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0] && room != NULL; next += parts[k++].size)
         *parts[k].array = next;
     g->listed = (ptrdiff_t *)(void *)next;
     g->marks = (unsigned char *)(void *)(next + n);
     g->still = (unsigned char *)(void *)(next + 2 * n);
+    g->kinked = (Kink *)(void *)(next + 2 * n + vectors);
+    g->kinks = (Kink **)(void *)(g->kinked + operations);
     return room;
 }
 
@@ -226,7 +229,7 @@ static Result go_back(Instance *c) {
     if (!state_copy_out(c, &present)) return RESULT_ERROR;
     g->next_seed = g->instant = 0;
     g->present = c->state.t;
-    for (int k = 0; k < c->model->tapes.rates.n_operations + c->model->n_guards; k++) g->rests[k] = NAN;
+    find_kinked(c);
     while (seed_behind(c, c->state.t, 1) > -INFINITY) continue;
     for (const Record *record = g->last; record != NULL; record = record->previous)
         g->instant += record->pass != NULL && !record->start;

@@ -289,11 +289,10 @@ void event_back(Instance *c, const Record *at) {
     double *before = g->rates, *behind = before + m->n_unknowns, *slope = g->moment;
     int plain = is_plain(c, at);
     g->early |= at->n_rounds > 0 && ((const State *)at->before)->n_steps == 0;
-    for (int k = 0; k < m->tapes.rates.n_operations + m->n_guards; k++) /* in other modes it may matter */
-        if (at->n_rounds > 0 && !isnan(g->rests[k])) g->rests[k] = INFINITY;
     keep_vectors(c);
     state_copy_in(c, at->behind);
     evaluate_now(c, &m->tapes.rates, behind);
+    if (at->n_rounds > 0) note_kinks(c);
     move_later(c, -1);
     state_copy_in(c, at->before);
     g->speed = find_cause(c, slope);

@@ -3,16 +3,17 @@
  * reasons, and those at which a run is read. */
 #include "adjoint.h"
 
-#define RESTS 1e-3       /* of a run: for how long what is zero has to be so that it rests, and is looked at */
-#define SELDOM 0.02      /* of a run: when it is looked at again, if modes stay */
-#define NEARBY_KINK 3e-6 /* of sizes: how far slopes beside a kink are looked at */
-#define FELT_SLOPE 1e-9  /* of slopes, by which states change in the time of a run */
-#define FELT_KINK 1e-3   /* of a slope: curvature changes it by about NEARBY_KINK */
-#define SAME_TIME 1e-9   /* of the run: rounding */
-#define FELT_JUMP 1e-9   /* of outputs and their rates */
-#define CLOSER 0.01      /* the part of a way where a kink or jump is as large, */
-#define LESS 0.1         /* and what bends is less than this part of it */
-#define SOON 100         /* of how far a number is moved: what follows from that at once, by the clock */
+#define RESTS 1e-3         /* of a run: for how long what is zero has to be so that it rests, and is looked at */
+#define SELDOM 0.02        /* of a run: when it is looked at again, if modes stay */
+#define NEARBY_KINK 3e-6   /* of sizes: how far slopes beside a kink are looked at */
+#define FELT_SLOPE 1e-9    /* of slopes, by which states change in the time of a run */
+#define FELT_KINK 1e-3     /* of a slope: curvature changes it by about NEARBY_KINK */
+#define FELT_TOGETHER 2e-5 /* the same, on a way over many kinks, whose slopes add up */
+#define SAME_TIME 1e-9     /* of the run: rounding */
+#define FELT_JUMP 1e-9     /* of outputs and their rates */
+#define CLOSER 0.01        /* the part of a way where a kink or jump is as large, */
+#define LESS 0.1           /* and what bends is less than this part of it */
+#define SOON 100           /* of how far a number is moved: what follows from that at once, by the clock */
 
 /* Slopes along a direction at the present point. */
 static void slopes_along(Instance *c, const double *direction, double *slopes) {
@@ -30,33 +31,33 @@ static void slopes_along(Instance *c, const double *direction, double *slopes) {
     tangent_now(c, &m->tapes.rates, slopes);
 }
 
-/* By how much slopes along a direction differ that can be felt in the time of a run. */
-static double felt(const Instance *c, const double *direction, const double *some, const double *others) {
+/* By how much slopes along a direction differ that can be felt in the time of a run, by more than a part of them. */
+static double felt(const Instance *c, const double *direction, double part, const double *some, const double *others) {
     const double *x = direction + (c->x - c->numbers), *nominals = c->model->nominals;
     double largest = 0, most = 0, span = span_of(c);
     for (int k = 0; k < c->model->n_x; k++) largest = max_of(largest, fabs(x[k]) / nominals[k]);
     for (int k = 0; k < c->model->n_x; k++) {
         double change = fabs(some[k] - others[k]), least = FELT_SLOPE * largest * nominals[k] / span;
-        int any = change > least && change > FELT_KINK * max_of(fabs(some[k]), fabs(others[k]));
+        int any = change > least && change > part * max_of(fabs(some[k]), fabs(others[k]));
         if (any) most = max_of(most, change / nominals[k]);
     }
     return most;
 }
 
 /* By how much slopes along a direction differ a little to its two sides, or in a mode (-1: none) and another one. */
-static double felt_beside(Instance *c, const double *direction, double part, int mode, int target) {
+static double felt_beside(Instance *c, const double *direction, double way, double part, int mode, int target) {
     Gradient *g = c->gradient;
     size_t size = c->n_smooth * sizeof(double);
     double *kept = g->sides, *slopes = g->rates;
     memcpy(kept, c->numbers, size);
     for (int side = 0; side < 2; side++) {
-        for (size_t k = 0; k < c->n_smooth && mode < 0; k++) c->numbers[k] += (side ? part : -part) * direction[k];
+        for (size_t k = 0; k < c->n_smooth && mode < 0; k++) c->numbers[k] += (side ? way : -way) * direction[k];
         if (mode >= 0 && side) c->d[mode] = target;
         slopes_along(c, direction, slopes + side * c->model->n_unknowns);
         memcpy(c->numbers, kept, size);
     }
     c->variables_valid = c->state.z_valid = 0;
-    return felt(c, direction, slopes, slopes + c->model->n_unknowns);
+    return felt(c, direction, part, slopes, slopes + c->model->n_unknowns);
 }
 
 /* A direction that leads off a kink or guard of which `slope` is the derivative: along it numbers change by up to
@@ -99,36 +100,82 @@ static double kink_of(int operation, double a, double b, double by[2]) {
     }
 }
 
-/* Notes since when, on the way back, operations are at their kinks and guards are zero, at an end of the piece. */
+/* Lists the operations that have kinks. */
+void find_kinked(Instance *c) {
+    Gradient *g = c->gradient;
+    const Tape *tape = &c->model->tapes.rates;
+    double by[2];
+    g->n_kinked = 0;
+    g->kinks_by = 0;
+    for (int r = 0, k = 0; r < tape->n_runs; k += tape->runs[r++].count)
+        for (int n = 0; n < tape->runs[r].count && isfinite(kink_of(tape->runs[r].operation, 1, -2, by)); n++)
+            g->kinked[g->n_kinked++] = (Kink){tape->runs[r].operation, k + n, 0, 0};
+    for (int k = 0; k < tape->n_operations + c->model->n_guards; k++) g->rests[k] = NAN;
+}
+
+/* Is an operation at its kink, where the tape has been run last? */
+static int at_kink(const Instance *c, const Kink *kink) {
+    const Operands *of = &c->model->tapes.rates.operands[kink->place];
+    double by[2];
+    return fabs(kink_of(kink->operation, c->slots[of->left], c->slots[of->right], by)) <= AT_EDGE;
+}
+
+/* Behind an event, where the tape has been run last: what is at its kink may matter in the modes before it. */
+void note_kinks(Instance *c) {
+    Gradient *g = c->gradient;
+    double *rests = g->rests;
+    for (int k = 0; k < g->n_kinked; k++) rests[g->kinked[k].place] = at_kink(c, &g->kinked[k]) ? INFINITY : NAN;
+    rests += c->model->tapes.rates.n_operations;
+    for (int k = 0; k < c->model->n_guards; k++)
+        if (!isnan(rests[k])) rests[k] = INFINITY;
+}
+
+/* Notes since when, on the way back, operations are at their kinks and guards are zero. */
 static void note_rests(Instance *c, double t, const double *point) {
     const Model *m = c->model;
-    const Tape *tape = &m->tapes.rates;
-    double *rests = c->gradient->rests, by[2], zero;
-    evaluate(c, tape, t, point, c->rhs);
-    for (int r = 0, k = 0; r < tape->n_runs; r++)
-        for (int end = k + tape->runs[r].count; k < end; k++) {
-            const Operands *of = &tape->operands[k];
-            zero = kink_of(tape->runs[r].operation, c->slots[of->left], c->slots[of->right], by);
-            rests[k] = !(fabs(zero) <= AT_EDGE) ? NAN : isnan(rests[k]) ? t : rests[k];
-        }
-    rests += tape->n_operations;
-    if (m->n_guards > 0) evaluate(c, &m->tapes.guards, t, point, c->edge_guards);
+    const Gradient *g = c->gradient;
+    double *rests = g->rests;
+    if (g->n_kinks > 0) evaluate(c, &m->tapes.rates, t, point, c->rhs);
+    for (int k = 0; k < g->n_kinks; k++) {
+        double *since = &rests[g->kinks[k]->place];
+        *since = !at_kink(c, g->kinks[k]) ? NAN : isnan(*since) ? t : *since;
+    }
+    rests += m->tapes.rates.n_operations;
+    if (m->n_guards > 0) evaluate_special(c, &m->tapes.guards, t, point, c->edge_guards);
     for (int k = 0; k < m->n_guards; k++) {
-        int rest = fabs(c->edge_guards[k]) <= AT_EDGE && guard_active(c, k);
+        int rest = guard_active(c, k) && fabs(c->edge_guards[k]) <= AT_EDGE;
         rests[k] = !rest ? NAN : isnan(rests[k]) ? t : rests[k];
     }
 }
 
+/* Lists the kinks that matter in the present modes, and notes those at the end of the piece; at the ends of those
+ * before it the next one begins. */
+static void list_kinks(Instance *c) {
+    Gradient *g = c->gradient;
+    const Tape *tape = &c->model->tapes.rates;
+    load_decided(c);
+    if (g->kinks_by == c->decided_by + 1) return;
+    g->kinks_by = c->decided_by + 1;
+    g->n_kinks = 0;
+    piece_at(c->model, c->piece, c->piece->end, g->points);
+    if (!solve_implicit(c, c->piece->end, g->points, 1)) return;
+    evaluate(c, tape, c->piece->end, g->points, c->rhs);
+    mark_mattering(c, tape);
+    for (int k = 0; k < g->n_kinked; k++)
+        if (c->needed_slots[tape->first_result + g->kinked[k].place]) g->kinks[g->n_kinks++] = &g->kinked[k];
+    note_rests(c, c->piece->end, g->points);
+}
+
 /* The slope of what is zero at the kink of an operation of a tape; 0 if it is not zero at the present point. */
-static int slope_of_kink(Instance *c, const Tape *tape, int operation, int k, double *slope) {
-    const int operands[] = {tape->operands[k].left, tape->operands[k].right};
+static int slope_of_kink(Instance *c, const Tape *tape, const Kink *kink, double *slope) {
+    const int operands[] = {tape->operands[kink->place].left, tape->operands[kink->place].right};
     double values[2], by[2];
     Tape part = *tape;
-    if (!isfinite(kink_of(operation, 1, -2, by))) return 0;
+    if (!isfinite(kink_of(kink->operation, 1, -2, by))) return 0;
     part.n_outputs = 2;
     part.outputs = operands;
     evaluate_now(c, &part, values);
-    if (!(fabs(kink_of(operation, values[0], values[1], by)) <= AT_EDGE)) return 0;
+    if (!(fabs(kink_of(kink->operation, values[0], values[1], by)) <= AT_EDGE)) return 0;
     memset(slope, 0, (c->n_smooth + 1) * sizeof(double));
     memset(c->dots, 0, (size_t)c->model->slot_results * sizeof(double));
     tape_adjoint(&part, c->slots, c->dots, by);
@@ -151,9 +198,29 @@ static void check_guards(Instance *c, double *rests) {
         const Transition *to = &m->transitions[m->guard_transition[k]];
         if (!rests_long(c, &rests[k]) || !factor_implicit(c)) continue;
         slope_of_output(c, &m->tapes.guards, k, c->edge_guards, slope);
-        if (direction_off(c, slope, direction) && felt_beside(c, direction, NEARBY_KINK, to->mode, to->target) > 0)
+        if (direction_off(c, slope, direction) &&
+            felt_beside(c, direction, NEARBY_KINK, FELT_KINK, to->mode, to->target) > 0)
             add_doubt(c, FAILURE_LOST_AT_KINK, slope);
     }
+}
+
+/* Marks kinks that are due. Tells whether anything changes by more than curvature on a way over them all, but those
+ * that are known to be felt. */
+static int any_felt(Instance *c) {
+    Gradient *g = c->gradient;
+    double *slope = g->slope, *direction = g->work, *way = g->way;
+    int any = 0;
+    memset(way, 0, c->n_smooth * sizeof(double));
+    for (int k = 0; k < g->n_kinks; k++) {
+        Kink *kink = g->kinks[k];
+        kink->due = rests_long(c, &g->rests[kink->place]);
+        if (!kink->due || kink->alone || (!any && !factor_implicit(c))) continue;
+        kink->due = slope_of_kink(c, &c->model->tapes.rates, kink, slope) && direction_off(c, slope, direction);
+        double random = 0.5 + 0.5 * fmod(0.6180339887498949 * k, 1);
+        for (size_t n = 0; n < c->n_smooth && kink->due; n++) way[n] += random * direction[n];
+        any |= kink->due;
+    }
+    return any && felt_beside(c, way, CLOSER * NEARBY_KINK, FELT_TOGETHER, -1, 0) > 0;
 }
 
 /* At the begin of a piece, where something may be zero for a short step because it begins there. */
@@ -161,19 +228,18 @@ void check_kinks(Instance *c) {
     Gradient *g = c->gradient;
     const Tape *tape = &c->model->tapes.rates;
     double *slope = g->slope, *direction = g->work;
-    piece_at(c->model, c->piece, c->piece->end, g->points);
-    if (!solve_implicit(c, c->piece->end, g->points, 1) || !settle(c)) return;
-    note_rests(c, c->piece->end, g->points);
+    list_kinks(c);
+    if (!settle(c)) return;
     note_rests(c, c->state.t, c->x);
-    for (int r = 0, k = 0; r < tape->n_runs; r++)
-        for (int end = k + tape->runs[r].count; k < end; k++) {
-            if (!rests_long(c, &g->rests[k]) || !factor_implicit(c)) continue;
-            if (!slope_of_kink(c, tape, tape->runs[r].operation, k, slope)) continue;
-            if (!direction_off(c, slope, direction)) continue;
-            double most = felt_beside(c, direction, NEARBY_KINK, -1, 0);
-            if (most > 0 && felt_beside(c, direction, CLOSER * NEARBY_KINK, -1, 0) > 0.5 * most)
-                add_doubt(c, FAILURE_LOST_AT_KINK, slope);
-        }
+    int any = any_felt(c);
+    for (int k = 0; k < g->n_kinks; k++) {
+        Kink *kink = g->kinks[k];
+        if (!kink->due || !(any || kink->alone) || !factor_implicit(c)) continue;
+        if (!slope_of_kink(c, tape, kink, slope) || !direction_off(c, slope, direction)) continue;
+        double most = felt_beside(c, direction, NEARBY_KINK, FELT_KINK, -1, 0);
+        kink->alone = most > 0 && felt_beside(c, direction, CLOSER * NEARBY_KINK, FELT_KINK, -1, 0) > 0.5 * most;
+        if (kink->alone) add_doubt(c, FAILURE_LOST_AT_KINK, slope);
+    }
     check_guards(c, g->rests + tape->n_operations);
 }
 
@@ -213,7 +279,7 @@ void check_outputs(Instance *c) {
     const Tape *tape = &c->model->tapes.variables;
     for (int r = 0, k = 0; r < tape->n_runs; r++)
         for (int end = k + tape->runs[r].count; k < end; k++) {
-            if (!slope_of_kink(c, tape, tape->runs[r].operation, k, g->slope)) continue;
+            if (!slope_of_kink(c, tape, &(Kink){tape->runs[r].operation, k, 0, 0}, g->slope)) continue;
             if (!direction_off(c, g->slope, g->work)) continue;
             int any = 0;
             for (int v = 0; v < g->n_of && !any; v++) any = bends(c, g->of[v], g->work);

@@ -89,6 +89,7 @@ static void work_out(Instance *c, const Tape *tape) {
         }
 }
 
+/* Marks slots that wanted outputs need. */
 static void mark_needed(Instance *c, const Tape *tape) {
     const int *same = c->same;
     unsigned char *needed = c->needed_slots;
@@ -101,6 +102,14 @@ static void mark_needed(Instance *c, const Tape *tape) {
         needed[same[tape->operands[k].left]] = 1;
         needed[same[tape->operands[k].right]] = 1;
     }
+}
+
+/* Marks in `needed_slots` which results of a tape that has just been run matter in the present modes. */
+void mark_mattering(Instance *c, const Tape *tape) {
+    work_out(c, tape);
+    mark_needed(c, tape);
+    for (int slot = tape->first_result; slot < tape->first_result + tape->n_operations; slot++)
+        c->needed_slots[slot] = c->needed_slots[slot] && !c->known_slots[slot];
 }
 
 /* Writes the operations that are left; known results that they need get slots behind all others. */

@@ -80,12 +80,14 @@ void tape_adjoint_of(int count, const Tape *tape, const double *slots, double *b
     for (int r = tape->n_runs - 1; r >= 0; r--)
         for (int first = k - tape->runs[r].count; k > first;) {
             const Operands *one = &tape->operands[--k];
-            double *bar = results + (size_t)k * (size_t)count, by_a, by_b, largest = largest_of(count, bar);
-            if (largest == 0) continue;
+            double *bar = results + (size_t)k * (size_t)count, by_a, by_b;
+            int v = 0;
+            while (v < count && bar[v] == 0) v++;
+            if (v == count) continue;
             slopes(tape->runs[r].operation, slots[one->left], slots[one->right], slots[tape->first_result + k], &by_a,
                 &by_b);
             double *left = bars + (size_t)one->left * (size_t)count, *right = bars + (size_t)one->right * (size_t)count;
-            for (int v = 0; v < count; v++) {
+            for (; v < count; v++) {
                 left[v] += product(by_a, bar[v]);
                 right[v] += product(by_b, bar[v]);
             }
