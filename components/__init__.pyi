@@ -33,6 +33,7 @@ from components.blocks.sampled import UniformNoise as UniformNoise
 from components.blocks.sampled import ZeroOrderHold as ZeroOrderHold
 from components.blocks.signal_tables import Table1D as Table1D
 from components.blocks.signal_tables import Table2D as Table2D
+from components.blocks.rowwise import Table as Table
 from components.blocks.signals import CoilForce as CoilForce
 from components.blocks.signals import Constant as Constant
 from components.blocks.signals import Product as Product
@@ -40,7 +41,6 @@ from components.blocks.signals import Pulse as Pulse
 from components.blocks.signals import Ramp as Ramp
 from components.blocks.signals import Sine as Sine
 from components.blocks.signals import Step as Step
-from components.blocks.signals import Table as Table
 from components.blocks.signals import TimeFormula as TimeFormula
 from components.blocks.signals import Trapezoid as Trapezoid
 from components.blocks.stepped_signals import BooleanPulse as BooleanPulse

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from components import icons
-from components.blocks.signals import Pulse, Rowwise
+from components.blocks.rowwise import Rowwise
+from components.blocks.signals import Pulse
 from modelica_like.language import (
     Component,
     Equations,

@@ -6,7 +6,8 @@ from math import pi
 from typing import Literal
 
 from components import icons
-from components.blocks.signals import Periodic, Started, Table
+from components.blocks.rowwise import Table
+from components.blocks.signals import Periodic, Started
 from modelica_like.language import (
     Component,
     Equations,
