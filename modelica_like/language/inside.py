@@ -157,6 +157,7 @@ class InsideAssembly(InsideComponent):
         optimize: what is optimised, as written in the netlist.
         tolerances: how parameters scatter, as written there.
         libraries: of Modelica text, as written there.
+        remarks: what its reader took that the file does not say.
         places: in the netlist, by section and name.
         made: the call that created it.
     """
@@ -174,6 +175,7 @@ class InsideAssembly(InsideComponent):
     optimize: dict[str, Any] = field(default_factory=_empty)
     tolerances: dict[str, Any] = field(default_factory=_empty)
     libraries: dict[str, list[str]] = field(default_factory=_empty)
+    remarks: tuple[str, ...] = ()
     places: dict[str, Source] = field(default_factory=_empty)
     made: Source = NOWHERE
 

@@ -29,6 +29,7 @@ from modelica_like.language import (
 from modelica_like.language.assembly import declare, end_at
 from modelica_like.language.fields import Discrete, Field, Input, Parameter
 from modelica_like.language.inside import inside
+from modelica_like.netlist.modelica.at_start import bind_at_start
 from modelica_like.netlist.modelica.attributes import check_attributes, check_declared
 from modelica_like.netlist.modelica.before import uses_time
 from modelica_like.netlist.modelica.carried import Carried
@@ -94,6 +95,7 @@ class _Builder:
         self.absent: set[str] = set()
 
     def run(self) -> Written:
+        bind_at_start(self.instance)
         self._attempt(Source(""), self.statements.read)
         if self.errors:
             raise raise_together_or_one(self.errors)

@@ -72,6 +72,18 @@ package Modelica
       type Efficiency = Real(min = 0);
       type PerUnit = Real;
     end SI;
+    package NonSI
+      type Temperature_degC = Real(unit = "degC");
+      type Angle_deg = Real(unit = "deg");
+      type AngularVelocity_rpm = Real(unit = "1/min");
+      type Velocity_kmh = Real(unit = "km/h");
+      type Time_hour = Real(unit = "h");
+      type Time_minute = Real(unit = "min");
+      type Time_day = Real(unit = "d");
+      type Energy_kWh = Real(unit = "kW.h");
+      type ElectricCharge_Ah = Real(unit = "A.h");
+      type Pressure_bar = Real(unit = "bar");
+    end NonSI;
     package Conversions
       function from_deg
         input Real degree;
@@ -115,6 +127,12 @@ package Modelica
       algorithm
         speed := kmh/3.6;
       end from_kmh;
+      function to_kmh
+        input Real speed;
+        output Real kmh;
+      algorithm
+        kmh := 3.6*speed;
+      end to_kmh;
     end Conversions;
   end Units;
   package Constants
@@ -127,8 +145,58 @@ package Modelica
     constant Real inf = 1e60;
     constant Real g_n = 9.80665;
     constant Real T_zero = -273.15;
+    constant Real mu_0 = 1.25663706127e-6;
   end Constants;
   package Electrical
+    package Analog
+      package Interfaces
+        partial model TwoPin
+          Units.SI.Voltage v "voltage between the ends";
+          PositivePin p;
+          NegativePin n;
+        equation
+          v = p.v - n.v;
+        end TwoPin;
+        partial model OnePort
+          extends TwoPin;
+          Units.SI.Current i "from p to n";
+        equation
+          0 = p.i + n.i;
+          i = p.i;
+        end OnePort;
+      end Interfaces;
+      package Basic
+        model Conductor
+          extends Interfaces.OnePort;
+          parameter Units.SI.Conductance G;
+        equation
+          i = G*v;
+        end Conductor;
+      end Basic;
+      package Sources
+        model SineVoltage
+          extends Interfaces.OnePort;
+          parameter Real V, phase = 0, f, offset = 0, startTime = 0;
+        equation
+          v = offset + (if time < startTime then 0 else V*sin(2*Constants.pi*f*(time - startTime) + phase));
+        end SineVoltage;
+        model StepVoltage
+          extends Interfaces.OnePort;
+          parameter Real V, offset = 0, startTime = 0;
+        equation
+          v = offset + (if time < startTime then 0 else V);
+        end StepVoltage;
+      end Sources;
+      package Sensors
+        model PotentialSensor
+          Interfaces.PositivePin p;
+          Blocks.Interfaces.RealOutput phi(unit = "V");
+        equation
+          p.i = 0;
+          phi = p.v;
+        end PotentialSensor;
+      end Sensors;
+    end Analog;
     package Machines
       package Losses
         record FrictionParameters
@@ -191,39 +259,6 @@ package Modelica
       end Thermal;
     end Machines;
   end Electrical;
-  package Blocks
-    package Types
-      type Smoothness = enumeration(LinearSegments, ContinuousDerivative, ConstantSegments,
-          MonotoneContinuousDerivative1, MonotoneContinuousDerivative2, ModifiedContinuousDerivative);
-      type Extrapolation = enumeration(HoldLastPoint, LastTwoPoints, Periodic, NoExtrapolation);
-      type Regularization = enumeration(Exp, Sine, Linear, Cosine);
-      type Init = enumeration(NoInit, SteadyState, InitialState, InitialOutput);
-      type SimpleController = enumeration(P, PI, PD, PID);
-    end Types;
-    package Interfaces
-      connector RealInput = input Real;
-      connector RealOutput = output Real;
-      connector BooleanInput = input Boolean;
-      connector BooleanOutput = output Boolean;
-      connector IntegerInput = input Integer;
-      connector IntegerOutput = output Integer;
-      partial block SO
-        RealOutput y "output";
-      end SO;
-      partial block SI
-        RealInput u "input";
-      end SI;
-      partial block SISO
-        RealInput u "input";
-        RealOutput y "output";
-      end SISO;
-      partial block SI2SO
-        RealInput u1 "first input";
-        RealInput u2 "second input";
-        RealOutput y "output";
-      end SI2SO;
-    end Interfaces;
-  end Blocks;
   package Mechanics
     package Rotational
       package Interfaces

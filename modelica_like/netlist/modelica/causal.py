@@ -191,7 +191,7 @@ def _connects(body: Iterable[Statement]) -> bool:
 def parts_in(instance: Instance, levels: int = 1) -> Iterator[tuple[Instance, int]]:
     """Yield the parts in an instance, with the levels from them up to it."""
     for name, member in instance.members.items():
-        if member.declaration.is_outer or basic_type(instance, member) is not None or not exists(instance, member):
+        if member.declaration.is_outer or not exists(instance, member) or basic_type(instance, member) is not None:
             continue
         shape = sizes(instance, member)
         for _, index in elements_of(name, shape):
@@ -275,8 +275,8 @@ class Joints:
         """Yield the causal connectors of the parts of a member."""
         if (
             member.declaration.is_outer
-            or basic_type(self.instance, member) is not None
             or not exists(self.instance, member)
+            or basic_type(self.instance, member) is not None
         ):
             return
         for head, index in elements_of(name, sizes(self.instance, member)):
@@ -328,10 +328,9 @@ class Joints:
 def connectors(instance: Instance) -> Iterator[tuple[str, Instance]]:
     """Yield the own causal connectors of an instance by their names."""
     for name, member in instance.members.items():
-        if member.declaration.is_outer or basic_type(instance, member) is not None:
+        if member.declaration.is_outer or not exists(instance, member) or basic_type(instance, member) is not None:
             continue
-        if exists(instance, member):
-            for path, index in elements_of(name, sizes(instance, member)):
-                part = part_of(instance, member, index)
-                if isinstance(part, Instance) and is_causal(part):
-                    yield path, part
+        for path, index in elements_of(name, sizes(instance, member)):
+            part = part_of(instance, member, index)
+            if isinstance(part, Instance) and is_causal(part):
+                yield path, part

@@ -20,11 +20,6 @@ from modelica_like.netlist.modelica.tree import ClassText, Extends, Import
 
 BASIC = ("Real", "Integer", "Boolean", "String", "StateSelect")
 _SI = ("SI", "SIunits")
-_RENAMED = (
-    ("Modelica.SIunits.Conversions.NonSIunits", "Modelica.Units.NonSI"),
-    ("Modelica.SIunits.Conversions", "Modelica.Units.Conversions"),
-    ("Modelica.SIunits", "Modelica.Units.SI"),
-)
 _MOST_STEPS = 1_000_000
 """Of about 10 microseconds; 10,000 parts of own classes, or 100,000 equations."""
 _KEPT_FILES = 3_000
@@ -100,6 +95,7 @@ class Classes:
         self.steps = 0
         self.lacking: dict[str, str] = {}
         self.untabled: set[str] = set()
+        self.missing: dict[str, Any] = {}
         self.only_said = False
 
     @contextmanager
@@ -190,6 +186,16 @@ class Classes:
             package = package.rpartition(".")[0]
         return self.full(f"Modelica.Units.SI.{rest}" if head in _SI else name)
 
+    def lineage(self, text: ClassText) -> Iterator[ClassText | Known]:
+        """Yield a class and its bases."""
+        yield text
+        for base in [*(e for e in text.elements if isinstance(e, Extends)), *([text.short] if text.short else [])]:
+            kind = self.find(base.base, text.owner or text if base is text.short else text)
+            if isinstance(kind, ClassText) and kind is not text:
+                yield from self.lineage(kind)
+            elif isinstance(kind, Known):
+                yield kind
+
     def around(self, text: ClassText) -> ClassText | None:
         """Return the class that encloses another one, which may have a file of its own."""
         outer = text.owner or (self.full(text.within) if text.within else None)
@@ -247,8 +253,8 @@ class Classes:
         return self.inherited[key]
 
     def full(self, path: str) -> Found | None:
-        """Return a class by its full name; units of version 3 of the standard library have the names of version 4."""
-        for old, new in _RENAMED:
+        """Return a class by its full name; names of version 3 of the standard library have those of version 4."""
+        for old, new in table()["renamed"].items():
             if path == old or path.startswith(f"{old}."):
                 path = f"{new}{path[len(old) :]}"
         for class_text in self.own:
@@ -273,9 +279,9 @@ class Classes:
         if not isinstance(known, Known):
             return known if isinstance(known, ClassText) else None
         head, _, rest = known.path.partition(".")
-        top = self._top(head)
-        inner = None if top is None else self.inside(top, rest)
-        return inner if isinstance(inner, ClassText) else None
+        tops = filter(None, (self._top(head), built_in().get(head)))
+        texts = (inner for top in tops if isinstance(inner := self.inside(top, rest), ClassText))
+        return next(texts, None)
 
     def lack(self, part: str, path: str) -> None:
         """Remember that the component for a class cannot be what a text says of a part.

@@ -41,9 +41,11 @@ def imported(classes: Classes, text: ClassText, name: str) -> ClassText | None:
     level: ClassText | None = text
     while level is not None:
         for element in level.elements:
-            if isinstance(element, Import) and name in (element.alias, *element.names):
-                path = element.path if name in element.names else element.path.rpartition(".")[0]
+            if isinstance(element, Import) and {name, "*"} & {element.alias, *element.names}:
+                path = element.path if {name, "*"} & {*element.names} else element.path.rpartition(".")[0]
                 package = classes.full(path)
-                return package if isinstance(package, ClassText) else None
+                known = isinstance(package, ClassText)
+                if known and ("*" not in element.names or name in holder_of(classes, package).members):
+                    return package
         level = classes.around(level)
     return None

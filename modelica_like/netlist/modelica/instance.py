@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from modelica_like.errors import ModelicaTextError, Source, UnknownName, did_you_mean
 from modelica_like.language.fields import Parameter
+from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica.classes import Classes, Found
-from modelica_like.netlist.modelica.library import Known
+from modelica_like.netlist.modelica.library import Known, table
 from modelica_like.netlist.modelica.tree import (
     ClassText,
     Declaration,
@@ -99,6 +101,28 @@ def given(modification: Modification, scope: tuple[Instance, ClassText], line: i
     return entry
 
 
+def of_version_4(entry: Given, lineage: Iterable[ClassText | Known]) -> Given:
+    """Return a modification of a class of the standard library with the names of parameters that version 4 has.
+
+    Args:
+        entry: the modification.
+        lineage: the class and its bases.
+    """
+    renamed = table()["renamed_parameters"]
+    if not renamed.keys() & entry.inner.keys():
+        return entry
+    names: set[str] = set()
+    standard = False
+    for kind in lineage:
+        standard = standard or kind.path.startswith("Modelica.")
+        if isinstance(kind, ClassText):
+            names |= {element.name for element in kind.elements if isinstance(element, Declaration)}
+        else:
+            names |= {*declarations(kind.type).fields, *kind.names.values(), *kind.only}
+    new = {old: renamed.get(old, old) if standard and old not in names else old for old in entry.inner}
+    return replace(entry, inner={new[old]: value for old, value in entry.inner.items() if new[old]})
+
+
 @dataclass(slots=True)
 class Member:
     """A declared component of an instance.
@@ -144,6 +168,7 @@ class Instance:
     def __init__(
         self, classes: Classes, text: ClassText, given: Given, owner: Instance | None = None, name: str = ""
     ) -> None:
+        given = of_version_4(given, classes.lineage(text))
         self.classes, self.text, self.given, self.owner, self.name = classes, text, given, owner, name
         self.members: dict[str, Member] = {}
         self.equations: list[tuple[Statement, ClassText]] = []
@@ -201,13 +226,15 @@ class Instance:
         return self.classes.find(name, text)
 
     def inner(self, name: str) -> Instance | None:
-        """Return the instance above whose part an `outer` declaration means, None if there is none."""
+        """Return the instance above whose part an `outer` declaration means; None, and remembered, if there is none."""
         level = self.owner
         while (
             level is not None
             and "inner" not in getattr(level.members.get(name), "declaration", _NO_DECLARATION).prefixes
         ):
             level = level.owner
+        if level is None and name in self.members:
+            self.classes.missing.setdefault(name, self.members[name])
         return level
 
     def scope_of(self, text: ClassText) -> Instance:
@@ -259,7 +286,7 @@ class Instance:
         if isinstance(base, Known):
             base = self.classes.text_of(base.path) or base
         if isinstance(base, ClassText):
-            inner = given(clause.modification, (self, text), clause.line)
+            inner = of_version_4(given(clause.modification, (self, text), clause.line), self.classes.lineage(base))
             inner.inner |= self._redeclaring(text)
             redeclared = {k: v for k, v in inner.inner.items() if isinstance(v.redeclared, ClassText)}
             self._replaced = redeclared | self._replaced

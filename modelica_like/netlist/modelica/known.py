@@ -13,7 +13,7 @@ from modelica_like.language.inside import declarations, inside
 from modelica_like.language.scopes import give_by_path
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.attributes import check_attributes
-from modelica_like.netlist.modelica.instance import GIVE, Given, Instance, Member, refused
+from modelica_like.netlist.modelica.instance import GIVE, Given, Instance, Member, of_version_4, refused
 from modelica_like.netlist.modelica.library import Known, table
 from modelica_like.netlist.modelica.members import demand_determined, record_of
 from modelica_like.netlist.modelica.parse import parse_expression
@@ -71,6 +71,7 @@ class _Part:
             given,
             notes,
         )
+        self.given = of_version_4(given, [entry])
         self.entries = dict(self._entries())
         self.kind = self._kind()
         self.fields, self.structural = declarations(self.kind).fields, declarations(self.kind).structural

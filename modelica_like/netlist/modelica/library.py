@@ -129,9 +129,14 @@ def by_component() -> dict[str, Known]:
 
 @lru_cache(maxsize=1)
 def built_in() -> dict[str, ClassText]:
-    """Return the outermost classes of the built-in text."""
-    file = _HERE / "builtin.mo"
-    return {stored.name: stored for stored in parse_modelica(file.read_text(encoding="utf-8"), file.name)}
+    """Return the outermost classes of the built-in text, with blocks in `Modelica`."""
+    classes: dict[str, ClassText] = {}
+    for file in (_HERE / "builtin.mo", _HERE / "blocks.mo"):
+        for stored in parse_modelica(file.read_text(encoding="utf-8"), file.name):
+            around = classes.get(stored.within)
+            (classes if around is None else around.classes)[stored.name] = stored
+            stored.owner = around
+    return classes
 
 
 def connector_type(path: str) -> type[Connector] | None:

@@ -268,9 +268,9 @@ def part_at(instance: Instance, path: str) -> Instance | Known | str | None:
     for head in path.split("."):
         name, _, index = head.partition("[")
         member = part.members.get(name) if isinstance(part, Instance) else None
-        if member is None or not isinstance(part, Instance) or basic_type(part, member) is not None:
+        if member is None or not isinstance(part, Instance) or not exists(part, member):
             return None
-        if not exists(part, member):
+        if basic_type(part, member) is not None:
             return None
         shape = sizes(part, member)
         if bool(index) is not bool(shape):

@@ -153,6 +153,7 @@ NATIVE: dict[str, Native] = {
     f"{_TABLES}CombiTable2D_getValue": _value("u1", "u2"),
     f"{_TABLES}CombiTimeTable_nextTimeEvent": lambda classes, given, line: fold.number(_LAST, line),
     f"{_TABLES}CombiTimeTable_minimumTime": _end(0), f"{_TABLES}CombiTimeTable_maximumTime": _end(-1),
+    f"{_TABLES}CombiTable1D_read": lambda classes, given, line: fold.number(1.0, line),  # has been read already
     f"{_TABLES}CombiTable1D_minimumAbscissa": _end(0), f"{_TABLES}CombiTable1D_maximumAbscissa": _end(-1),
     **{f"{_RANDOM}{name}": _drawn(name) for name in NAMES},
     f"{_RANDOM}setInternalState_xorshift1024star": lambda classes, given, line: Expr("tuple", (), line),

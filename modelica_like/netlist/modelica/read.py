@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from modelica_like.errors import ModelicaLikeError, ModelicaTextError
@@ -9,7 +10,8 @@ from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.build import build_component
 from modelica_like.netlist.modelica.buses import join_buses
 from modelica_like.netlist.modelica.classes import Classes, given_libraries
-from modelica_like.netlist.modelica.instance import Given, Instance
+from modelica_like.netlist.modelica.instance import Given, Instance, Member
+from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.tree import ClassText
 from modelica_like.netlist.modelica.values import Notes
 from modelica_like.netlist.modelica.written import Written
@@ -56,18 +58,44 @@ def read_modelica(path: Path, name: str = "", *, table: bool = True) -> tuple[Wr
 
 
 def _built(classes: Classes, text: ClassText) -> tuple[Written, Notes]:
-    """Return the component of a class; a part that a component of ours cannot be is read from its class's own text."""
+    """Return the component of a class.
+
+    A part that a component of ours cannot be is read from its class's own text, and an `outer` part without an `inner`
+    one above it has one in the class that is read, with the values of its class.
+    """
+    inner: dict[str, Member] = {}
     while True:
         notes, untabled = Notes(), set(classes.untabled)
         try:
             instance = Instance(classes, text, Given())
+            instance.members |= {name: member for name, member in inner.items() if name not in instance.members}
             join_buses(instance)
-            return build_component(instance, notes), notes
+            component = build_component(instance, notes)
+            told = (
+                f"There is no inner {name}: a {m.declaration.type} with its own values is taken."
+                for name, m in inner.items()
+            )
+            inside(component).remarks = tuple(told)
+            return component, notes
         except RecursionError:
             raise ModelicaTextError(
                 "Classes, functions or formulas are nested too deeply.", where=text.place(text.line)
             ) from None
         except ModelicaLikeError:
             classes.untabled |= {part for part, path in classes.lacking.items() if classes.text_of(path) is not None}
-            if classes.untabled == untabled or classes.spent:
+            lacking = {
+                name for name, member in classes.missing.items() if name not in inner and _is_whole(classes, member)
+            }
+            for name in lacking:
+                member = classes.missing[name]
+                declaration = replace(member.declaration, prefixes=frozenset({"inner"}))
+                inner[name] = Member(declaration, member.text, Given())
+            if (classes.untabled == untabled and not lacking) or classes.spent:
                 raise
+
+
+def _is_whole(classes: Classes, member: Member) -> bool:
+    """Tell whether a class can be a part as it is."""
+    kind = classes.find(member.declaration.type, member.text)
+    parts = isinstance(kind, ClassText) and not kind.partial and kind.kind in ("model", "block", "class", "record")
+    return (parts or isinstance(kind, Known)) and not member.declaration.dimensions

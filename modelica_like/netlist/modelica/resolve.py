@@ -284,7 +284,7 @@ class Resolver:
         self, owner: Instance, member: Member, basic: Basic, path: str, subscripts: tuple[Expr, ...], line: int
     ) -> Expr:
         declared = member.declaration
-        fixed = {"parameter", "constant"} & declared.prefixes
+        fixed = {"parameter", "constant"} & declared.prefixes or {"object"} & {basic.kind}
         if fixed and (self.numeric or basic.kind != "Real" or declared.dimensions or "constant" in fixed):
             if self.numeric:
                 owner.freeze(declared.name)

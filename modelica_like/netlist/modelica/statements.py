@@ -212,9 +212,12 @@ class Statements(Whens):
     def _bindings(self) -> None:
         """Collect declarations `Real x = …`."""
         for name, member in self.instance.members.items():
-            declared, basic = member.declaration, basic_type(self.instance, member)
+            declared = member.declaration
             if {"parameter", "constant"} & declared.prefixes or declared.is_outer or not exists(self.instance, member):
                 continue
+            basic = basic_type(self.instance, member)
+            if basic is not None and basic.kind == "object":
+                continue  # a value from the beginning
             if basic is None:
                 self._part_bindings(name, member)
             elif is_bound_outside(self.instance, member, basic):
@@ -251,7 +254,8 @@ class Statements(Whens):
     def _input_bindings(self, path: str, part: Instance) -> None:
         """Collect `Own part(input = …)`: a signal of this class has the value, and drives the input."""
         for name, member in part.members.items():
-            basic, (given, scope) = basic_type(part, member), (member.given.value, member.given.scope)
+            given, scope = member.given.value, member.given.scope
+            basic = basic_type(part, member) if given is not None and scope is not None else None
             if given is None or scope is None or not is_bound_outside(part, member, basic):
                 continue
             assert basic is not None

@@ -141,7 +141,7 @@ def _of_bundle(end: Expr, instance: Instance) -> list[str] | None:
     owner, path = instance, ""
     for depth, (name, subscripts) in enumerate(end.args):
         member = owner.members.get(name)
-        if member is None or depth > 1 or basic_type(owner, member) is not None or not exists(owner, member):
+        if member is None or depth > 1 or not exists(owner, member) or basic_type(owner, member) is not None:
             return None
         indices = _indices(subscripts, sizes(owner, member), instance, end.line)
         part = part_of(owner, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0)

@@ -37,13 +37,15 @@ _HERTZ = parse_unit("Hz")
 def drive_notes(drive: Component) -> list[str]:
     """Return notes about probable mistakes in a drive, before a run.
 
-    Neighbours whose inertias, masses or stiffnesses are four decades apart, unused signals, and values without effect.
+    What its reader took that the file does not say, neighbours whose inertias, masses or stiffnesses are four decades
+    apart, unused signals, and values without effect.
 
     Args:
         drive: the drive.
     """
     drawn = diagram(drive, 0)
-    return [*_neighbours(drawn), *_unread(drawn), *_without_effect(drive)]
+    remarks = inside(drive).remarks if isinstance(drive, Assembly) else ()
+    return [*remarks, *_neighbours(drawn), *_unread(drawn), *_without_effect(drive)]
 
 
 def run_notes(drive: Component, run: Solution, *, energy: bool = True) -> list[str]:
