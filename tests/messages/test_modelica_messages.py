@@ -69,6 +69,11 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "There is no connector bus.sub.\n  in a.mo:5 `connect(bus.sub.x, s.y);`\n"
         "Declare it in the class of the bus, or join it with a connector.",
     ),
+    "transport": (
+        model("Real x; Real y;", "(x, y) = spatialDistribution(time, 0, time, true);"),
+        "spatialDistribution (of a constant velocity it is delay(u, T)): that is not supported here.\n"
+        "  in a.mo:5 `(x, y) = spatialDistribution(time, 0, time, true);`",
+    ),
     "units of a connection": (
         model("P p; Q q;", "connect(p.y, q.u);", before=SIGNALS),
         "p.y is in kW, and q.u in W.\n  in a.mo:5 `connect(p.y, q.u);`\n"

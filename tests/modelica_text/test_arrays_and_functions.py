@@ -180,3 +180,68 @@ end S;
         with pytest.raises(ModelicaTextError) as caught:
             load(tmp_path / "s.mo")
         assert caught.value.what == f"A subscript of this end is not one of {what}."
+
+
+ANNOTATED = """
+package Laws
+  function law "torque of a spring over its angle"
+    extends Modelica.Icons.Function;
+    input Real phi;
+    input Real k = 4;
+    output Real tau;
+  algorithm
+    tau := if phi > 0 then k*phi^3 else -k*phi^3;
+    annotation(derivative = law_der, inverse(phi = law_inverse(tau, k)), smoothOrder = 2, Inline = true);
+  end law;
+  function law_der
+    input Real phi;
+    input Real k = 4;
+    input Real phi_der;
+    input Real k_der = 0;
+    output Real tau_der;
+  algorithm
+    tau_der := 3*k*phi^2*phi_der;
+    annotation(derivative(order = 2) = law_der2, smoothOrder = 1);
+  end law_der;
+  function law_der2
+    input Real phi;
+    input Real k = 4;
+    input Real phi_der;
+    input Real k_der = 0;
+    input Real phi_der2;
+    input Real k_der2 = 0;
+    output Real tau_der2;
+  algorithm
+    tau_der2 := 6*k*phi*phi_der^2 + 3*k*phi^2*phi_der2;
+  end law_der2;
+  function law_inverse
+    input Real tau;
+    input Real k = 4;
+    output Real phi;
+  algorithm
+    phi := (tau/k)^(1/3);
+  end law_inverse;
+  model A
+    Real s(start = 1, fixed = true), v, a, q(start = 0.5);
+    Real Q;
+  equation
+    s = law(1 + time/2) - 3;
+    der(s) = v;
+    der(v) = a;
+    2*(1 + time) = law(q);
+    Q = law_der(1 + time/2, 4, 1/2);
+  end A;
+end Laws;
+"""
+
+
+def test_annotations_of_functions_change_no_value(tmp_path: Path) -> None:
+    # What is inlined is differentiated as it is written, and solved for any argument.
+    (tmp_path / "a.mo").write_text(ANNOTATED)
+    result = simulate(load(tmp_path / "a.mo"), 1.0, rtol=1e-10, atol=1e-12)
+    t = result.time
+    assert result["s"] == pytest.approx(4 * (1 + t / 2) ** 3 - 3)
+    assert result["v"] == pytest.approx(6 * (1 + t / 2) ** 2)
+    assert result["a"] == pytest.approx(6 * (1 + t / 2))
+    assert result["Q"] == pytest.approx(6 * (1 + t / 2) ** 2)
+    assert result["q"] == pytest.approx(((1 + t) / 2) ** (1 / 3))
