@@ -55,6 +55,8 @@ def updates(
     discrete = [row for row in rows if row.entry is not None]
     old = {row.entry: row.kept for row in discrete}
     before = [(flat.d[k], old[of if of in old else k]) for k, of in flat.pres.items()]
+    lefts = _replaced([reduced.values[node] for node in flat.lefts.values()], _begun(flat, old))
+    before += [(flat.d[k], value) for k, value in zip(flat.lefts, lefts, strict=True)]
     values = _replaced([ca.if_else(row.active, row.value, row.kept) for row in (*discrete, *rows)], before)
     values, results = values[: len(discrete)], values[len(discrete) :]
     symbols = [flat.d[row.entry] for row in discrete]
@@ -64,6 +66,15 @@ def updates(
         results = inserted([symbols[k] for k in order], [values[k] for k in order], results)
     results = _replaced(results, [(symbol, flat.d[entry]) for entry, symbol in old.items()])
     return ca.vertcat(*results), tuple(row.update for row in rows)
+
+
+def _begun(flat: FlatModel, old: dict[int | None, Any]) -> list[tuple[Any, Any]]:
+    """Return discrete values and modes with what they were before: where a run begins, modes are what they are."""
+    if not flat.lefts:
+        return []
+    starts = next(old[k] for k, of in flat.pres.items() if k == of)
+    begun = {of: old[of] if of in old else ca.if_else(starts, flat.d[of], old[k]) for k, of in flat.pres.items()}
+    return [(flat.d[of], value) for of, value in begun.items()]
 
 
 def _solve_delays(those: list[int], symbols: list[Any], values: list[Any]) -> None:

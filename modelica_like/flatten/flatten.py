@@ -88,6 +88,7 @@ class _Flattener:
         self.inputs: list[int] = []
         self.flags: list[tuple[Any, int]] = []
         self.pres: dict[int, int] = {}
+        self.lefts: dict[int, int] = {}
         self.errors: list[ModelicaLikeError] = []
 
     def run(self) -> FlatModel:
@@ -109,6 +110,7 @@ class _Flattener:
         added = self._disturb() if self.disturbed else None
         self.nodes = [(k, 0) for k in range(len(self.variables))]
         instances = [self._instance(component, template) for component, template in templates]
+        self._keep_before()
         self._connect(added)
         for component, _ in templates:
             self._bind_inputs(component)
@@ -129,7 +131,7 @@ class _Flattener:
             discretes=self.discretes, d=d, time=ca.SX(TIME), instances=instances, linear=self.linear,
             general=general, starts=self.starts, inputs=self.inputs,
             components={component.path: component for component, _ in templates}, flags=tuple(self.flags),
-            pres=self.pres,
+            pres=self.pres, lefts=self.lefts,
         )  # fmt: skip
 
     def _elaborate(self) -> list[tuple[Component, Template]]:
@@ -213,9 +215,11 @@ class _Flattener:
         """Return the position of a mode, a discrete value, a `pre`, or one of the whole model."""
         key = (id(None), path) if path in _OF_ALL else self._owner(component, _plain(path))
         if path != _plain(path):
-            of = self.discrete_of[key]
+            of, node = self.discrete_of.get(key), self.variable_of.get(key)
             key = key[0], f"pre({key[1]})"
-            if key not in self.discrete_of:
+            if key not in self.discrete_of and of is None and node is not None:
+                self.lefts[self._hide(*key, f"pre({self.variables[node].path})", Hidden("", ""))] = node
+            elif key not in self.discrete_of and of is not None:
                 flat = self.discretes[of]
                 self.pres[self._hide(*key, f"pre({flat.path})", Hidden("", ""), flat.start)] = of
         elif key not in self.discrete_of:
@@ -223,6 +227,16 @@ class _Flattener:
             here = self._hide(*key, path, Hidden("", about), start)
             self.pres |= {here: here} if path == INITIAL.name else {}
         return self.discrete_of[key]
+
+    def _keep_before(self) -> None:
+        """Keep what all modes were before an event, if that is asked of variables: they follow from modes."""
+        if self.lefts:
+            self._discrete(self.root, INITIAL.name)
+        kept = {*self.pres, *self.pres.values(), *self.lefts}
+        for of in range(len(self.discretes) if self.lefts else 0):
+            if of not in kept:
+                path = f"pre({self.discretes[of].path})"
+                self.pres[self._hide(id(None), path, path, Hidden("", ""), self.discretes[of].start)] = of
 
     # -- instances ---------------------------------------------------------------------------------------------------
 

@@ -166,6 +166,7 @@ class FlatModel:
         inputs: variables given from outside.
         components: the tree of the model.
         pres: discrete value -> the one that it is the `pre` of; and `initial()` -> itself.
+        lefts: discrete value -> the variable (node) whose value before an event it stands for in new values.
         flags: symbols in q for "the motion is prescribed", with the variable; none once the structure is
             known.
     """
@@ -190,6 +191,7 @@ class FlatModel:
     components: dict[str, Component]
     flags: tuple[tuple[Any, int], ...] = ()
     pres: dict[int, int] = field(default_factory=dict[int, int])
+    lefts: dict[int, int] = field(default_factory=dict[int, int])
 
     def node_name(self, node: int) -> str:
         """Return the name of a node: `motor.phi`, `der(motor.phi)`."""

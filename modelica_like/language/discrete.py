@@ -43,7 +43,7 @@ class Marker(Symbol):
 
 
 class Pre(Symbol):
-    """The value of a discrete value before the present iteration of an event."""
+    """A value before the present iteration of an event: of a discrete value, or of a variable in a new value."""
 
     of: Symbol
 
@@ -177,7 +177,11 @@ def pre(value: Expr) -> Expr:
     ):
         what = f"pre({value}): only a discrete, Boolean or integer variable has a value before an event."
         raise LanguageError(what, where=caller(), advice="For a mode, declare boolean(…) and set it by an equation.")
-    symbol = cast(Symbol, value)
+    return before(cast(Symbol, value))
+
+
+def before(symbol: Symbol) -> Expr:
+    """Return what a symbol was before an event; that of a variable belongs in the new values of a `when`."""
     symbol.before = Pre(symbol) if symbol.before is None else symbol.before
     return symbol.before
 

@@ -242,12 +242,6 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("Real x;", "x = pre(x) + 1;"),
         "pre(x): only what changes at events has a value before them.\n  in a.mo:5 `x = pre(x) + 1;`",
     ),
-    "pre of an input in a when": (
-        model("input Real u; discrete Real x;", "when time > 1 then x = pre(u); end when;"),
-        "pre(u): no equation of A tells what u was before an event.\n"
-        "  in a.mo:5 `when time > 1 then x = pre(u); end when;`\n"
-        "Keep it in a discrete variable that is set where it changes.",
-    ),
     "two whens": (
         model("discrete Real x;", "when time > 1 then x = 1; end when; when time > 2 then x = 2; end when;"),
         "Two whens determine x.\n  in a.mo:5 `when time > 1 then x = 1; end when; when time > 2 then x = 2; end when;`",

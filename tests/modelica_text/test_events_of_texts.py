@@ -196,6 +196,38 @@ def test_what_rests_at_a_limit_stays_there(tmp_path: Path, solver: Any, size: fl
             assert result.at(time)["y"] == pytest.approx(wanted * size, abs=1e-7 * size)
 
 
+@pytest.mark.parametrize("solver", ["native", "idas"])
+def test_delays_in_a_row_and_a_step_at_the_same_instant(tmp_path: Path, solver: Any) -> None:
+    """Each takes what was before: of the one before it, and of what jumps just then."""
+    (tmp_path / "a.mo").write_text("""
+model A
+  connector In = input Real;
+  connector Out = output Real;
+  block Delay
+    In u; Out y;
+  initial equation
+    y = 0;
+  equation
+    when sample(0, 0.25) then
+      y = pre(u);
+    end when;
+  end Delay;
+  block Step
+    Out y = if time < 0.5 then 1 else 3;
+  end Step;
+  Delay a, b, c;
+  Step step;
+equation
+  a.u = time + 1;
+  connect(a.y, b.u);
+  connect(step.y, c.u);
+end A;
+""")
+    result = simulate(load(tmp_path / "a.mo"), 1.1, solver=solver)
+    for time, values in ((0.1, (1, 0, 1)), (0.3, (1.25, 1, 1)), (0.6, (1.5, 1.25, 1)), (0.8, (1.75, 1.5, 3))):
+        assert [result.at(time)[f"{name}.y"] for name in "abc"] == pytest.approx(values, abs=1e-9)
+
+
 def test_what_changes_all_the_time_has_a_value_before_an_event(tmp_path: Path) -> None:
     """A slope begins anew from where the one before has come to, also where that was not at its end."""
     result = run(tmp_path, """

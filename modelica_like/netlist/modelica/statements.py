@@ -10,7 +10,6 @@ from modelica_like.netlist.modelica.before import Before, begin_late, begun
 from modelica_like.netlist.modelica.buses import bus_equations
 from modelica_like.netlist.modelica.causal import Joints, connections, declared_at, variable_at
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
-from modelica_like.netlist.modelica.left_limits import LeftLimits
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.lifting import above, height, levels_between, outside, owner_above, renamed
 from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
@@ -75,8 +74,6 @@ class Statements(Whens):
         others = [v for h in self.happenings for conditions, new in h.branches for v in (*conditions, *new.values())]
         memories.read(self.equations, others, self.instance.text.place(self.instance.text.line))
         self.equations, self.outputs = memories.equations, memories.of
-        limits = LeftLimits(self.instance, self.equations, self.states, self._is_discrete)
-        self.happenings = [limits.of(happening) for happening in self.happenings]
         self._lift()
         for left, right, source in self.equations:
             for call in (*calls_in(left), *calls_in(right)):

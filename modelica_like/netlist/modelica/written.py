@@ -37,10 +37,10 @@ from modelica_like.language import (
     when,
     where,
 )
-from modelica_like.language.discrete import Ending, is_a, silent
+from modelica_like.language.discrete import Ending, before, is_a, silent
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import Symbol, symbol_of
-from modelica_like.language.fields import Discrete, Field, Parameter
+from modelica_like.language.fields import Discrete, Field, Parameter, Variable
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import InsideAssembly, inside
 from modelica_like.netlist.modelica.fold import SILENT, SLOT
@@ -237,7 +237,7 @@ class Written(Assembly):
                 return self._called(args[0], [self._remembered(args[1][0].args[0][0])], events)
             if args[0] == SILENT:
                 return self._operation(args[1][0], events, quiet=True)
-            events = False if args[0] == "noEvent" else events
+            events = False if args[0] == "noEvent" and events else events
         return self._operation(node, events, quiet=events is False)
 
     def _operation(self, node: Node, events: bool | None, *, quiet: bool) -> Any:
@@ -257,7 +257,8 @@ class Written(Assembly):
 
     def _called(self, name: str, values: list[Any], events: bool | None) -> Any:
         if name == "pre" and not (isinstance(values[0], Symbol) and is_a(values[0], Discrete)):
-            return values[0]  # of a state: the value before the event, as in all new values
+            varies = isinstance(values[0], Symbol) and is_a(values[0], Variable)
+            return before(values[0]) if varies and events is None else values[0]
         return _STEPPED[name](*values, events) if name in _STEPPED else FUNCTIONS[name](*values)
 
     def _symbol(self, path: str) -> Any:
