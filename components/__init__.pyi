@@ -27,13 +27,13 @@ from components.blocks.nonlinear_blocks import Quantizer as Quantizer
 from components.blocks.nonlinear_blocks import SlewRateLimiter as SlewRateLimiter
 from components.blocks.nonlinear_blocks import VariableLimiter as VariableLimiter
 from components.blocks.point_to_point import KinematicPTP2 as KinematicPTP2
+from components.blocks.rowwise import Table as Table
 from components.blocks.sampled import FrequencyMeter as FrequencyMeter
 from components.blocks.sampled import NormalNoise as NormalNoise
 from components.blocks.sampled import UniformNoise as UniformNoise
 from components.blocks.sampled import ZeroOrderHold as ZeroOrderHold
 from components.blocks.signal_tables import Table1D as Table1D
 from components.blocks.signal_tables import Table2D as Table2D
-from components.blocks.rowwise import Table as Table
 from components.blocks.signals import CoilForce as CoilForce
 from components.blocks.signals import Constant as Constant
 from components.blocks.signals import Product as Product

@@ -48,7 +48,7 @@ def bus_equations(instance: Instance) -> Iterator[tuple[Expr, Expr, Source]]:
 def _buses_in(instance: Instance) -> Iterator[Instance]:
     """Yield the expandable connectors of an instance, and those within them."""
     for name, member in instance.members.items():
-        if member.declaration.is_outer or basic_type(instance, member) is not None or not exists(instance, member):
+        if member.declaration.is_outer or not exists(instance, member) or basic_type(instance, member) is not None:
             continue
         for _, index in elements_of(name, sizes(instance, member)):
             part = part_of(instance, member, index)

@@ -121,7 +121,8 @@ class _Part:
         """Refuse a number that the component does not take; the class may."""
         field = self.fields.get(here)
         if isinstance(field, Parameter):
-            with suppress(ModelicaLikeError):  # what no constants determine is checked with the values of a run
+            # What no constants determine is checked with the values of a run, and so is what changes.
+            with suppress(ModelicaLikeError), self.owner.classes.saying():
                 value = self._owners().known()(value)
         if isinstance(field, Parameter) and value.kind == "number":
             label = f"{self.name}.{self.known.there(here)}"
