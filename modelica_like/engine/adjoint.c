@@ -224,11 +224,13 @@ void piece_back(Instance *c, const Record *along) {
         ends[parts] = any ? min_of(edge_ahead(c, begins[parts], &behind), along->end) : along->end;
         if (!any) behind = INFINITY;
     } while (parts++ < MOST_EDGES && behind <= along->end && behind < INFINITY);
+    find_touches(c, parts, begins, ends);
     while (parts-- > 0) {
-        for (double t; (t = seed_behind(c, begins[parts], 0)) > begins[parts];) {
+        for (double t; (t = max_of(seed_behind(c, begins[parts], 0), touch_behind(g))) > begins[parts];) {
             smoothly_back(c, t, ends[parts], MOST_HALVINGS);
             ends[parts] = min_of(t, ends[parts]);
-            seed_behind(c, t, 1);
+            judge_touches(c, along, t);
+            if (seed_behind(c, begins[parts], 0) == t) seed_behind(c, t, 1);
         }
         smoothly_back(c, begins[parts], ends[parts], MOST_HALVINGS);
         if (parts > 0) check_jump(c, ends[parts - 1], begins[parts]);

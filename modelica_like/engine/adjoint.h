@@ -6,8 +6,10 @@
 #include "rodas.h"
 
 enum { N_NODES = LAST_POINTS }; /* of stages: the last ones have one */
-#define MOST_DOUBTFUL 8         /* reasons that are told apart */
-#define MOST_LANES 16           /* vectors that go over a tape together */
+#define DOUBTFUL 1e-9   /* effect of a parameter, by relative changes, on what has no derivative: less is rounding */
+#define MOST_DOUBTFUL 8 /* reasons that are told apart */
+#define MOST_TOUCHES 16 /* in a step */
+#define MOST_LANES 16   /* vectors that go over a tape together */
 
 typedef struct Record { /* a part of a piece along which the run has moved, or an instant */
     struct Record *previous;
@@ -21,9 +23,15 @@ typedef struct Record { /* a part of a piece along which the run has moved, or a
 
 typedef struct {
     FailureCode why;
-    int n; /* of them */
-    double t;
+    int n;           /* of them */
+    double t, place; /* that of a guard: its transition */
 } Doubt;
+
+typedef struct { /* a guard that is highest there; felt: what an event would change, beside it; corner: it turns at once
+                  */
+    double t, felt;
+    int guard, corner;
+} Touch;
 
 typedef struct {
     ptrdiff_t place; /* among the numbers of the state */
@@ -70,6 +78,9 @@ struct Gradient {
     double present, cause_speed; /* time from which it goes; of the guard of an event */
     double singular_at, speed;   /* how fast the guard of an event comes to zero, where it matters; or 0 */
     Doubt doubts[MOST_DOUBTFUL];
+    Touch touches[MOST_TOUCHES]; /* of a piece, or an instant */
+    int n_touches, measured;
+    double *guard_sizes;      /* if `measured` */
     double *vectors, *behind; /* of outputs, then of doubts: derivatives by numbers of the state, and by the time */
     double *sides, *slope, *way, *moment, *rates, *work, *sizes, *motions, *largest;
     double *points, *matrices, *stages, *node_bars; /* of a step */
@@ -130,6 +141,13 @@ void check_outputs(Instance *c);
 int begins_alike(Instance *c, const Record *at, int listed);
 void check_meeting(Instance *c, const Record *at, const unsigned char *fired);
 void check_reading(Instance *c, const Record *at);
+/* graze.c */
+void find_touches(Instance *c, int parts, const double *begins, const double *ends);
+double touch_behind(const Gradient *g);
+void judge_touches(Instance *c, const Record *along, double t);
+int find_touches_at(Instance *c, const Record *at, double rate);
+void add_touches_at(Instance *c, double speed);
+void check_end(Instance *c);
 /* integrals.c */
 double integral_back(int of_error, double *stages, double *weights);
 double slopes_of_integrands(Instance *c, double begin, double h);

@@ -184,6 +184,7 @@ void take_looks(Instance *c, Looks *looks);
 /* locate.c */
 #define MOST_LOOKS 11 /* at guards, that there is room for */
 double cubic_guess(double g0, double r0, double g1, double r1);
+int is_hump(double g0, double r0, double g1, double r1);
 int search_events(Instance *c);
 double soonest_zero(Instance *c);
 const double *rounding_of_guards(Instance *c, const Piece *piece, double t);

@@ -4,7 +4,6 @@
  * that tells at the end which parameters it concerns. */
 #include "adjoint.h"
 
-#define DOUBTFUL 1e-9 /* effect of a parameter, by relative changes, on what has no derivative: less is rounding */
 #define MOST_ROUNDS 32
 #define MOST_VALUES 100000
 #define MOST_MEMORY 1e9 /* bytes */
@@ -30,7 +29,7 @@ void add_doubt(Instance *c, FailureCode why, const double *slope) {
     Doubt *doubt = &g->doubts[same ? g->n_doubts - 1 : g->n_doubts++];
     double *vector = vector_of(c, g->n_of + g->n_doubts - 1), factor = 1 + fmod(0.6180339887498949 * doubt->n, 1);
     g->n_vectors = g->n_of + g->n_doubts;
-    *doubt = (Doubt){why, doubt->n + 1, c->state.t};
+    *doubt = (Doubt){why, doubt->n + 1, c->state.t, -1};
     for (size_t n = 0; n < c->n_smooth; n++) vector[n] += factor * slope[n];
 }
 
@@ -146,7 +145,8 @@ static double *take_room(const Instance *c, size_t n_of) {
         {&g->motions, n}, {&g->rates, 2 * n_y}, {&g->points, N_NODES * n_y}, {&g->matrices, N_NODES * nonzeros},
         {&g->stages, (STAGES + 3) * n_y}, {&g->node_bars, vectors * N_NODES * n_y},
         {&g->integrand_slopes, integrals * n_y}, {&g->integrand_bars, integrals * n}, {&g->later, n_of},
-        {&g->rests, rests}, {&g->lanes, (vectors < MOST_LANES ? vectors : MOST_LANES) * c->n_bars}};
+        {&g->rests, rests}, {&g->guard_sizes, (size_t)c->model->n_guards},
+        {&g->lanes, (vectors < MOST_LANES ? vectors : MOST_LANES) * c->n_bars}};
     size_t total = 0;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) total += parts[k].size;
     double *room = c->allocate(total + 2 * n + vectors + 3 * operations, sizeof(double));
@@ -239,6 +239,8 @@ static Result go_back(Instance *c) {
     }
     if (g->along == NULL) check_outputs(c);
     c->passing = 1;
+    check_end(c);
+    state_copy_in(c, present);
     c->decided_by++; /* tapes know less now, see work_out */
     for (const Record *record = g->last; record != NULL; record = record->previous) {
         if (record->pass == NULL) {
@@ -277,7 +279,7 @@ static Result write_gradient(Instance *c, double *gradient) {
         first = doubt;
         by = g->values[j].by;
     }
-    return any || fail_with(c, first->why, by, first->t, 0);
+    return any || fail_with(c, first->why, by, first->t, first->place);
 }
 
 /* By rows: of variables at the present point, or of what is read along the run, whose places are unchecked. */
@@ -292,7 +294,7 @@ Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along 
     double *room = n_of > MOST_VALUES ? NULL : take_room(c, n_of);
     if (room == NULL) return fail(c, NO_MEMORY, 0);
     g->n_of = g->n_vectors = (int)n_of;
-    g->n_doubts = g->singular = g->early = 0;
+    g->n_doubts = g->singular = g->early = g->measured = 0;
     memset(g->doubts, 0, sizeof g->doubts);
     g->loaded = NULL;
     Result result = go_back(c);

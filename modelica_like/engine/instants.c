@@ -299,8 +299,10 @@ void event_back(Instance *c, const Record *at) {
     evaluate_now(c, &m->tapes.rates, before);
     move_later(c, 1);
     double speed = g->speed;
+    int touches = find_touches_at(c, at, -speed);
     if (g->speed != 0 && !matters(c, at, before, behind)) g->speed = 0;
-    int read = largest_of(g->n_of, g->later) > 0, tells = (g->speed == 0 && !read) || speed == 0 || isfinite(1 / speed);
+    int read = largest_of(g->n_of, g->later) > 0,
+        tells = (g->speed == 0 && !read) || speed == 0 || (isfinite(1 / speed) && touches == 0);
     if (!tells) g->speed = speed = 0;
     if (plain) {
         stop_back(c, at);
@@ -318,7 +320,11 @@ void event_back(Instance *c, const Record *at) {
     }
     state_copy_in(c, at->before);
     read_before(c, speed);
-    if (!tells) add_doubt(c, FAILURE_LOST_AT_TOUCH, slope);
+    if (!tells && touches >= 0) {
+        add_doubt(c, FAILURE_LOST_AT_TOUCH, slope);
+        g->doubts[g->n_doubts - 1].place = (double)(g->cause - m->transitions);
+    }
+    add_touches_at(c, speed);
     int moves = tells && speed != 0 && (g->speed != 0 || read);
     g->cause_speed = speed;
     if (at->n_rounds > 0 && (moves || g->early) && factor_implicit(c)) check_meeting(c, at, assignment(c, at, 0).fired);

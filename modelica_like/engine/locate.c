@@ -70,7 +70,7 @@ static inline double cubic(double s, double g0, double r0, double g1, double r1)
 }
 
 /* Does the cubic through both ends come near zero from below in between? */
-static int is_hump(double g0, double r0, double g1, double r1) {
+int is_hump(double g0, double r0, double g1, double r1) {
     double top = -INFINITY;
     if (!(g0 <= 0 && g1 <= 0 && r0 > NOISE && r1 < -NOISE)) return 0;
     for (int k = 1; k < 20; k++) top = max_of(top, cubic(k / 20.0, g0, r0, g1, r1));

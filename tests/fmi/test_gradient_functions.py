@@ -106,3 +106,29 @@ def test_model_exchange_is_the_importers(fmus):
     assert functions(fmu)[0](fmu.component, references(BY), 3) == 1
     assert "Co-Simulation" in said[-1]
     fmu.freeInstance()
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_what_a_touch_moves_has_no_derivative(tmp_path, version):
+    """A freewheel that just closes at 1.5 s, or not: by an offset of its torque there is none, by its mass there is."""
+    path = tmp_path / "drive.fmu"
+    drive = CLUTCHES.with_name("OneWayClutch.toml")
+    export_fmu(drive, path, version, check=False, embed=False)
+    fmu, references, said = opened(path)
+    start, read = functions(fmu)
+    by, of, found = ["signalTorque.offset", "inertiaIn.J"], ["inertiaIn.w"], np.zeros((1, 2))
+    times = {"tolerance": 1e-8, "startTime": 0.0, "stopTime": 2.0}
+    if version == "2.0":
+        fmu.setupExperiment(**times)
+    fmu.enterInitializationMode(**({} if version == "2.0" else times))
+    assert start(fmu.component, references(by), 2) == 0
+    fmu.exitInitializationMode()
+    fmu.doStep(currentCommunicationPoint=0.0, communicationStepSize=2.0)
+    assert read(fmu.component, references(of), 1, found.ctypes.data) == 0, said
+    fmu.terminate()
+    fmu.freeInstance()
+    handle = build(drive).native(outputs=of, by=by[1:], rtol=1e-8)
+    handle.reset(until=2.0)
+    handle.step(2.0)
+    assert np.isnan(found[0, 0])
+    assert found[0, 1] == handle.gradient()[0, 0]

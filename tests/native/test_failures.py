@@ -218,7 +218,7 @@ ALONE: dict[Code, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
     ),
     Code.LOST_AT_TOUCH: (
         NoGradient, lambda: gradient(Touching(x=0.0), "x", "a", lambda one: one.step(2.0)),
-        LOST.format("a", "1", "the guard of that event only touches zero"),
+        LOST.format("a", "1", r"the guard of relation\[1\] only touches zero there"),
     ),
     Code.LOST_AT_MEETING: (
         NoGradient, lambda: gradient(Meeting(x=0.0), "x", "a", lambda one: one.step(1.5)),
