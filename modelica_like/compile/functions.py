@@ -82,7 +82,7 @@ def _settings(root: Any) -> dict[str, Any]:
     return {**record.simulate, **({"display": record.display} if record.display else {})}
 
 
-def _discrete_starts(flat: FlatModel) -> Any:
+def _discrete_starts(flat: FlatModel, conditions: Any, modes: StartModes, moving: Any) -> Any:
     starts = [ca.SX(discrete.start) for discrete in flat.discretes]
     places = {discrete.path: k for k, discrete in enumerate(flat.discretes)}
     # Initial equations of discrete variables have no variables; a start value that is given takes their place.
@@ -93,6 +93,10 @@ def _discrete_starts(flat: FlatModel) -> Any:
             owner, _, own = full.rpartition(".")
             if own not in inside(flat.components[owner]).starts:
                 starts[places[full]] = value
+    # What time and parameters alone decide is known where the search begins: a branch not taken may be infinite.
+    for (mode, target, _), condition in zip(modes, ca.vertsplit(conditions) if modes else (), strict=True):
+        if flat.discretes[mode].hidden and not ca.depends_on(condition, moving):
+            starts[mode] = ca.if_else(condition, target, starts[mode])
     return ca.vertcat(*starts, ca.SX.zeros(flat.d.numel() - len(starts)))
 
 
@@ -201,12 +205,13 @@ class _Builder:
         """Return what is known at the start."""
         reduced, flat = self.reduced, self.reduced.flat
         conditions, modes = self.start_modes()
+        moving = ca.vertcat(reduced.x, reduced.z, reduced.u, flat.d)
         return Starts(
             conditions=self.function("start_conditions", conditions),
             modes=modes,
             entries=tuple(StartEntry(s.node, reduced.node_states[s.node], s.strength) for s in flat.starts),
             values=self.function("start_values", ca.vertcat(*(ca.SX(s.value) for s in flat.starts))),
-            discretes=self.function("discrete_starts", _discrete_starts(flat)),
+            discretes=self.function("discrete_starts", _discrete_starts(flat, conditions, modes, moving)),
             guesses=np.array(reduced.guesses, float),
             z_guesses=np.array(reduced.z_guesses, float),
         )

@@ -208,3 +208,20 @@ end A;
     inside = np.abs(passed - np.round(passed)) > 1e-9
     assert run["n"][inside] == pytest.approx(np.floor(passed[inside]))
     assert run.final["t0"] == begin
+
+
+@pytest.mark.parametrize("solver", ["native", "idas"])
+def test_branches_that_time_does_not_take_have_no_part_in_a_start(tmp_path: Path, solver: Solver) -> None:
+    """At the start exp(7200) would be the value of the last branch, and nothing finite solves the equation of v."""
+    (tmp_path / "a.mo").write_text("""
+model A
+  Real y = if time < 0.1 then 2 else if time < 3600 then 10 else exp(-2*(time - 3600));
+  Real v(start = 0.5), x(start = 0, fixed = true);
+equation
+  v + v^3 = y;
+  der(x) = v;
+end A;
+""")
+    result = simulate(load(tmp_path / "a.mo"), 0.5, solver=solver)
+    assert result["v"][0] == pytest.approx(1)
+    assert result.final["x"] == pytest.approx(0.1 * 1 + 0.4 * 2)
