@@ -40,6 +40,7 @@ BUS = (
 )
 ENDLESS = "while true loop y := 1; end while"
 GROWING = "function f input Real u; output Real y; algorithm y := u; for i in 1:60 loop y := y*y + y; end for; end f;"
+SLICED = "when time > 0.5 then w[k, {2, 1}] := {1, 2}; end when;"
 DRAWN = 'function f input Integer a[:]; output Real y; external "C" y = ModelicaRandom_{}(a); end f;'
 TYPES = (
     "type M = enumeration(a, b); type N = enumeration(a, b); model B parameter Real k = 1; end B; "
@@ -426,6 +427,29 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "Random numbers whose state is hidden are not supported: draw them by "
         "Modelica.Math.Random.Generators.Xorshift1024star.random, with a state of your own.\n"
         "  in a.mo:5 `x = f({1, 2});`",
+    ),
+    "a subscript of an initial equation": (
+        model(
+            "Integer k = integer(time) + 1; Real v[2] = {1, 2}; parameter Real p(fixed = false); "
+            "initial equation p = v[k];"
+        ),
+        "A subscript of an initial equation must be known.\n"
+        "  in a.mo:3 `Integer k = integer(time) + 1; Real v[2] = {1, 2}; parameter Real p(fixed = false); "
+        "initial equation p = v[k];`",
+    ),
+    "a subscript of what is outside": (
+        model("Integer k = integer(time) + 1; B b(u = w[k]); Real w[2] = {1, 2};", before="model B Real u; end B;"),
+        "A subscript of what is outside of a class must be known.\n"
+        "  in a.mo:3 `Integer k = integer(time) + 1; B b(u = w[k]); Real w[2] = {1, 2};`",
+    ),
+    "a subscript of nothing": (
+        model("Integer k = integer(time) + 1; parameter Real v[0]; Real x;", "x = v[k];"),
+        "An array without elements has none at a subscript.\n  in a.mo:5 `x = v[k];`",
+    ),
+    "a slice beside a subscript of a run": (
+        model("Integer k = integer(time) + 1; Real w[2, 2];", f"algorithm {SLICED}"),
+        "A slice beside a subscript that only a run knows: that is not supported here.\n"
+        f"  in a.mo:5 `algorithm {SLICED}`",
     ),
     "a large array": (
         model("Real v[100000000];"),

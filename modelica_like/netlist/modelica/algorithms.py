@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from modelica_like.errors import ModelicaTextError
-from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica import fold, subscripts
 from modelica_like.netlist.modelica.instance import refused
-from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Statement
+from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Statement, names_in
 
 if TYPE_CHECKING:
     from modelica_like.netlist.modelica.classes import Classes
@@ -36,6 +36,7 @@ class Algorithm:
         declared: declarations by name.
         local: values so far.
         loops: how deep in loops the statements are.
+        guards: conditions of the branches they stand in, which only a run knows.
     """
 
     def __init__(self, classes: Classes, text: ClassText) -> None:
@@ -43,6 +44,7 @@ class Algorithm:
         self.declared: dict[str, Declaration] = {}
         self.local: dict[str, Expr] = {}
         self.loops = 0
+        self.guards: tuple[Expr, ...] = ()
 
     def here(self, text: ClassText | None = None) -> Resolver:
         """Return what resolves expressions with the values so far."""
@@ -107,7 +109,9 @@ class Algorithm:
         return holds.args[0]
 
     def insist(self, statement: Statement) -> None:
-        """Refuse what an assertion excludes; what only a run knows is not checked."""
+        """Refuse what an assertion excludes; what only a run knows is not checked, nor whether it comes to it."""
+        if self.guards:
+            return
         given = statement.parts[0].args[1]
         holds = self.here()(given[0]) if given else None
         if holds is not None and holds.kind == "boolean" and not holds.args[0]:
@@ -132,6 +136,9 @@ class Algorithm:
         if "input" in self.declared[name].prefixes:
             raise ModelicaTextError(f"{name} is an input and cannot be assigned.", where=self.text.place(target.line))
         places, whole = list[int](), self.local[name]
+        if any(self._only_in_a_run(subscript) for subscript in subscripts):
+            self.local[name] = self._into(whole, subscripts, value)
+            return
         for dimension, subscript in enumerate(subscripts):
             chosen = self._several(subscript, whole)
             if chosen is not None:
@@ -141,6 +148,27 @@ class Algorithm:
             places.append(self.place(whole, subscript, open_size=open_size))
             whole = whole.args[places[-1]] if places[-1] < len(whole.args) else fold.number(0)
         self.local[name] = _replaced(self.local[name], places, value)
+
+    def _only_in_a_run(self, subscript: Expr) -> bool:
+        """Whether only a run knows a subscript."""
+        if subscript.kind in ("all", "range", "array") or any(name.path == "end" for name in names_in(subscript)):
+            return False
+        return self.here().known()(subscript).kind not in ("number", "literal", "array")
+
+    def _into(self, whole: Expr, places: tuple[Expr, ...], value: Expr) -> Expr:
+        """Return an array with a new element at subscripts of which only a run knows some."""
+        if not places:
+            return value
+        if whole.kind != "array":
+            raise ModelicaTextError("What is no array has no subscript.", where=self.text.place(places[0].line))
+        chosen, items = self.here().index(places[0], len(whole.args)), list(whole.args)
+        if isinstance(chosen, int):
+            items[chosen - 1] = self._into(items[chosen - 1], places[1:], value)
+            return Expr("array", tuple(items), whole.line)
+        if chosen.kind == "array":
+            raise refused("a slice beside a subscript that only a run knows", self.text, places[0].line)
+        new = tuple(self._into(item, places[1:], value) for item in items)
+        return subscripts.placed(chosen, tuple(items), new, places[0].line)
 
     def _into_record(self, target: Expr, value: Expr) -> bool:
         """Give an element of a record its value; tell whether the target is one."""
@@ -189,10 +217,13 @@ class Algorithm:
             return self.run(statements) if holds.args[0] else self.branch(branches[1:], line)
         if self.loops and any(_leaves(body) for _, body in branches):
             raise _open("a loop that ends where only a run knows", self.text, line)
-        before = dict(self.local)
+        before, guards = dict(self.local), self.guards
+        self.guards = (*guards, holds)
         self.run(statements)
         taken, self.local = self.local, before
+        self.guards = (*guards, fold.operation("not", (holds,), line))
         self.branch(branches[1:], line)
+        self.guards = guards
         for name, other in self.local.items():
             if name in taken and taken[name] != other:
                 self.local[name] = fold.choice([holds, taken[name]], other, line)

@@ -61,12 +61,16 @@ def variables(connector: Instance) -> list[Variable]:
 
 def declared_at(instance: Instance, path: str) -> tuple[Instance, Member] | None:
     """Return the declaration of a variable of an instance, or of a causal connector in it; None if it is neither."""
+    place = declared_in(instance, path)
+    return place if place is not None and (place[0] is instance or is_causal(place[0])) else None
+
+
+def declared_in(instance: Instance, path: str) -> tuple[Instance, Member] | None:
+    """Return the declaration of a variable of an instance or of a part in it; None if it is neither."""
     heads, _, last = path.rpartition(".")
     part = part_at(instance, heads) if heads else instance
     member = part.members.get(last.partition("[")[0]) if isinstance(part, Instance) else None
-    if member is None or not isinstance(part, Instance) or (heads and not is_causal(part)):
-        return None
-    return part, member
+    return (part, member) if member is not None and isinstance(part, Instance) else None
 
 
 def variable_at(instance: Instance, path: str) -> Expr:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from modelica_like.netlist.modelica.tree import Expr, joined, with_operands
@@ -13,6 +13,7 @@ from modelica_like.netlist.modelica.tree import Expr, joined, with_operands
 _BINARY: dict[str, Callable[[float, float], float]] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "^": operator.pow,
 }  # fmt: skip
+ARITHMETIC = (*_BINARY, "neg")
 _RELATIONS: dict[str, Callable[[Any, Any], bool]] = {
     "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq, "<>": operator.ne,
 }  # fmt: skip
@@ -45,9 +46,13 @@ SLOT = "#"
 
 @dataclass(frozen=True)
 class Law:
-    """The result of a function of arguments: an expression of slots."""
+    """The result of a function of arguments: an expression of slots, and whether subscripts in it demand something."""
 
     result: Expr
+    demanding: bool = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "demanding", _demanding(self.result))
 
     def of(self, arguments: tuple[Expr, ...]) -> Expr:
         """Return the expression with arguments in the slots."""
@@ -58,6 +63,17 @@ class Law:
             return with_operands(node, filled)
 
         return filled(self.result)
+
+
+OUTSIDE = "outside"
+"""A value that is taken where a subscript is none of the array: the value, the subscript and the size."""
+
+
+def _demanding(node: Expr) -> bool:
+    if node.kind == OUTSIDE or (node.kind == "shared" and node.args[0].demanding):
+        return True
+    inner = node.args[1] if node.kind == "call" else node.args
+    return any(_demanding(operand) for operand in inner if isinstance(operand, Expr))
 
 
 class Unfit(ValueError):
@@ -183,6 +199,8 @@ def is_condition(expression: Expr) -> bool:
         return is_condition(expression.args[1])
     if expression.kind == "shared":
         return is_condition(expression.args[0].result)
+    if expression.kind == OUTSIDE:
+        return is_condition(expression.args[0])
     if expression.kind == "call":
         name, args, _ = expression.args
         same = name in _SAME_TYPE or (name == "sample" and len(args) == 1)

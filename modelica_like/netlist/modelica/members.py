@@ -112,6 +112,8 @@ def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
         owner.folded.remove(name)
     owner.values[name] = value  # its size may be that of the value
     check_value(owner, member, value)
+    if owner.classes.only_said:  # one that is read later keeps what it depends on
+        del owner.values[name]
     return value
 
 

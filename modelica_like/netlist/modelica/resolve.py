@@ -14,6 +14,7 @@ from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
 from modelica_like.netlist.modelica.lifting import way
 from modelica_like.netlist.modelica.parse import parse_expression
+from modelica_like.netlist.modelica.subscripts import elements_at, subscript_of
 from modelica_like.netlist.modelica.tree import ClassText, Expr
 from modelica_like.netlist.modelica.types import Basic, basic_type
 
@@ -186,43 +187,11 @@ class Resolver:
 
     def indexed(self, value: Expr, subscripts: tuple[Expr, ...], line: int) -> Expr:
         """Return an element of an array."""
-        for k, subscript in enumerate(subscripts):
-            if value.kind != "array":
-                raise refused("a subscript of something that is not an array", self.text, line)
-            if subscript.kind == "all":
-                rest = subscripts[k + 1 :]
-                return Expr("array", tuple(self.indexed(item, rest, line) for item in value.args), line)
-            chosen = self.index(subscript, len(value.args))
-            if isinstance(chosen, Expr):
-                rest = subscripts[k + 1 :]
-                rows = tuple(self.indexed(value, (index, *rest), line) for index in chosen.args)
-                return Expr("array", rows, line)
-            value = value.args[chosen - 1]
-        return value
+        return self._told(lambda: elements_at(self, value, subscripts, line), line)
 
-    def index(self, expression: Expr, size: int) -> int | Expr:
-        """Return a subscript: a position, or an array of them; `end` is the size of the array.
-
-        Raises:
-            ModelicaTextError: it is no whole number from 1 to the size.
-        """
-        inside = self.known()
-        inside.local["end"] = fold.number(size)
-        chosen = inside(expression)
-        if chosen.kind == "array":
-            return chosen
-        if chosen.kind == "literal":
-            chosen = fold.numbered(chosen)
-        if chosen.kind != "number":
-            raise ModelicaTextError(
-                "A subscript must be a number that constants and parameters determine.",
-                where=self.text.place(expression.line),
-            )
-        position = chosen.args[0]
-        if position != int(position) or not 1 <= position <= size:
-            what = f"The index {position:g} is {'outside' if position == int(position) else 'no whole number from'}"
-            raise ModelicaTextError(f"{what} 1 to {size}.", where=self.text.place(expression.line))
-        return int(position)
+    def index(self, expression: Expr, size: int, *, known: bool = False) -> int | Expr:
+        """Return a subscript; see `subscript_of`."""
+        return subscript_of(self, expression, size, known=known)
 
     def _member(
         self, owner: Instance, before: str, parts: tuple[Any, ...], line: int, *, inner: bool = False
@@ -248,7 +217,7 @@ class Resolver:
             raise ModelicaTextError(f"{name} is no array and has no subscript.", where=self.text.place(line))
         whole = Expr("range", (fold.number(1), Expr("name", (("end", ()),), line)), line)
         every = bool(shape) and (not subscripts or subscripts[0].kind == "all")
-        chosen = self.index(whole if every else subscripts[0], shape[0]) if shape else 0
+        chosen = self.index(whole if every else subscripts[0], shape[0], known=True) if shape else 0
         if isinstance(chosen, Expr):
             items = (((name, (argument,)), *rest) for argument in chosen.args)
             return Expr("array", tuple(self._member(owner, before, item, line) for item in items), line)

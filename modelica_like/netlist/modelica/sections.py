@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 from modelica_like.errors import Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.algorithms import Algorithm, targets_in, targets_of
+from modelica_like.netlist.modelica.demands import guarded
 from modelica_like.netlist.modelica.instance import refused
 from modelica_like.netlist.modelica.members import named_array, sizes, value_of
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
 from modelica_like.netlist.modelica.types import Basic, basic_type
 from modelica_like.netlist.modelica.whens import is_ending
+from modelica_like.netlist.modelica.written import ASSERT, Happening
 
 if TYPE_CHECKING:
     from modelica_like.netlist.modelica.statements import Statements
@@ -38,6 +40,7 @@ class Section(Algorithm):
         self.initial = initial
         self.declared = {name: member.declaration for name, member in self.instance.members.items()}
         self.changed: list[str] = []
+        self.demands: list[Expr] | None = None  # of the `when` that is read
         self.whens: list[tuple[When, Source]] = []
 
     def here(self, text: ClassText | None = None) -> Resolver:
@@ -90,9 +93,21 @@ class Section(Algorithm):
         if statement.kind == "when":
             self._when(statement)
         elif statement.kind == "call" and statement.parts[0].args[0] == "assert":
-            self.statements.statement(statement, self.text, self.local)
+            self._demand(statement)
         else:
             super().other(statement)
+
+    def _demand(self, statement: Statement) -> None:
+        """Take an assertion where the branches it stands in are taken; in a `when` it demands when that happens."""
+        demand = self.statements.demanded(statement.parts[0], self.here(), self.text, certain=not self.guards)
+        if demand is None:
+            return
+        holds, words = guarded(demand[0], self.guards), demand[1]
+        if self.demands is not None:
+            self.demands.append(Expr("demand", (holds, words), statement.line))
+            return
+        place = self.text.place(statement.line)
+        self.statements.happenings.append(Happening((((holds,), {}),), place, words.args[0]))
 
     def _when(self, statement: Statement) -> None:
         branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]] = []
@@ -102,13 +117,15 @@ class Section(Algorithm):
         for condition, body in statement.parts:
             holds = self.here().condition(condition, "when", statement.line)
             before, names = dict(self.local), self.changed
-            self.changed = []
+            self.changed, self.demands = [], list[Expr]()
             calls = [s for s in body if s.kind == "call" and s.parts[0].args[0] in _CALLS]
             self.run([s for s in body if s not in calls])
             values: dict[str, Expr] = {}
             for name in dict.fromkeys(self.changed):
                 self.statements.fitted(name, self.local[name], values, self.text, statement.line)
             values |= self.statements.changes(calls, self.text, self.local)
+            values |= {f"{ASSERT}{len(values) + k}": demand for k, demand in enumerate(self.demands)}
+            self.demands = None
             inside, self.changed, self.local = self.changed, names, before
             if set(inside) & set(names):
                 what = f"{inside[0]}, which a 'when' and other statements give a value,"

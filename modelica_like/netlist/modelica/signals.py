@@ -9,11 +9,13 @@ from modelica_like.errors import Source
 from modelica_like.language.fields import Output
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.causal import declared_in
 from modelica_like.netlist.modelica.instance import Instance, Member
 from modelica_like.netlist.modelica.library import Known
+from modelica_like.netlist.modelica.lifting import UP, height, owner_above
 from modelica_like.netlist.modelica.members import exists, part_at
 from modelica_like.netlist.modelica.parse import parse_expression
-from modelica_like.netlist.modelica.tree import Expr, calls_in
+from modelica_like.netlist.modelica.tree import Expr, calls_in, with_operands
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_signal
 from modelica_like.netlist.modelica.wiring import Wire
 from modelica_like.netlist.modelica.written import MEMORY
@@ -162,6 +164,24 @@ def taken(path: str, basic: Basic) -> Expr:
     if basic.kind == "Boolean":
         return Expr(">", (name, half))
     return fold.call("floor", (Expr("+", (name, half)),), 0)
+
+
+def whole_numbers(instance: Instance, value: Expr) -> Expr:
+    """Return the value of a discrete variable with whole numbers of signals, which change at events, too."""
+
+    def taking(node: Expr) -> Expr:
+        if node.kind == "call" and node.args[0] in _OF_BEFORE:
+            return node
+        if node.kind != "name":
+            return with_operands(node, taking)
+        path = node.args[0][0]
+        place = declared_in(owner_above(instance, height(node)), path.lstrip(UP))
+        basic = basic_type(*place) if place is not None else None
+        if place is None or basic is None or basic.kind not in ("Integer", "enumeration"):
+            return node
+        return taken(path, basic) if is_signal(*place, basic) else node
+
+    return taking(value)
 
 
 def _asked(value: Expr) -> Iterator[str]:

@@ -9,13 +9,14 @@ from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.before import Before, begin_late, begun
 from modelica_like.netlist.modelica.buses import bus_equations
 from modelica_like.netlist.modelica.causal import Joints, connections, declared_at, variable_at
+from modelica_like.netlist.modelica.demands import demanded_elements
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.lifting import above, height, levels_between, outside, owner_above, renamed
 from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.sections import Section
-from modelica_like.netlist.modelica.signals import Memories, inner_signals
+from modelica_like.netlist.modelica.signals import Memories, inner_signals, whole_numbers
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement, calls_in
 from modelica_like.netlist.modelica.types import Basic, basic_type, is_bound_outside, is_signal
 from modelica_like.netlist.modelica.units import check_units
@@ -70,6 +71,9 @@ class Statements(Whens):
             self.statement(happening, text, {})
         self._join()
         self._read_start()
+        self.happenings = demanded_elements(self.equations, self.initial, self.happenings)
+        inside, discrete = self.instance, self._is_discrete
+        self.equations = [(a, whole_numbers(inside, b) if discrete(a) else b, at) for a, b, at in self.equations]
         memories = Memories(self.instance, self.assigned)
         others = [v for h in self.happenings for conditions, new in h.branches for v in (*conditions, *new.values())]
         memories.read(self.equations, others, self.instance.text.place(self.instance.text.line))

@@ -135,6 +135,8 @@ def _leaves(value: Expr) -> Iterator[Expr]:
     inner = {"array": value.args, "if": (*value.args[1::2], value.args[-1])} if value.args else {}
     if value.kind == "shared":
         yield from _leaves(value.args[0].result)
+    elif value.kind == fold.OUTSIDE:
+        yield from _leaves(value.args[0])
     elif value.kind not in ("array", "if"):
         yield value
     for item in inner.get(value.kind, ()):

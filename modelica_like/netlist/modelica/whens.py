@@ -140,8 +140,20 @@ class Whens:
             value = new if holds.kind == "boolean" else fold.choice([holds, new], value, line)
         return as_condition(value) if left.kind == "condition" else value
 
-    def demanded(self, call: Expr, resolver: Resolver, text: ClassText) -> tuple[Expr, Expr] | None:
-        """Return the condition of an assertion and its words; None of a warning and of what always holds."""
+    def demanded(
+        self, call: Expr, resolver: Resolver, text: ClassText, *, certain: bool = True
+    ) -> tuple[Expr, Expr] | None:
+        """Return the condition of an assertion and its words; None of a warning and of what always holds.
+
+        Args:
+            call: the assertion.
+            resolver: of its place.
+            text: class it stands in.
+            certain: whether it is demanded in any case.
+
+        Raises:
+            ModelicaTextError: it is certain, and broken.
+        """
         name, given, named = call.args
         if name != "assert":  # an error
             given = (Expr("boolean", (False,), call.line), *given)
@@ -150,7 +162,7 @@ class Whens:
             return None
         condition = resolver.condition(given[0], "assert", call.line)
         words = _words(given[1]) if len(given) > 1 else "an assertion is broken"
-        if condition.kind != "boolean" or (self.in_branch and not condition.args[0]):
+        if condition.kind != "boolean" or ((self.in_branch or not certain) and not condition.args[0]):
             return condition, Expr("string", (words,), call.line)
         if not condition.args[0]:
             raise ModelicaTextError(f"An assertion is broken: {words}.", where=text.place(call.line))

@@ -43,7 +43,7 @@ from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field, Parameter, Variable
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import InsideAssembly, inside
-from modelica_like.netlist.modelica.fold import SILENT, SLOT
+from modelica_like.netlist.modelica.fold import OUTSIDE, SILENT, SLOT
 from modelica_like.netlist.modelica.tree import Expr as Node
 
 MEMORY = "_condition"
@@ -214,6 +214,8 @@ class Written(Assembly):
             return ca.SX(1.0 if args[0] else 0.0)
         if kind in ("name", "condition") and args[0][0].startswith(SLOT):
             return self._inside.slots[-1][int(args[0][0].removeprefix(SLOT))]
+        if kind == OUTSIDE:
+            return self.symbolic(args[0], events)
         if kind == "shared":
             self._inside.slots.append([self.symbolic(argument, events) for argument in args[1:]])
             result = self.symbolic(args[0].result, events)
