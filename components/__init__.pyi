@@ -27,7 +27,6 @@ from components.blocks.nonlinear_blocks import Quantizer as Quantizer
 from components.blocks.nonlinear_blocks import SlewRateLimiter as SlewRateLimiter
 from components.blocks.nonlinear_blocks import VariableLimiter as VariableLimiter
 from components.blocks.point_to_point import KinematicPTP2 as KinematicPTP2
-from components.blocks.rowwise import Table as Table
 from components.blocks.sampled import FrequencyMeter as FrequencyMeter
 from components.blocks.sampled import NormalNoise as NormalNoise
 from components.blocks.sampled import UniformNoise as UniformNoise
@@ -41,6 +40,7 @@ from components.blocks.signals import Pulse as Pulse
 from components.blocks.signals import Ramp as Ramp
 from components.blocks.signals import Sine as Sine
 from components.blocks.signals import Step as Step
+from components.blocks.signals import Table as Table
 from components.blocks.signals import TimeFormula as TimeFormula
 from components.blocks.signals import Trapezoid as Trapezoid
 from components.blocks.stepped_signals import BooleanPulse as BooleanPulse

@@ -5,9 +5,13 @@ Jumps and kinks of a signal are time events, so that the solver never steps acro
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import log, pi
+from typing import Literal
 
 from components import icons
+from components.blocks.rowwise import Rowwise, is_long
+from components.tabulated import GUESSED
 from modelica_like.language import (
     BoundMode,
     Component,
@@ -22,13 +26,17 @@ from modelica_like.language import (
     Parameter,
     all_of,
     any_of,
+    column,
     discrete,
+    element,
     exp,
     floor,
+    interpolate,
     maximum,
     minimum,
     param,
     parse_formula,
+    rows,
     signal_in,
     signal_out,
     sin,
@@ -302,3 +310,57 @@ class Trapezoid(Periodic):
 
     def length(self) -> Expr:
         return minimum(self.rising + self.width + self.falling, self.period)
+
+
+class Table(Rowwise):
+    """Signal that interpolates in a table of time and value."""
+
+    table: tuple[tuple[float, float], ...] = rows(
+        column("time", scale="time_scale", rising=True), column("value", scale="scale")
+    )
+    smooth: bool = False
+    """Interpolate with a continuous slope instead of straight lines."""
+    extrapolate: Literal["hold", "linear", "error"] = "hold"
+    """Beyond the ends `hold` the last value, continue the last slope (`linear`), or end the run (`error`)."""
+    end = Mode("ahead", "passed", "awaited", description="whether the table has ended, or not begun")
+    scale: Parameter = param("*", "scale of the values", default=1.0)
+
+    def moments(self) -> tuple[float, ...]:
+        return () if self.smooth else tuple(moment for moment, _ in self.table)
+
+    def equations(self) -> Equations:
+        times, values = zip(*self.table, strict=True)
+        now = self.time / self.time_scale
+        if not self.smooth and is_long(times) and is_long(values):
+            yield self.y == self.scale * self._on_line(now, times, values)
+            return
+        yield self.y == self.scale * interpolate(now, times, values, self.smooth, self.extrapolate)
+
+    def _on_line(self, now: Expr, times: tuple[float, ...], values: tuple[float, ...]) -> Expr:
+        """Return the value on the line between the last row that was passed and the next one."""
+        lines = [(t, y, (later - y) / (end - t)) for (t, y), (end, later) in pairwise(self.table)]
+        last = (*self.table[-1], lines[-1][2])
+        if self.extrapolate != "linear":
+            lines, last = [(*self.table[0], 0.0), *lines], (*self.table[-1], 0.0)
+        else:
+            lines = [lines[0], *lines]
+        begin, value, slope = (element(column, self.row + 1) for column in zip(*lines, last, strict=True))
+        return value + slope * (now - begin)
+
+    def events(self) -> Events:
+        if not self.smooth:
+            yield from super().events()
+        # A run may begin and end with the table. Where the value stays anyway, nothing is guessed.
+        (begin, first), (end, last) = self.table[0], self.table[-1]
+        now, slack = self.time / self.time_scale, _INSTANT * (1 + end - begin)
+        fails, goes_on = self.extrapolate == "error", self.extrapolate == "linear"
+        if len(self.table) > 1 and not _stays(first, self.table[1][1]):
+            notice = f"has no rows yet: its first {'slope' if goes_on else 'value'} counts"
+            yield self.end.go("ahead", "awaited", when=now < begin - slack, notice=notice)
+        if len(self.table) > 1 and (fails or not _stays(last, self.table[-2][1])):
+            notice = f"has no more rows{GUESSED[self.extrapolate]}"
+            yield self.end.go(("ahead", "awaited"), "passed", when=now > end + slack, notice=notice, fails=fails)
+
+
+def _stays(value: Expr | float, following: Expr | float) -> bool:
+    return isinstance(value, float | int) and isinstance(following, float | int) and value == following

@@ -6,8 +6,7 @@ from math import pi
 from typing import Literal
 
 from components import icons
-from components.blocks.rowwise import Table
-from components.blocks.signals import Periodic, Started
+from components.blocks.signals import Periodic, Started, Table
 from modelica_like.language import (
     Component,
     Equations,

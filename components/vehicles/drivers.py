@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from components import icons
 from components.blocks.control import PI
-from components.blocks.rowwise import Table
+from components.blocks.signals import Table
 from modelica_like.language import (
     Component,
     Equations,

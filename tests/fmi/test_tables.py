@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fmpy.fmi3 import FMU3Slave
 
-from components.blocks.rowwise import Table
+from components.blocks.signals import Table
 from components.clutches.friction import BearingFriction
 from components.gears.gearboxes import Gearbox
 from components.gears.shift_schedule import ShiftSchedule
