@@ -192,25 +192,52 @@ static void smoothly_back(Instance *c, double begin, double end, int halvings) {
     }
 }
 
-/* Slopes jump between two neighbouring times without an event: nothing tells by how much that moves. */
+/* Slopes jump between two neighbouring times without an event, or have no bound there: nothing tells by how much that
+ * moves. An edge moves in time by its slope beside its rate, also where both are flat; where it does not, by all. */
 static void check_jump(Instance *c, double before, double behind) {
     const Model *m = c->model;
+    Gradient *g = c->gradient;
     int n = m->tapes.edges.n_outputs;
     const double *here = c->edges_middle;
     int jump = integrands_jump(c, before, behind); /* the other one leaves edges */
-    if (!jumps_between(c, before, behind) && !jump) return;
+    jump |= jumps_between(c, before, behind);
+    if (!jump && !is_steep(c, before, behind)) return;
     c->state.t = behind;
     piece_at(m, c->piece, behind, c->x);
     c->variables_valid = c->state.z_valid = 0;
     if (!factor_implicit(c)) return;
     for (int k = 0; k < m->settings->n_kinks; k++) {
         if ((here[k] > 0) == (here[n + k] > 0)) continue;
-        slope_of_output(c, &m->tapes.edges, k, c->edges_middle + 2 * n, c->gradient->slope);
-        add_doubt(c, FAILURE_LOST_AT_JUMP, c->gradient->slope);
+        slope_of_output(c, &m->tapes.edges, k, c->edges_middle + 2 * n, g->slope);
+        evaluate_now(c, &m->tapes.rates, c->rhs);
+        double rate = g->slope[c->n_smooth] + dot(m->n_x, g->slope + (c->x - c->numbers), c->rhs);
+        for (size_t i = 0; i < c->n_smooth; i++) g->slope[i] = rate == 0 ? 1 : g->slope[i] / (rate * span_of(c));
+        add_doubt(c, jump ? FAILURE_LOST_AT_JUMP : FAILURE_LOST_AT_ROOT, g->slope);
     }
 }
 
-/* Goes back along a part of a piece: states are smooth enough at edges within a step, slopes are not. */
+/* Runs along a part of a piece again, with steps that end at corners, and goes back along these. Returns 0 if they are
+ * too many. */
+static int along_corners(Instance *c, const Record *along) {
+    Record *last = NULL;
+    int count = 0, any = 1;
+    c->state.step = along->end - along->begin;
+    c->edges_valid = c->state.inputs_changed = 0;
+    while (any && c->state.t < along->end - least_step(&c->state)) {
+        double begin = c->state.t;
+        Record *record = count++ < MOST_EDGES ? c->allocate(1, sizeof *record + piece_size(c->model)) : NULL;
+        any = record != NULL && land_on_edges(c, along->end);
+        if (record == NULL) break;
+        *record = (Record){.previous = last, .frame = along->frame, .begin = begin, .end = c->state.t};
+        record->own = memcpy(record + 1, c->piece, piece_size(c->model));
+        last = record;
+    }
+    for (const Record *record = any ? last : NULL; record != NULL; record = record->previous) piece_back(c, record);
+    for (Record *record; (record = last) != NULL; c->release(record)) last = record->previous;
+    return any;
+}
+
+/* Goes back along a part of a piece. A step that went over a corner is right in its end, not on the way there. */
 void piece_back(Instance *c, const Record *along) {
     Gradient *g = c->gradient;
     double begins[MOST_EDGES + 1], ends[MOST_EDGES + 1], behind = along->begin;
@@ -224,7 +251,17 @@ void piece_back(Instance *c, const Record *along) {
         ends[parts] = any ? min_of(edge_ahead(c, begins[parts], &behind), along->end) : along->end;
         if (!any) behind = INFINITY;
     } while (parts++ < MOST_EDGES && behind <= along->end && behind < INFINITY);
-    find_touches(c, parts, begins, ends);
+    if (!g->lands) find_touches(c, parts, begins, ends);
+    int corners = 0;
+    for (int k = 1; k < parts && !g->lands; k++) corners |= is_corner(c, ends[k - 1], begins[k], g->matrices);
+    if (corners) {
+        stand_at(c, along->frame, along->own, along->begin);
+        g->lands = 1;
+        int done = along_corners(c, along);
+        g->lands = 0;
+        if (done) return;
+        stand_at(c, along->frame, along->own, along->begin);
+    }
     while (parts-- > 0) {
         for (double t; (t = max_of(seed_behind(c, begins[parts], 0), touch_behind(g))) > begins[parts];) {
             smoothly_back(c, t, ends[parts], MOST_HALVINGS);

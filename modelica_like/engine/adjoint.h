@@ -78,8 +78,9 @@ struct Gradient {
     double present, cause_speed; /* time from which it goes; of the guard of an event */
     double singular_at, speed;   /* how fast the guard of an event comes to zero, where it matters; or 0 */
     Doubt doubts[MOST_DOUBTFUL];
-    Touch touches[MOST_TOUCHES]; /* of a piece, or an instant */
-    int n_touches, measured;
+    Touch touches[MOST_TOUCHES];    /* of a piece, or an instant */
+    int n_touches, measured, lands; /* lands: steps that end at edges, instead of a piece that went over them */
+    double *edges;
     double *guard_sizes;      /* if `measured` */
     double *vectors, *behind; /* of outputs, then of doubts: derivatives by numbers of the state, and by the time */
     double *sides, *slope, *way, *moment, *rates, *work, *sizes, *motions, *largest;
@@ -142,6 +143,7 @@ int begins_alike(Instance *c, const Record *at, int listed);
 void check_meeting(Instance *c, const Record *at, const unsigned char *fired);
 void check_reading(Instance *c, const Record *at);
 /* graze.c */
+int stand_at(Instance *c, const void *frame, const double *own, double t);
 void find_touches(Instance *c, int parts, const double *begins, const double *ends);
 double touch_behind(const Gradient *g);
 void judge_touches(Instance *c, const Record *along, double t);

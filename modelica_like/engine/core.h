@@ -170,6 +170,7 @@ void piece_at(const Model *m, const Piece *piece, double t, double *point);
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 Result pass_instant(Instance *c, unsigned char *wanting, int located);
+Result land_on_edges(Instance *c, double end);
 Result handle_event(Instance *c);
 Result finish(Instance *c);
 Result check_whole(Instance *c, double size);
@@ -192,6 +193,8 @@ const double *rounding_of_guards(Instance *c, const Piece *piece, double t);
 double seen_length(Instance *c, double least, double *most);
 void keep_edges(Instance *c);
 int is_over_edge(Instance *c);
+int is_steep(Instance *c, double before, double behind);
+int is_corner(Instance *c, double before, double behind, double *room);
 int jumps_between(Instance *c, double before, double behind);
 double edge_ahead(Instance *c, double t, double *behind);
 /* fixed.c */

@@ -5,17 +5,23 @@
 #define LOCATED 1e-13 /* of the step */
 #define BEHIND 1e-12  /* of a step that ends at an edge: the next one begins behind it */
 #define ROUNDS 60
+#define SECANTS 20 /* of these, on straight lines at times: flat edges are halved */
 #define REACH 2
-#define ROUGHLY 1e-8     /* of a part: edges that stand alone and are smooth need no better */
-#define NEAR 0.1         /* an extremum that comes this close to zero is looked at */
-#define UNSEEN 10        /* error of a window between two edges, in tolerances, from which on the step ends before it */
-#define UNEXPLAINED 300  /* of a piece of another integrator: less is the error of its steps, which are longer */
-#define CURVED 4         /* parts of a window whose slopes may be curved: their error is 256 times as small */
-#define BESIDE 1e-14     /* of the time: rounding, by which counts rise before or behind their edges */
-#define JUMP 1e-4        /* of slopes at neighbouring times: much more than they change there if they are steep */
-#define ALREADY 1e-9     /* of the step: edges at its beginning, on which it stands */
-#define TOPS 2           /* parabolas through a top: the second one is */
-#define NARROWER 0.05    /* times as wide */
+#define ROUGHLY 1e-8    /* of a part: edges that stand alone and are smooth need no better */
+#define NEAR 0.1        /* an extremum that comes this close to zero is looked at */
+#define UNSEEN 10       /* error of a window between two edges, in tolerances, from which on the step ends before it */
+#define UNEXPLAINED 300 /* of a piece of another integrator: less is the error of its steps, which are longer */
+#define CURVED 4        /* parts of a window whose slopes may be curved: their error is 256 times as small */
+#define BESIDE 1e-14    /* of the time: rounding, by which counts rise before or behind their edges */
+#define JUMP 1e-4       /* of slopes at neighbouring times: much more than they change there if they are steep */
+#define ALREADY 1e-9    /* of the step: edges at its beginning, on which it stands */
+#define TOPS 2          /* parabolas through a top: the second one is */
+#define NARROWER 0.05   /* times as wide */
+/* Distances from an edge, beside the time, between which a slope without a bound is each time less by GROWS: the middle
+ * ones tell it from another corner in between. */
+#define ROOT_AWAY {0, 1e-12, 1e-10, 1e-6}
+#define ROOT_GROWS 3
+#define ROOT_FELT 1e3    /* times the size: a smaller slope there is rounding */
 #define MOST_WINDOWS 200 /* of a step: with more, it becomes shorter */
 #define MOST_NOISE 16    /* windows shorter than the time resolution: what stays at an edge has them by rounding */
 #define FINE 0.9         /* of the advance of a phase that a step may have */
@@ -113,7 +119,7 @@ static double next_edge(Instance *c, double low, double *before, int precisely) 
     if (high == low) return INFINITY;
     for (size_t k = 0; k < n; k++) sizes[k] = fabs(before[k] - after[k]);
     for (int round = 0, near = 0; round < ROUNDS && high - low > LOCATED * h; round++) {
-        double place = round % 4 == 3 ? 0.5 : place_between(c, before, after);
+        double place = round % 4 == 3 || round >= SECANTS ? 0.5 : place_between(c, before, after);
         double t = low + place * (high - low) + (near ? ROUGHLY * part : 0);
         if (!(t < high)) t = 0.5 * (low + high);
         if (!(t > low)) t = low + min_of(ROUGHLY * part, 0.5 * (high - low));
@@ -158,6 +164,54 @@ int jumps_between(Instance *c, double before, double behind) {
     for (int k = 0; k < m->n_x; k++)
         any |= fabs(last[k] - first[k]) > JUMP * (m->nominals[k] + fabs(first[k]) + fabs(last[k]));
     return any;
+}
+
+/* Has a slope no bound at one of two neighbouring times? It grows the more, the nearer to them. */
+int is_steep(Instance *c, double before, double behind) {
+    const Model *m = c->model;
+    const double away[] = ROOT_AWAY;
+    double *point = c->vector + m->n_z, *at = c->edge_slopes, *there = c->edge_change, *grown = c->changes;
+    for (int side = -1; side <= 1; side += 2) {
+        double t = side < 0 ? before : behind;
+        for (int k = 0; k < 4; k++) {
+            double way = side * away[k] * max_of(1, fabs(t));
+            piece_at(m, c->piece, t, point);
+            for (int i = 0; i < m->n_x && k > 0; i++) point[i] += way * at[i];
+            if (!solve_implicit(c, t + way, point, 1)) return 0;
+            evaluate_special(c, &m->tapes.rates, t + way, point, k == 0 ? at : there);
+            for (int i = 0; i < m->n_x && k > 0; i++) {
+                double slope = fabs(there[i] - at[i]) / away[k], felt = ROOT_FELT * (m->nominals[i] + fabs(at[i]));
+                int bends = k > 1 && slope * away[k] > 2 * grown[i] * away[k - 1]; /* it is no step nearby */
+                int grows = k == 1 || (bends && grown[i] > ROOT_GROWS * slope && (k == 3 || slope > felt));
+                if (k == 3 && grows) return 1;
+                grown[i] = grows ? slope : 0;
+            }
+        }
+    }
+    return 0;
+}
+
+/* Do Jacobians differ at two neighbouring times, so that derivatives feel it in a step of the piece? */
+int is_corner(Instance *c, double before, double behind, double *room) {
+    const Model *m = c->model;
+    const QrPattern *a = &m->step;
+    double *point = c->vector + m->n_z, h = c->piece->end - c->piece->begin;
+    double *sides[] = {room, c->jacobian};
+    for (int side = 0; side < 2; side++) {
+        piece_at(m, c->piece, side ? behind : before, point);
+        if (!solve_implicit(c, side ? behind : before, point, 1)) return 0;
+        evaluate_special(c, &m->tapes.jacobian, side ? behind : before, point, sides[side]);
+    }
+    for (int column = 0, k = 0; k < m->n_jacobian; k++) {
+        int place = m->jacobian_to_step[k];
+        while (column + 1 < a->size && a->colind[column + 1] <= place) column++;
+        while (a->colind[column] > place) column--;
+        double size = h * m->nominals[column] / m->nominals[a->row[place]];
+        if (fabs(sides[1][k] - sides[0][k]) * (column < m->n_x && a->row[place] < m->n_x ? size : h) >
+            c->state.tolerance)
+            return 1;
+    }
+    return 0;
 }
 
 /* Adds what slopes on the piece's path change from one time to another, by Gauss's rule of order four. */

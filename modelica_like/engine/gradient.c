@@ -146,6 +146,7 @@ static double *take_room(const Instance *c, size_t n_of) {
         {&g->stages, (STAGES + 3) * n_y}, {&g->node_bars, vectors * N_NODES * n_y},
         {&g->integrand_slopes, integrals * n_y}, {&g->integrand_bars, integrals * n}, {&g->later, n_of},
         {&g->rests, rests}, {&g->guard_sizes, (size_t)c->model->n_guards},
+        {&g->edges, 3 * (size_t)c->model->tapes.edges.n_outputs},
         {&g->lanes, (vectors < MOST_LANES ? vectors : MOST_LANES) * c->n_bars}};
     size_t total = 0;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) total += parts[k].size;
@@ -225,8 +226,10 @@ static Result go_back(Instance *c) {
     Gradient *g = c->gradient;
     void *present = NULL;
     int edges_valid = c->edges_valid, doubts = c->doubts;
-    double one = 1;
+    size_t size = 3 * (size_t)c->model->tapes.edges.n_outputs * sizeof(double);
+    double one = 1, edges_kept = c->edges_kept;
     if (!state_copy_out(c, &present)) return RESULT_ERROR;
+    memcpy(g->edges, c->edges, size);
     g->next_seed = g->instant = 0;
     g->present = c->state.t;
     find_kinked(c);
@@ -257,6 +260,8 @@ static Result go_back(Instance *c) {
     c->passing = 0;
     c->decided_by++;
     c->edges_valid = edges_valid;
+    c->edges_kept = edges_kept;
+    memcpy(c->edges, g->edges, size);
     c->doubts = doubts;
     return state_release(c, &present);
 }
@@ -294,7 +299,7 @@ Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along 
     double *room = n_of > MOST_VALUES ? NULL : take_room(c, n_of);
     if (room == NULL) return fail(c, NO_MEMORY, 0);
     g->n_of = g->n_vectors = (int)n_of;
-    g->n_doubts = g->singular = g->early = g->measured = 0;
+    g->n_doubts = g->singular = g->early = g->measured = g->lands = 0;
     memset(g->doubts, 0, sizeof g->doubts);
     g->loaded = NULL;
     Result result = go_back(c);

@@ -52,7 +52,7 @@ static double uncertainty(const Instance *c, int guard, const double *slope) {
 }
 
 /* Goes to a time of a piece, in the modes of a copy. */
-static int stand_at(Instance *c, const void *frame, const double *own, double t) {
+int stand_at(Instance *c, const void *frame, const double *own, double t) {
     state_copy_in(c, frame);
     c->gradient->loaded = NULL;
     memcpy(c->piece, own, piece_size(c->model));

@@ -184,7 +184,7 @@ static Result take_step(Instance *c, double limit) {
             wished = seen;
             continue;
         }
-        if (!solved || (c->model->n_guards > 0 && !search_events(c))) {
+        if (!solved || (c->model->n_guards > 0 && !c->passing && !search_events(c))) {
             rejected++;
             s->n_rejected++;
             wished = h * (error > 1 ? max_of(0.1, factor) : 0.25);
@@ -200,6 +200,19 @@ static Result take_step(Instance *c, double limit) {
     }
     leave_piece(c);
     return fail(c, STEP_TOO_SMALL, s->t);
+}
+
+/* Goes on by a step towards a time, for derivatives, which ends at an edge in between. */
+Result land_on_edges(Instance *c, double end) {
+    int landed = c->lands;
+    c->lands = 1;
+    Result result = take_step(c, end);
+    c->lands = landed;
+    if (!result) return result;
+    c->state.t = c->piece->end;
+    memcpy(c->x, last_of(c->model, c->piece), (size_t)c->model->n_unknowns * sizeof(double));
+    c->variables_valid = c->state.z_valid = c->state.piece_valid = 0;
+    return settle(c);
 }
 
 static Result take_own(Instance *c, double limit) {

@@ -76,6 +76,7 @@ class Code(IntEnum):
     LOST_AT_SINGULAR = auto()
     LOST_AT_KINK = auto()
     LOST_AT_JUMP = auto()
+    LOST_AT_ROOT = auto()
     LOST_AT_TOUCH = auto()
     LOST_AT_MEETING = auto()
     LOST_AT_READING = auto()

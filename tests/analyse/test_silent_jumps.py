@@ -132,7 +132,7 @@ def test_only_parameters_that_move_the_jump_have_none() -> None:
     assert whole["x", "a"] == pytest.approx(0.5, rel=1e-6)
 
 
-@pytest.mark.parametrize("kind", [*JUMPS, "clock"])
+@pytest.mark.parametrize("kind", [*JUMPS, FLAT, "clock"])
 def test_the_engine_refuses_them_too(kind: Kind) -> None:
     """By both parameters, or b alone if it is when the rate jumps."""
     native = build(Way(kind=kind, b=0.5)).native(outputs=["x"], by=["b"])
@@ -206,3 +206,15 @@ def test_a_slope_without_bound_is_told() -> None:
     way = 2 * END - 1
     by_a, by_b = (3 * END * way**2 - (1 + way**3) / 2) / 6, (1 - way**2) / 2
     np.testing.assert_allclose(found.derivatives, [[by_a, by_b]], rtol=1e-7)
+    handle = build(Orifice()).native(outputs=["y"], by=["a", "b"])
+    handle.run(END)
+    with pytest.raises(NoGradient, match=r"to a after t = 0\.5 s: the slope of a rate has no bound there"):
+        handle.gradient()
+
+
+@pytest.mark.parametrize("told", [False, True])
+def test_the_engine_differentiates_what_is_merely_steep(told: bool) -> None:
+    """Corners that one step goes over: b/a^2 and 1 - 1/a, but for the way of 1e-6 between them."""
+    handle = build(Way(kind="steep", told=told)).native(outputs=["x"], by=["a", "b"])
+    handle.run(END)
+    np.testing.assert_allclose(handle.gradient(), [[0.25, 0.5]], rtol=1e-5)

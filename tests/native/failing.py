@@ -22,6 +22,7 @@ from modelica_like.language import (
     Mode,
     Parameter,
     Variable,
+    absolute,
     clock,
     delay,
     der,
@@ -219,6 +220,16 @@ class Silent(Basis):
 
     def equations(self) -> Equations:
         yield der(self.x) == self.a + where(self.x < 0.5, 0.0, 1.0, events=False)
+
+
+class Rooted(Basis):
+    """The root of a distance, which has no slope where that is zero."""
+
+    y: Variable = var("1", "integral", default=0.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.a
+        yield der(self.y) == sqrt(absolute(self.x - 0.5))
 
 
 class Touching(Basis):

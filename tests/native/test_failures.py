@@ -26,6 +26,7 @@ from failing import (
     Meeting,
     Rebound,
     Root,
+    Rooted,
     Running,
     Sampling,
     Silent,
@@ -215,6 +216,10 @@ ALONE: dict[Code, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
     Code.LOST_AT_JUMP: (
         NoGradient, lambda: gradient(Silent(x=0.0), "x", "a", lambda one: one.step(1.0)),
         LOST.format("a", r"0\.\d+", "a rate jumps without an event there"),
+    ),
+    Code.LOST_AT_ROOT: (
+        NoGradient, lambda: gradient(Rooted(x=0.0), "y", "a", lambda one: one.step(1.0)),
+        LOST.format("a", r"0\.5", "the slope of a rate has no bound there"),
     ),
     Code.LOST_AT_TOUCH: (
         NoGradient, lambda: gradient(Touching(x=0.0), "x", "a", lambda one: one.step(2.0)),

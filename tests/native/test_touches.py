@@ -9,7 +9,7 @@ from components import Clutch, Inertia, Sine, Torque
 from modelica_like import Assembly, build
 from modelica_like.analyse.sensitivity.by_run_time import differentiated_run
 from modelica_like.errors import NoGradient
-from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var, when
+from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var, when, where
 from modelica_like.runs.readings import read_output
 from modelica_like.simulation import plan
 
@@ -94,6 +94,38 @@ def test_a_spring_that_is_just_reached_has_derivatives(rtol):
     found = gradient_of(Sprung(), 3.0, ["x", "v"], ["v", "edge", "c"], rtol)
     np.testing.assert_allclose(found, [[3, 0, 0], [1, 0, 0]], atol=1e-3)  # by the root of rounding
     assert np.isnan(gradient_of(Sprung(d=1.0), 3.0, ["x", "c"], ["v", "edge", "c"], rtol)[:, :2]).all()
+
+
+class Thrown(Component):
+    """The same way, with a spring at its end that makes no event."""
+
+    units_checked = False
+    x: Variable = var("1", "way", default=0.0)
+    v: Variable = var("1", "speed", default=2.0)
+    c: Parameter = param("1", "stiffness", default=1e3)
+    g: Parameter = param("1", "deceleration", default=2.0)
+    edge: Parameter = param("1", "its begin", default=1.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.v
+        yield der(self.v) == -self.g - self.c * where(self.x > self.edge, self.x - self.edge, 0 * self.x)
+
+
+@TOLERANCES
+@pytest.mark.parametrize("way", [1e-2, 1e-3, 1e-4])
+def test_a_spring_that_is_touched_for_less_than_a_step(way, rtol):
+    """It is in touch for 2 / c^0.5 atan(u c^0.5 / g), at the speed u, with which it falls back."""
+
+    def law(c, edge, v, g):
+        u = (v * v - 2 * g * edge) ** 0.5
+        rest = 3.0 - (v - u) / g - 2 / c**0.5 * np.arctan(u * c**0.5 / g)
+        return edge - u * rest - g * rest**2 / 2, -u - g * rest
+
+    values, step = {"c": 1e3, "edge": 1 - way, "v": 2.0, "g": 2.0}, 1e-30
+    moved = [[value + 1j * step * (k == other) for other, value in enumerate(values.values())] for k in range(4)]
+    exact = np.transpose([np.imag(law(*those)) / step for those in moved])
+    found = gradient_of(Thrown(edge=1 - way), 3.0, ["x", "v"], [*values], rtol)
+    assert np.all(np.abs(found - exact) <= 20 * rtol * np.abs(exact).max(axis=0))
 
 
 def shaken(capacity, peak=1.0):
