@@ -198,3 +198,9 @@ def _numbers(symbol: Symbol) -> int:
     """Return how many values a mode has, or some for another discrete value."""
     mode = None if symbol.owner is None else getattr(symbol.owner, "modes", {}).get(symbol.name)
     return _SOME if mode is None else len(mode.names)
+
+
+def is_trace(node: Any) -> bool:
+    """Tell whether a term is always zero, and shows what an expression depends on only."""
+    parts = operands(node) if node.op() == ca.OP_FMIN else []
+    return bool(parts) and parts[1].is_zero() and ca.OP_TANH in [inner.op() for inner in operands(parts[0])]
