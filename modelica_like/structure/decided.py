@@ -40,15 +40,13 @@ def vanishing(jacobian: Any) -> set[Place]:
 def needs_decision(system: System, residual: Any, unknowns: list[int]) -> bool:
     """Return whether equations determine unknowns for other parameters only: what they need is zero for these."""
     jacobian = ca.jacobian(residual, system.column(unknowns))
-    moving = ca.which_depends(jacobian.nz[:], system.volatile, 1, True)
-    zero = np.array(system.generic(jacobian.nz[:])).ravel() == 0
-    if not any(zero):
-        return False
-    every = [*zip(*jacobian.sparsity().get_triplet(), moving, zero, strict=True)]
-    kept = [(row, column) for row, column, moves, nothing in every if moves or not nothing]
-    open_rates = {c for _, c, moves, nothing in every if nothing and not moves and system.levels[unknowns[c]].order}
+    lost = _lost(system, jacobian)
+    if any(system.levels[unknowns[column]].order for _, column in lost) and _loses_rates(system):
+        return True
+    lost &= vanishing(jacobian) if lost else lost
+    kept = [place for place in zip(*jacobian.sparsity().get_triplet(), strict=True) if place not in lost]
     pattern = ca.Sparsity.triplet(*jacobian.shape, *map(list, zip(*kept, strict=True)))
-    return ca.sprank(ca.DM(pattern, 1)) < len(unknowns) or (bool(open_rates) and _loses_rates(system))
+    return bool(lost) and ca.sprank(ca.DM(pattern, 1)) < len(unknowns)
 
 
 def _loses_rates(system: System) -> bool:
@@ -66,7 +64,8 @@ def decide(system: System) -> list[tuple[int, Any]]:
     """
     system.residual, checks = _without_zeros(system)
     rows = ca.vertsplit(system.residual)
-    for row in sorted({row for row, _ in _lost(system, ca.jacobian(system.residual, system.everything))}):
+    jacobian = ca.jacobian(system.residual, system.everything)
+    for row in sorted({row for row, _ in _lost(system, jacobian) & vanishing(jacobian)}):
         branches = _Branches(system)
         rows[row] = branches.write(rows[row])
         checks += [(row, condition) for condition in branches.conditions]
@@ -122,13 +121,12 @@ def _entries(expressions: Any, symbols: Any) -> list[list[int]]:
 
 def _lost(system: System, jacobian: Any) -> set[Place]:
     """Return the places of entries that parameters alone decide, and that are zero."""
-    places = vanishing(jacobian)
-    if not places:
+    zero = np.array(system.generic(jacobian.nz[:])).ravel() == 0
+    if not any(zero):
         return set()
     moving = ca.which_depends(jacobian.nz[:], system.volatile, 1, True)
-    zero = np.array(system.generic(jacobian.nz[:])).ravel() == 0
     every = zip(*jacobian.sparsity().get_triplet(), moving, zero, strict=True)
-    return {(row, column) for row, column, moves, nothing in every if nothing and not moves} & places
+    return {(row, column) for row, column, moves, nothing in every if nothing and not moves}
 
 
 class _Plain:
