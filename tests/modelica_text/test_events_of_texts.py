@@ -251,3 +251,39 @@ end A;
     third = 3 * second + 0.5  # what it has come to until 1.5 s
     assert result.at(1.5)["size"] == pytest.approx(third, abs=1e-9)
     assert (result.final["from"], result.final["to"]) == pytest.approx((third, 3 * third + 1.5), abs=1e-9)
+
+
+def test_other_classes_see_what_a_part_has_before_the_start(tmp_path: Path) -> None:
+    """It is 3*u, which only a run knows, with u = 2 + x = 3 at the start."""
+    result = run(tmp_path, """
+model A
+  block B
+    input Real u;
+    discrete Real n;
+  initial equation
+    pre(n) = 3*u;
+  equation
+    when time > 0.5 then
+      n = pre(n) + 1;
+    end when;
+  end B;
+  model Around
+    B b(u = 2 + x);
+    Real x(start = 1, fixed = true);
+  equation
+    der(x) = 1;
+  end Around;
+  Around around;
+  discrete Real first(start = 0), last(start = 0);
+  Boolean large = pre(around.b.n) > 8 and pre(around.b.n) < 9.5;
+equation
+  when initial() then
+    first = pre(around.b.n);
+  end when;
+  when time > 0.5 then
+    last = pre(around.b.n);
+  end when;
+end A;
+""")  # fmt: skip
+    assert (result["first"][0], result.final["last"], result.final["around.b.n"]) == pytest.approx((9, 9, 10))
+    assert result.at(0.25)["large"] == 1

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 from modelica_like.errors import ModelicaTextError, Source
+from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.lifting import renamed
 from modelica_like.netlist.modelica.tree import Expr
-from modelica_like.netlist.modelica.written import Happening
+from modelica_like.netlist.modelica.written import Happening, Written
 
 Equation = tuple[Expr, Expr, Source]
 Node = tuple[str, str]
@@ -140,3 +142,24 @@ def begin_late(happening: Happening, late: dict[str, Expr]) -> Happening:
     if own:
         branches.append(((Expr("call", ("initial", (), ())),), own))
     return Happening(tuple(branches), happening.source, happening.text)
+
+
+def begin_parts(component: Written, own: dict[str, Expr]) -> None:
+    """Let equations and whens of a component see what parts have before the start, if only a run knows it.
+
+    Args:
+        component: with its parts, equations and whens.
+        own: such values of its own variables.
+    """
+    record, late = inside(component), dict[str, Expr]()
+    for name, part in component.parts.items():
+        if isinstance(part, Written):
+            late |= {f"{name}.{path}": _seen_from_above(value, name) for path, value in inside(part).late.items()}
+    if late:
+        record.statements = tuple((left, begun(right, late), source) for left, right, source in record.statements)
+        record.happenings = tuple(begin_late(happening, late) for happening in record.happenings)
+    record.late = own | late
+
+
+def _seen_from_above(value: Expr, part: str) -> Expr:
+    return renamed(value, lambda path: path if path == "time" else f"{part}.{path}")

@@ -31,7 +31,7 @@ from modelica_like.language.fields import Discrete, Field, Input, Parameter
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.at_start import bind_at_start
 from modelica_like.netlist.modelica.attributes import check_attributes, check_declared
-from modelica_like.netlist.modelica.before import uses_time
+from modelica_like.netlist.modelica.before import begin_parts, uses_time
 from modelica_like.netlist.modelica.carried import Carried
 from modelica_like.netlist.modelica.causal import is_causal, variables
 from modelica_like.netlist.modelica.connectors import bundle, connector_of, lend
@@ -123,6 +123,7 @@ class _Builder:
         record.text, record.statements, record.icon = text.path, equations, icon_of(self.instance)
         record.elsewhere, record.lent = frozenset(self.instance.lent), self.instance.balance
         record.initial, record.happenings = tuple(statements.initial), tuple(statements.happenings)
+        begin_parts(component, self.instance.late)
         record.instants = frozenset(name for name, (_, instant) in statements.outputs.items() if instant)
         record.instants |= self.carried.instants
         self._connect()

@@ -159,6 +159,7 @@ class Instance:
         parameters: of its component.
         lent: own discrete variables whose equations stand in an instance above.
         driving: protected signals that drive parts.
+        late: values of discrete variables before the start that only a run knows.
         bus_wires: connections of variables of buses that go no further up.
         bus_equations: own signals that are equal to variables of buses.
         balance: equations of continuous variables that are lent, less those that are adopted.
@@ -186,6 +187,7 @@ class Instance:
         self.balance = 0
         self.lineage: list[ClassText] = []
         self.driving: set[str] = set()
+        self.late: dict[str, Expr] = {}
         self.bus_wires: list[tuple[tuple[str, ...], Source]] = []
         self.bus_equations: list[tuple[str, str, Source]] = []
         self._replaced = {name: entry for name, entry in given.inner.items() if isinstance(entry.redeclared, ClassText)}

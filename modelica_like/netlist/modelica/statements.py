@@ -118,6 +118,7 @@ class Statements(Whens):
             Resolver(self.instance, self.instance.text).known(),
         )  # fmt: skip
         self.memory, self.initial = before.memory, before.others
+        self.instance.late = before.late
         if before.late:
             staying = [
                 e for e in self.equations if e[1] == fold.call("pre", (e[0],), 0) and e[0].args[0][0] in before.late

@@ -92,6 +92,7 @@ class InsideWritten(InsideAssembly):
         instants: Boolean signals that are true for instants only.
         slots: arguments, in symbols, of the laws of functions that are being written.
         icon: its symbol, of the annotations of its class.
+        late: values of discrete variables before the start that only a run knows, of parts, too.
     """
 
     text: str = ""
@@ -101,6 +102,7 @@ class InsideWritten(InsideAssembly):
     instants: frozenset[str] = frozenset()
     slots: list[list[Any]] = field(default_factory=list[list[Any]])
     icon: Icon | None = None
+    late: dict[str, Node] = field(default_factory=dict[str, Node])
 
 
 class Written(Assembly):
