@@ -44,9 +44,11 @@ def needs_decision(system: System, residual: Any, unknowns: list[int]) -> bool:
     if any(system.levels[unknowns[column]].order for _, column in lost) and _loses_rates(system):
         return True
     lost &= vanishing(jacobian) if lost else lost
+    if not lost:
+        return False
     kept = [place for place in zip(*jacobian.sparsity().get_triplet(), strict=True) if place not in lost]
-    pattern = ca.Sparsity.triplet(*jacobian.shape, *map(list, zip(*kept, strict=True)))
-    return bool(lost) and ca.sprank(ca.DM(pattern, 1)) < len(unknowns)
+    pattern = ca.Sparsity.triplet(*jacobian.shape, [row for row, _ in kept], [column for _, column in kept])
+    return ca.sprank(ca.DM(pattern, 1)) < len(unknowns)
 
 
 def _loses_rates(system: System) -> bool:
