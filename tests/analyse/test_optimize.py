@@ -83,6 +83,30 @@ def test_the_worst_load_case_counts() -> None:
     assert best["clutch.lock_time"] == max(limit.value for limit in best.limits)
 
 
+def test_a_limit_that_is_active_in_several_load_cases_has_one_price() -> None:
+    """Two cases that are the same: who allows 1 s more does so in both, and the torque falls by J W/t²."""
+    cases = [{"name": "first", "load_torque": LOAD}, {"name": "second", "load_torque": LOAD}]
+    best = optimum(
+        DIRECT, minimize="clutch.capacity", free=CAPACITY, subject_to="clutch.lock_time <= 0.25 s", cases=cases
+    )
+    assert sum(limit.price for limit in best.limits) == pytest.approx(-J * W / 0.25**2, rel=1e-4)
+    price = f"{-J * W / 0.25**2:+.4g} N.m"
+    assert f"in the load cases 'first', 'second': with 1 s more, clutch.capacity changes by {price}." in str(best)
+
+
+def test_what_changes_nothing_stays_as_it_is() -> None:
+    """The motor begins as fast as it does, whatever the clutch."""
+    best = optimum(DIRECT, maximize="at(motor.w, 0 s)", free=CAPACITY)
+    assert best["clutch.capacity"] == best.parameters[0].before
+    assert "No design that was tried is better than the drive as it is." in str(best)
+
+
+def test_a_bound_is_written_as_it_is(tmp_path: Path) -> None:
+    best = optimum(loads(STOP), minimize="brake.lock_time", free={"brake.capacity": [5, 150]})
+    best.save(tmp_path / "best.toml")
+    assert 'capacity = "150 N.m"' in (tmp_path / "best.toml").read_text()
+
+
 def test_the_worst_of_an_objective_is_its_value() -> None:
     """The heavy load locks later, J W / (M - 25)."""
     cases = [{"name": "heavy", "load_torque": 25.0}, {"name": "light", "load_torque": 5.0}]

@@ -56,17 +56,28 @@ DRIVES: dict[str, tuple[str, str, str, dict[str, Any]]] = {
         {"servo.Kv": (20, 80), "table.m": (100, 200)},
     ),
 }  # fmt: skip
-# Where a run of sticking and sliding ends has many optima: three starts find 1.4876 N, 900 runs of the other 1.4447 N.
-MANY_OPTIMA = "stick", ("stick_slip", "spring.f", "5 s", {"spring.c": (50, 200), "mass.m": (0.5, 2)})
-WORSE = pytest.mark.xfail(strict=True, raises=AssertionError, reason="three starts are too few for many optima")
+# Where a run of sticking and sliding ends has many optima.
+MANY_OPTIMA = ("stick_slip", "spring.f", "5 s", {"spring.c": (50, 200), "mass.m": (0.5, 2)})
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*DRIVES, pytest.param(MANY_OPTIMA[0], marks=WORSE)])
+@pytest.mark.parametrize("name", DRIVES)
 def test_never_worse_than_differential_evolution(name: str) -> None:
-    file, aim, until, free = {**DRIVES, MANY_OPTIMA[0]: MANY_OPTIMA[1]}[name]
+    runs, evolution = against_evolution(*DRIVES[name], starts=3)
+    assert runs <= evolution / 20
+
+
+@pytest.mark.slow
+def test_more_starts_find_the_best_of_many_optima() -> None:
+    """A dozen valleys: searches begin in the best of 64 native runs. Three starts find one that is 3 % worse."""
+    runs, evolution = against_evolution(*MANY_OPTIMA, starts=8)
+    assert runs <= evolution / 3
+
+
+def against_evolution(file: str, aim: str, until: str, free: dict[str, Any], starts: int) -> tuple[int, int]:
+    """Return the runs of both, after comparing their designs."""
     path = EXAMPLES / f"{file}.toml"
-    best = optimize(path, minimize=aim, free=free, until=until, starts=3)
+    best = optimize(path, minimize=aim, free=free, until=until, starts=starts)
     assert isinstance(best, Optimum)
     model, runs = build(path, free=free), 0
     low, high = np.array(list(free.values()), float).T
@@ -84,4 +95,4 @@ def test_never_worse_than_differential_evolution(name: str) -> None:
     found = differential_evolution(objective, bounds, rng=1, tol=1e-8, maxiter=30, polish=False)
     value = best.objectives[0].value
     assert value <= found.fun + 1e-6 * abs(found.fun)
-    assert best.runs <= runs / 20
+    return best.runs, runs

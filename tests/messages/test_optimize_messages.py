@@ -270,6 +270,16 @@ Write { points = 12, from = "0 N", to = "9 kN", rising = true }.""",
         lambda: optimize(loads(MOVED), minimize="mass.s", free={"profile.table": {"rows": [3], "from": 0, "to": 1}}),
         """free: profile.table: rows = [3] must be a list of row numbers from 1 to 2.""",
     ),
+    "no start of the search": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, starts=0, **M),
+        """starts must be at least 1, not 0.""",
+    ),
+    "bounds that are given do not stand in the netlist": (
+        ValueOutOfRange,
+        lambda: optimize(loads(TEXT + FREE, "stop.toml"), free={"brake.capacity": [30, 20]}),
+        """brake.capacity: the lower bound 30 is not below the upper bound 20.""",
+    ),
     "a front of one point": (
         ValueOutOfRange,
         lambda: optimize(loads(MOVED), minimize=["mass.s", "mass.v"], free={"mass.m": [0.5, 2]}, points=1),

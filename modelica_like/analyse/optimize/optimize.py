@@ -19,9 +19,9 @@ from modelica_like.analyse.optimize.promising import FINISHED, TRIALS, promising
 from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optimum
 from modelica_like.analyse.optimize.runs import Runs
 from modelica_like.analyse.optimize.solve import MOST_STEPS, Search
-from modelica_like.analyse.optimize.terms import Row, starts_of
+from modelica_like.analyse.optimize.starts import promising_starts
+from modelica_like.analyse.optimize.terms import Row
 from modelica_like.analyse.tolerance.tolerance import scatter_of
-from modelica_like.analyse.written import placed
 from modelica_like.arguments import checked
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
@@ -34,6 +34,8 @@ from modelica_like.solve.initialize import StartKind
 _POINTS = 20
 _SAME = 1e-5
 """Distance of two designs relative to the bounds: a design is known to about the root of the solver's tolerance."""
+_GAIN = 1e-9
+"""Of an objective, relative: less is rounding."""
 _DIFFERENCE = 1e-3
 """Of an output of the design in a run by IDAS, relative: more is told."""
 
@@ -68,7 +70,8 @@ def optimize(
         until: end time, as in `simulate`.
         parameters: other values of parameters, in all cases.
         start: kind of start, as in `simulate`.
-        starts: number of starts of the search, all but the first from a Latin hypercube between the bounds.
+        starts: number of searches, all but the first from the best of the square of as many native runs, of a Latin
+            hypercube between the bounds.
         points: number of designs on a Pareto front; 20 by default.
         seed: of the Latin hypercube.
         tolerances: how parameters scatter, as in `tolerance`, for limits that must hold with a probability,
@@ -88,11 +91,18 @@ def optimize(
     asked = {"minimize": _listed(minimize), "maximize": _listed(maximize)}
     aims = asked if any(asked.values()) else {key: tuple(written.get(key, ())) for key in asked}
     choices = choose if choose is not None else written.get("choose", {})
+    given = {"minimize", "maximize"} if aims is asked else set[str]()
+    given |= {key for key, value in (("free", free), ("choose", choose)) if value is not None}
+    given |= {key for key, value in (("subject_to", subject_to), ("for", cases)) if value}
+    for name, value in (("starts", starts), ("points", points)):
+        if value is not None and value < 1:
+            raise ValueOutOfRange(f"{name} must be at least 1, not {value}.")
     question = Question(
         aims["minimize"], aims["maximize"], free=free if free is not None else written.get("free"),
         subject_to=_listed(subject_to) or tuple(written.get("subject_to", ())),
         cases=tuple(cases) or tuple(written.get("for", ())), parameters=parameters, until=until, start=start,
         tolerances=scatter, correlated=pairs, folder=folder, chosen=bool(choices),
+        written=frozenset(written) - given,
     )  # fmt: skip
     return _answer(
         drive, question, choices, starts or written.get("starts", 1), points or written.get("points", _POINTS), seed,
@@ -117,7 +127,7 @@ def _answer(
         raise LanguageError(
             "A compiled model has nothing to choose.", advice="Give the netlist or the component itself."
         )
-    with placed(drive, "optimize.choose"):
+    with question.at(drive, "choose"):
         options = options_of(drive, choices)
     count = math.prod(map(len, options))
     if count <= ENUMERATED:
@@ -140,7 +150,7 @@ class _Study:
         self, drive: Component | CompiledDae, question: Question, seed: int, told: Callable[[], None] = lambda: None
     ) -> None:
         self.drive, self.seed = drive, seed
-        self.problem = make_problem(drive, question, lambda key: placed(drive, f"optimize.{key}"))
+        self.problem = make_problem(drive, question)
         self.runs = Runs(self.problem, told)
 
     def best(self, starts: int, points: int) -> Optimum | Front:
@@ -161,7 +171,15 @@ class _Study:
         return replace(result, notes=(*result.notes, *map(str, chances.results)))
 
     def _search(self, search: Search, starts: int) -> Outcome:
-        return better(self.runs.from_starts(starts_of(self.problem.free, starts, self.seed), search.from_design))
+        begins = promising_starts(self.runs, search, starts, self.seed) if self.problem.free else [self.problem.begin]
+        outcome = better(self.runs.from_starts(begins, search.from_design))
+        begin = self.runs.at(self.problem.begin)
+        if begin is None:
+            return outcome
+        objective, excess = search.measures(begin.values)
+        gained = objective - outcome.objective > _GAIN * (abs(objective) + abs(outcome.objective))
+        # What changes nothing is not changed.
+        return outcome if gained or excess > FEASIBLE else replace(outcome, x=begin.x, objective=objective)
 
     def _front(self, starts: int, points: int) -> Front:
         if points < 2:
@@ -257,6 +275,8 @@ class _Study:
             yield "The limits cannot all be met: this design exceeds them least, relative to their sizes."
         elif not outcome.optimal:
             yield f"The search stopped before an optimum was certain ({outcome.status}); this is the best design tried."
+        if outcome.excess <= FEASIBLE and self.problem.free and np.array_equal(outcome.x, self.problem.begin):
+            yield "No design that was tried is better than the drive as it is."
         for row in self.problem.within:
             if after[:, self.problem.outputs.index(row.output)].max() < row.most * (1.0 - FEASIBLE):
                 continue
@@ -281,7 +301,7 @@ def _best_choice(
     results: list[tuple[Choice, Optimum]] = []
     failures: list[tuple[Choice, ModelicaLikeError]] = []
     for choice in options:
-        with placed(drive, "optimize.choose"):
+        with question.at(drive, "choose"):
             variant = with_choice(drive, choice)
         try:
             study = _Study(variant, question, seed, told)

@@ -27,6 +27,7 @@ from modelica_like.analyse.optimize.terms import (
     read_limits,
 )
 from modelica_like.analyse.tolerance.scatter import read_population
+from modelica_like.analyse.written import placed
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean
@@ -58,6 +59,7 @@ class Question:
         correlated: which scatter together.
         folder: of files with measured values.
         chosen: whether something is chosen, so that nothing need be free.
+        written: what of this stands in [optimize] of the netlist.
     """
 
     minimize: tuple[str, ...] = ()
@@ -72,6 +74,13 @@ class Question:
     correlated: tuple[Mapping[str, Any], ...] = ()
     folder: Path = Path()
     chosen: bool = False
+    written: frozenset[str] = frozenset()
+
+    def at(self, drive: Model, key: str) -> AbstractContextManager[None]:
+        """Give errors the place of an entry of [optimize], if it stands there."""
+        if key in self.written and isinstance(drive, Component | CompiledDae):
+            return placed(drive, f"optimize.{key}")
+        return nullcontext()
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,39 +116,37 @@ class Problem(Bounded):
         return places, np.array([row.sign for row in rows]), np.array([row.most for row in rows])
 
 
-def make_problem(
-    drive: Model, question: Question, placed: Callable[[str], AbstractContextManager[None]] = lambda key: nullcontext()
-) -> Problem:
+def make_problem(drive: Model, question: Question) -> Problem:
     """Build a drive for a question.
 
     Args:
         drive: the drive.
         question: what is asked.
-        placed: gives errors their place by the key of [optimize].
 
     Raises:
         UnknownName, ValueOutOfRange, UnitError: something in the question does not fit the drive.
         LanguageError: a table of a compiled model is to be free.
         ModelicaLikeError: the drive has an error.
     """
-    with placed("free"):
+    with question.at(drive, "free"):
         scattering = [*(question.tolerances or {})]
         model, free, ordered = build_free(
             drive, question.free or {}, question.parameters or {}, scattering, none=question.chosen
         )
-    with placed("minimize" if question.minimize else "maximize"):
+    with question.at(drive, "minimize" if question.minimize else "maximize"):
         sized = Sized(drive, model, lambda: quick_run(model, question.until, start=question.start))
         unit_of = _units(model, sized)
         aims = read_aims(unit_of, question.minimize, question.maximize)
-    with placed("subject_to"):
+    with question.at(drive, "subject_to"):
         limits = read_limits(unit_of, question.subject_to)
-    with placed("for"):
+    with question.at(drive, "for"):
         cases = read_cases(model, question.cases, free)
     names = [parameter.name for parameter in free]
     rows = [*(row for aim in aims for row in aim.rows), *(row for limit in limits for row in limit.rows())]
     outputs = tuple(dict.fromkeys([*(row.output for row in rows), *(limit.name for limit in limits)]))
     order = tuple((names.index(low), names.index(high)) for low, high in ordered)
-    _check_chances(model, question, limits, placed)
+    with question.at(drive, "subject_to"):
+        _check_chances(model, question, limits)
     read = [name for name in outputs if not is_modal(name) and not sized.has(name)]
     within = _within_the_run(model, question, read, limits)
     return Problem(question, model, free, aims, limits, cases, order, outputs, within, sized)
@@ -196,25 +203,20 @@ def _units(model: CompiledDae, sized: Sized) -> Callable[[str], Unit]:
     return unit_of
 
 
-def _check_chances(
-    model: CompiledDae, question: Question, limits: Sequence[Limit],
-    placed: Callable[[str], AbstractContextManager[None]],
-) -> None:  # fmt: skip
+def _check_chances(model: CompiledDae, question: Question, limits: Sequence[Limit]) -> None:
     """Refuse limits with a probability where nothing scatters."""
     chances = [limit for limit in limits if limit.probability < 1.0]
     for limit in chances:
-        with placed("subject_to"):
-            if is_modal(limit.name):
-                raise ValueOutOfRange(
-                    f"'{limit.text}': a mode has no probability, as it needs no run.",
-                    advice="Ask for a probability of outputs of the run or of lines of design checks.",
-                )
-    if chances and not question.tolerances:
-        with placed("subject_to"):
+        if is_modal(limit.name):
             raise ValueOutOfRange(
-                f"'{chances[0].text}' asks for a probability, but nothing scatters.",
-                advice='Say how parameters scatter: [tolerances] in the netlist, or tolerances={"clutch.mu": "±10 %"}.',
+                f"'{limit.text}': a mode has no probability, as it needs no run.",
+                advice="Ask for a probability of outputs of the run or of lines of design checks.",
             )
+    if chances and not question.tolerances:
+        raise ValueOutOfRange(
+            f"'{chances[0].text}' asks for a probability, but nothing scatters.",
+            advice='Say how parameters scatter: [tolerances] in the netlist, or tolerances={"clutch.mu": "±10 %"}.',
+        )
     if chances:
         read_population(model, question.tolerances or {}, question.correlated, question.folder)
 

@@ -17,7 +17,6 @@ from modelica_like.analyse.optimize.designs import FEASIBLE
 from modelica_like.analyse.optimize.problem import Problem, Question, make_problem
 from modelica_like.analyse.optimize.runs import Values
 from modelica_like.analyse.optimize.solve import Scale
-from modelica_like.analyse.written import placed
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import ModelicaLikeError, extra_module
 from modelica_like.language import Component
@@ -108,7 +107,7 @@ class _Trials:
 
     def __init__(self, drive: Component, question: Question, options: Sequence[Sequence[Choice]]) -> None:
         self.drive, self.question, self.options, self.runs = drive, question, options, 0
-        self.problem = make_problem(drive, question, lambda key: placed(drive, f"optimize.{key}"))
+        self.problem = make_problem(drive, question)
         try:
             for choices in options:
                 for choice in choices:

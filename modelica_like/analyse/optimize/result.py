@@ -29,6 +29,8 @@ _WITHIN = 1e-6
 """Excess of a limit over its size that counts as none."""
 _AT_BOUND = 1e-6
 """Distance from a bound, relative to that of both: at it."""
+_ROUNDED = 1e-8
+"""Likewise: so near to a bound, the netlist has the bound; searches come no nearer."""
 
 
 class _InUnit:
@@ -54,7 +56,8 @@ class Chosen(_InUnit):
     @property
     def written(self) -> float | str:
         """Its best value as in a netlist: with its unit, or as a number in a cell of a table."""
-        number = f"{self.value:.{_DIGITS}g}"
+        ends = [end for end in (self.low, self.high) if abs(self.value - end) <= _ROUNDED * (self.high - self.low)]
+        number = f"{[*ends, self.value][0]:.{_DIGITS}g}"
         return float(number) if self.name.endswith("]") or not self.unit_text else f"{number} {self.unit_text}"
 
     @property
@@ -188,12 +191,15 @@ class Optimum(Shown):
         """Return what holds the design back, what that costs, and notes."""
         objective = self.objectives[0]
         sentences: list[str] = []
-        for limit in self.limits:
-            if limit.price and not limit.broken:
-                more, change = limit.unit_text or "unit", f"{limit.price:+.4g} {objective.unit_text}".rstrip()
-                sentences.append(
-                    f"'{limit.text}' is active{limit.within}: with 1 {more} more, {objective.name} changes by {change}."
-                )
+        active = [limit for limit in self.limits if limit.price and not limit.broken]
+        for text in dict.fromkeys(limit.text for limit in active):
+            # Who moves a limit moves it in all load cases.
+            same = [limit for limit in active if limit.text == text]
+            price = sum(limit.price for limit in same)
+            more, change = same[0].unit_text or "unit", f"{price:+.4g} {objective.unit_text}".rstrip()
+            cases = ", ".join(f"'{limit.case}'" for limit in same if limit.case)
+            within = f" in the load case{'s' * (len(same) > 1)} {cases}" if cases else ""
+            sentences.append(f"'{text}' is active{within}: with 1 {more} more, {objective.name} changes by {change}.")
         ends = {end: [p.name for p in self.parameters if p.at_bound == end] for end in ("lower", "upper")}
         sentences += [f"At the {end} bound: {', '.join(names)}." for end, names in ends.items() if names]
         return [*sentences, *self.notes]

@@ -62,6 +62,10 @@ class Runs(Designs):
     Args:
         problem: the problem.
         told: called after each design.
+
+    Attributes:
+        alone: runs without derivatives.
+        others: number of these.
     """
 
     def __init__(self, problem: Problem, told: Callable[[], None]) -> None:
@@ -71,7 +75,7 @@ class Runs(Designs):
         self.functions: list[SimulationFunction] = []
         self.alone = Values(problem)
         self.modal, self.read, self._of_runs = self.alone.modal, self.alone.read, self.alone.of_runs
-        self._places, self._single = self.alone.places, 0
+        self._places, self.others = self.alone.places, 0
         for case in problem.cases if self.read and names else ():
             run = {"until": question.until, "start": question.start, "parameters": dict(case.values), "options": None}
             try:
@@ -87,7 +91,7 @@ class Runs(Designs):
     @property
     def count(self) -> int:
         """Number of runs so far."""
-        return self._single + sum(function.runs + 1 for function in self.functions)
+        return self.others + sum(function.runs + 1 for function in self.functions)
 
     def run(self, x: Vector) -> tuple[Vector, Vector]:
         """Return values and derivatives, as `Designs` says."""
@@ -105,7 +109,7 @@ class Runs(Designs):
 
     def _as_it_is(self) -> tuple[Vector, Vector]:
         """Return the values of the only design where nothing is free."""
-        self._single = len(self.problem.cases) if self.read else 0
+        self.others = len(self.problem.cases) if self.read else 0
         values = np.array([self.alone.at(case.values) for case in self.problem.cases])
         if not np.all(np.isfinite(values)):
             raise does_not_happen(self.problem.outputs[int(np.argmin(np.isfinite(values).all(axis=0)))])

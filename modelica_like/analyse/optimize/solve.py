@@ -27,7 +27,7 @@ MOST_STEPS = 80
 """Of IPOPT: what converges does so within half of them."""
 _OPTIONS = {
     # Differences of gradients as Hessians take two to three times the runs: each costs a run for each parameter.
-    "print_level": 0, "sb": "yes", "hessian_approximation": "limited-memory", "mu_init": 1e-3, "max_iter": MOST_STEPS,
+    "print_level": 0, "sb": "yes", "hessian_approximation": "limited-memory", "max_iter": MOST_STEPS,
     # Relative to sizes: gradients are known to 1e-7.
     "tol": 1e-7, "acceptable_tol": 1e-6, "acceptable_iter": 4,
     # With a Hessian that is not known yet, corrections of second order jump to and fro across a limit: thrice the runs.
