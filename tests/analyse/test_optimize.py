@@ -266,6 +266,32 @@ def test_what_happens_at_the_end_of_a_run_is_a_limit() -> None:
     assert "clutch.lock_time is at the end of the run: a longer run may have a better design." in str(best)
 
 
+TABLE = f"""
+[parts]
+table = {{ is = "{DIRECT.as_posix()}" }}
+[simulate]
+until = "0.4 s"
+[optimize]
+minimize = "table.clutch.capacity"
+free = {{ "table.clutch.capacity" = ["40 N.m", "300 N.m"] }}
+subject_to = ["table.clutch.lock_time <= 0.25 s"]
+"""
+
+
+def test_the_design_of_document_000_from_its_netlist() -> None:
+    best = optimum(loads(TABLE))
+    assert best["table.clutch.capacity"] == pytest.approx(capacity(0.25), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["000", "engagement_profile", "gear_and_flywheel"])
+def test_designs_of_the_documents_take_few_lines(name: str) -> None:
+    """What a design takes beside the netlist of its drive; they were 107 and 70 lines of CasADi."""
+    text = TABLE if name == "000" else (EXAMPLES / "design" / f"{name}.toml").read_text()
+    whole = name == "engagement_profile"  # its drive stands in the same file
+    text = text[text.index("[optimize]") :] if whole else text
+    assert len([line for line in text.splitlines() if line.strip() and not line.startswith("#")]) <= 15
+
+
 @pytest.mark.slow
 def test_engagement_profile() -> None:
     best = optimum(EXAMPLES / "design" / "engagement_profile.toml")

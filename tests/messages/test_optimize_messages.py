@@ -421,3 +421,27 @@ def test_lines_of_design_checks(tmp_path: Path, name: str) -> None:
         optimize(tmp_path / "drive.toml")
     assert "\n".join(filter(None, [caught.value.what, caught.value.advice])) == message
     assert "drive.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "text"),
+    [
+        (
+            "name,capacity\nweak,20 N.m\nwrong,20 kg\n",
+            "PressedFriction.capacity expects N.m; '20 kg' is kg.\n  in brakes.csv:3 `wrong,20 kg`",
+        ),
+        (
+            "name,capacity,drag\nweak,20 N.m,3\n",
+            "Brake has no parameter or variable 'drag'; did you mean 'tau_drag'? It has phi, w, tau, peak, creep,"
+            " creep_time, rest, f_normalized, fn_max, cgeo, w_scale, capacity, tau_drag, mode, command, range, smooth,"
+            " extrapolate, mu_pos."
+            "\n  in brakes.csv:2 `weak,20 N.m,3`",
+        ),
+    ],
+)
+def test_cells_of_a_table_that_do_not_fit(tmp_path: Path, table: str, text: str) -> None:
+    (tmp_path / "brakes.csv").write_text(table)
+    (tmp_path / "stop.toml").write_text(TEXT + FREE.splitlines()[0] + '\nchoose = { brake = "brakes.csv" }\n')
+    with pytest.raises(ModelicaLikeError) as caught:
+        optimize(tmp_path / "stop.toml")
+    assert str(caught.value) == text

@@ -5,11 +5,11 @@ from __future__ import annotations
 import copy
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from modelica_like.errors import NetlistError, Source, ValueOutOfRange
+from modelica_like.errors import ModelicaLikeError, NetlistError, Source, ValueOutOfRange
 from modelica_like.language import Assembly, Component
 from modelica_like.language.inside import inside
 
@@ -19,10 +19,17 @@ ENUMERATED = 200
 
 @dataclass(frozen=True)
 class Choice:
-    """One combination: what was chosen by path, as shown, and the values of the drive that it means."""
+    """One combination.
+
+    Attributes:
+        labels: what was chosen by path, as shown.
+        values: what that means for the drive, by path.
+        places: where values come from a table, by path.
+    """
 
     labels: Mapping[str, Any]
     values: Mapping[str, Any]
+    places: Mapping[str, Source] = field(default_factory=dict[str, Source])
 
 
 def options_of(drive: Component, choose: Mapping[str, Any]) -> list[list[Choice]]:
@@ -55,6 +62,7 @@ def together(several: Sequence[Choice]) -> Choice:
     return Choice(
         {path: label for choice in several for path, label in choice.labels.items()},
         {path: value for choice in several for path, value in choice.values.items()},
+        {path: place for choice in several for path, place in choice.places.items()},
     )
 
 
@@ -66,7 +74,11 @@ def with_choice(drive: Component, choice: Choice) -> Component:
     """
     drive = copy.deepcopy(drive)
     for path, value in choice.values.items():
-        drive.set(path, value)
+        try:
+            drive.set(path, value)
+        except ModelicaLikeError as error:
+            error.where = (choice.places[path],) if path in choice.places else ()
+            raise
     return drive
 
 
@@ -99,7 +111,9 @@ def _row(path: str, file: Path, head: Sequence[str], columns: Sequence[int], num
             where=Source(str(file), number, ",".join(row)),
         )
     label = row[head.index("name")].strip() if "name" in head else f"row {number - 1}"
-    return Choice({path: label}, {f"{path}.{head[k]}": _cell(row[k].strip()) for k in columns})
+    place = Source(str(file), number, ",".join(row))
+    values = {f"{path}.{head[k]}": _cell(row[k].strip()) for k in columns}
+    return Choice({path: label}, values, dict.fromkeys(values, place))
 
 
 def _cell(text: str) -> Any:

@@ -129,6 +129,8 @@ def _answer(
         )
     with question.at(drive, "choose"):
         options = options_of(drive, choices)
+        for choice in itertools.chain(*options):
+            with_choice(drive, choice)  # says what cannot be, before anything runs
     count = math.prod(map(len, options))
     if count <= ENUMERATED:
         every = [together(several) for several in itertools.product(*options)]
