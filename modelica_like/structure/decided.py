@@ -41,21 +41,26 @@ def needs_decision(system: System, residual: Any, unknowns: list[int]) -> bool:
     """Return whether equations determine unknowns for other parameters only: what they need is zero for these."""
     jacobian = ca.jacobian(residual, system.column(unknowns))
     lost = _lost(system, jacobian)
-    if any(system.levels[unknowns[column]].order for _, column in lost) and _loses_rates(system):
+    rates = any(system.levels[unknowns[column]].order for _, column in lost)
+    if rates and (left_out := _left_out(system, unknowns)) and _rank(jacobian, lost | left_out) < len(unknowns):
         return True
     lost &= vanishing(jacobian) if lost else lost
-    if not lost:
-        return False
+    return bool(lost) and _rank(jacobian, lost) < len(unknowns)
+
+
+def _rank(jacobian: Any, lost: set[Place]) -> int:
+    """Return how many unknowns equations can determine without some entries."""
     kept = [place for place in zip(*jacobian.sparsity().get_triplet(), strict=True) if place not in lost]
     pattern = ca.Sparsity.triplet(*jacobian.shape, [row for row, _ in kept], [column for _, column in kept])
-    return ca.sprank(ca.DM(pattern, 1)) < len(unknowns)
+    return ca.sprank(ca.DM(pattern, 1))
 
 
-def _loses_rates(system: System) -> bool:
-    """Return whether derivatives are in no equation but with a factor that is zero, and all equations say something."""
+def _left_out(system: System, unknowns: list[int]) -> set[Place]:
+    """Return the places of unknowns that zeros leave out of equations, unless one says nothing then."""
     before, after = (_entries(r, system.everything) for r in (system.residual, _without_zeros(system)[0]))
-    lost = {level for levels in before for level in levels} - {level for levels in after for level in levels}
-    return any(system.levels[level].order for level in lost) and all(after)
+    column = {level: k for k, level in enumerate(unknowns)}
+    pairs = enumerate(zip(before, after, strict=True)) if all(after) else ()
+    return {(row, column[k]) for row, (old, new) in pairs for k in {*old} - {*new} if k in column}
 
 
 def decide(system: System) -> list[tuple[int, Any]]:
@@ -67,7 +72,8 @@ def decide(system: System) -> list[tuple[int, Any]]:
     system.residual, checks = _without_zeros(system)
     rows = ca.vertsplit(system.residual)
     jacobian = ca.jacobian(system.residual, system.everything)
-    for row in sorted({row for row, _ in _lost(system, jacobian) & vanishing(jacobian)}):
+    places = vanishing(jacobian)
+    for row in sorted({row for row, _ in places and places & _lost(system, jacobian)}):
         branches = _Branches(system)
         rows[row] = branches.write(rows[row])
         checks += [(row, condition) for condition in branches.conditions]
