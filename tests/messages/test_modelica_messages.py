@@ -9,6 +9,7 @@ from modelica_like.errors import (
     ComponentUnbalanced,
     ExportError,
     LanguageError,
+    LimitPassed,
     ModelicaLikeError,
     ModelicaTextError,
     SingularAtStart,
@@ -40,6 +41,10 @@ BUS = (
 )
 ENDLESS = "while true loop y := 1; end while"
 GROWING = "function f input Real u; output Real y; algorithm y := u; for i in 1:60 loop y := y*y + y; end for; end f;"
+LESS = (
+    "function f input Real v[:]; input Real u; output Real w; "
+    "algorithm w := u; while w > v[1] loop w := w - 1; end while; end f;"
+)
 SLICED = "when time > 0.5 then w[k, {2, 1}] := {1, 2}; end when;"
 DRAWN = 'function f input Integer a[:]; output Real y; external "C" y = ModelicaRandom_{}(a); end f;'
 TYPES = (
@@ -187,8 +192,9 @@ MESSAGES: dict[str, tuple[str, str]] = {
     ),
     "external function": (
         model("Real x = f(1);", before='function f input Real u; output Real y; external "C"; end f;'),
-        "The function f, which is written in another language,: that is not supported here.\n"
-        "  in a.mo:3 `Real x = f(1);`",
+        "f(…), a function of another language: that is not supported here.\n"
+        "  in a.mo:3 `Real x = f(1);`\n"
+        "Write its algorithm in Modelica.",
     ),
     "overdetermined connectors": (
         model("Real x;", "Connections.branch(a.R, b.R);"),
@@ -646,6 +652,27 @@ def test_a_formula_with_names_inside_and_outside_of_a_class(tmp_path: Path, chec
         "Give it a number."
     )
     check_message(ModelicaTextError, lambda: modelica_text(load(tmp_path / "drive.toml")), told)
+
+
+ENDS = {
+    "a subscript": ("Real y = v[integer(2*time) + 2];", "0.5", "has a subscript that is none of 1 to 2, in a.mo:3"),
+    "a subscript in a when": (
+        "Real y; equation when time > 0.25 then y = v[integer(4*time) + 2]; end when;", "0.25",
+        "has a subscript that is none of 1 to 2, in a.mo:3",
+    ),
+    "a while": (
+        "Real y; equation when time > 0.25 then y = f(v, 4*time + 2); end when;", "0.25",
+        "has a 'while' that does not end after 2 rounds, in a.mo:3",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", ENDS)
+def test_what_ends_a_run(case: str, tmp_path: Path, check_message) -> None:
+    declarations, time, what = ENDS[case]
+    (tmp_path / "a.mo").write_text(model(f"parameter Real v[2] = {{0, 0}}; {declarations}", before=LESS))
+    drive = load(tmp_path / "a.mo")
+    check_message(LimitPassed, lambda: simulate(drive, 1.0), f"At {time} s A {what}.")
 
 
 def test_a_parameter_of_which_arrays_are_made(tmp_path: Path, check_message) -> None:

@@ -59,9 +59,9 @@ def test_a_buffer(tmp_path: Path) -> None:
 
 
 OUTSIDE = {
-    "above": (model(f"{PLACE} parameter Real v[2] = {{1, 2}}; Real y = v[k];"), "a subscript is none of 1 to 2", 0.5),
-    "below": (model(f"{PLACE} {VALUES} Real y = v[3 - k];"), "a subscript is none of 1 to 4", 0.5),
-    "a place": (BUFFER.format("buffer[k] := 1;"), "a subscript is none of 1 to 3", 1.0),
+    "above": (model(f"{PLACE} Real v[2] = {{1, 2}}; Real y = v[k];"), "has a subscript that is none of 1 to 2", 0.5),
+    "below": (model(f"{PLACE} {VALUES} Real y = v[3 - k];"), "has a subscript that is none of 1 to 4", 0.5),
+    "a place": (BUFFER.format("buffer[k] := 1;"), "has a subscript that is none of 1 to 3", 1.0),
     "an assertion": (BUFFER.format('buffer[k] := time; if k > 2 then assert(false, "full"); end if;'), "full", 0.75),
 }  # fmt: skip
 

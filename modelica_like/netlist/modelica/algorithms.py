@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from modelica_like.errors import ModelicaTextError
-from modelica_like.netlist.modelica import fold, subscripts
+from modelica_like.netlist.modelica import fold, laws, subscripts
 from modelica_like.netlist.modelica.instance import refused
 from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, Statement, names_in
 
@@ -37,7 +37,10 @@ class Algorithm:
         local: values so far.
         loops: how deep in loops the statements are.
         guards: conditions of the branches they stand in, which only a run knows.
+        silences: whether relations make no events.
     """
+
+    silences = False
 
     def __init__(self, classes: Classes, text: ClassText) -> None:
         self.classes, self.text = classes, text
@@ -85,11 +88,41 @@ class Algorithm:
 
     def repeat(self, statement: Statement) -> str:
         """Run a `while`."""
-        while self.known_to_hold(statement):
+        while True:
+            holds = self.here()(statement.parts[0])
+            if holds.kind != "boolean":
+                self._rounds(statement)
+                return ""
+            if not holds.args[0]:
+                return ""
             self.classes.spend(5, self.text, statement.line)
             if end := self.run(statement.parts[1]):
                 return end
-        return ""
+
+    def _rounds(self, loop: Statement) -> None:
+        """Run a `while` that goes along an array: its condition has an element of it, so as many rounds are enough."""
+        condition, body = loop.parts
+        arrays = [self.local.get(name) for each in names_in(condition) for name, at in each.args if at]
+        rounds = max((len(array.args) for array in arrays if array is not None), default=0)
+        if not rounds or _leaves(body):
+            raise _open("a 'while' whose end only a run knows", self.text, loop.line)
+        changed = [name for name in dict.fromkeys(targets_of(body)) if name in self.local]
+        for _ in range(rounds):
+            arguments, before = list[Expr](), dict(self.local)
+            slots = {name: laws.opened(value, arguments) for name, value in before.items()}
+            self.local = dict(slots)
+            holds, guards = self.here().condition(condition, "while", loop.line), self.guards
+            self.guards = (*guards, holds)
+            self.run(body)
+            after, self.local, self.guards = self.local, before, guards
+            for name in changed:
+                law = fold.choice([holds, after[name]], slots[name], loop.line)
+                law = fold.quiet(law) if self.silences else law
+                self.local[name] = laws.closed(law, arguments, loop.line)
+        ends = fold.operation("not", (self.here()(condition),), loop.line)
+        for name in changed:
+            words = f"has a 'while' that does not end after {rounds} rounds"
+            self.local[name] = subscripts.demanding(self.local[name], ends, words, loop.line)
 
     def other(self, statement: Statement) -> None:
         """Run an assertion; what is only printed is left out."""
@@ -100,13 +133,6 @@ class Algorithm:
             self.here()(statement.parts[0])  # a function of assertions
         elif not name:
             raise refused(f"'{statement.kind}' in an algorithm", self.text, statement.line)
-
-    def known_to_hold(self, loop: Statement) -> bool:
-        """Whether a loop goes on; that must be known when the text is read."""
-        holds = self.here()(loop.parts[0])
-        if holds.kind != "boolean":
-            raise _open("a 'while' whose end only a run knows", self.text, loop.line)
-        return holds.args[0]
 
     def insist(self, statement: Statement) -> None:
         """Refuse what an assertion excludes; what only a run knows is not checked, nor whether it comes to it."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.fold import OUTSIDE
+from modelica_like.netlist.modelica.laws import Law
 from modelica_like.netlist.modelica.lifting import height
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.whens import is_ending
@@ -36,7 +37,8 @@ def demanded_elements(equations: Equations, initial: Equations, happenings: list
             every += [(demand, happening.source) for each in conditions for demand in demands(each)]
             values = (value for name, value in new.items() if not is_ending(name))
             inner = dict.fromkeys(demand for value in values for demand in demands(value))
-            more = {f"{ASSERT}{len(new) + n}": Expr("demand", demand) for n, demand in enumerate(inner)}
+            placed = [(holds, _at(words, happening.source)) for holds, words in inner]
+            more = {f"{ASSERT}{len(new) + n}": Expr("demand", demand) for n, demand in enumerate(placed)}
             branches[m] = (conditions, {**new, **more})
         result.append(replace(happening, branches=tuple(branches)))
     for *sides, source in initial:
@@ -45,8 +47,13 @@ def demanded_elements(equations: Equations, initial: Equations, happenings: list
     for (holds, words), source in dict.fromkeys(every):
         if height(holds):
             raise ModelicaTextError("A subscript of what is outside of a class must be known.", where=source)
-        result.append(Happening((((holds,), {}),), source, words.args[0]))
+        result.append(Happening((((holds,), {}),), source, _at(words, source).args[0]))
     return result
+
+
+def _at(words: Expr, source: Source) -> Expr:
+    """Return the words of a demand with its place: the end of a run does not tell it."""
+    return Expr("string", (f"{words.args[0]}, in {source}".partition(" `")[0],), words.line)
 
 
 def demands(node: Expr) -> list[Demand]:
@@ -58,7 +65,11 @@ def _demands(node: Expr, guards: tuple[Expr, ...]) -> Iterator[Demand]:
     """Yield the demands where all guards hold: conditions of what is around the expression."""
     args = node.args[1] if node.kind == "call" else node.args
     if node.kind == "shared" and node.args[0].demanding:
-        yield from _demands(node.args[0].of(node.args[1:]), guards)
+        law, *arguments = node.args
+        for holds, words in demands(law.result):
+            yield guarded(Expr("shared", (Law(holds), *arguments), node.line), guards), words
+        for argument in arguments:
+            yield from _demands(argument, guards)
     elif node.kind == "if":
         before = guards
         for condition, value in zip(args[:-1:2], args[1::2], strict=True):
@@ -72,20 +83,11 @@ def _demands(node: Expr, guards: tuple[Expr, ...]) -> Iterator[Demand]:
         first = args[0] if node.kind == "and" else fold.operation("not", (args[0],), node.line)
         yield from _demands(args[1], (*guards, first))
     elif node.kind == OUTSIDE:
-        yield _demand(node, guards)
+        yield guarded(node.args[1], guards), Expr("string", node.args[2:], node.line)
     else:
         for operand in args:
             if isinstance(operand, Expr):
                 yield from _demands(operand, guards)
-
-
-def _demand(node: Expr, guards: tuple[Expr, ...]) -> Demand:
-    _, index, size = node.args
-    line = node.line
-    whole = fold.operation("==", (fold.function("floor", (index,), line), index), line)
-    low, high = fold.operation(">=", (index, fold.number(1)), line), fold.operation("<=", (index, size), line)
-    holds = fold.operation("and", (fold.operation("and", (low, high), line), whole), line)
-    return guarded(holds, guards), Expr("string", (f"a subscript is none of 1 to {size.args[0]:g}",), line)
 
 
 def guarded(holds: Expr, guards: tuple[Expr, ...]) -> Expr:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 from modelica_like.netlist.modelica.tree import Expr, joined, with_operands
@@ -23,6 +22,8 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": abs, "sign": lambda x: float((x > 0) - (x < 0)), "integer": math.floor, "min": min, "max": max,
     "mod": lambda x, y: x - math.floor(x / y) * y, "div": lambda x, y: float(math.trunc(x / y)), "rem": math.fmod,
 }  # fmt: skip
+OUTSIDE = "outside"
+"""A value that is taken where a demand does not hold: the value, the demand and its words."""
 ARGUMENT, SILENT = "argument", "silent"
 """Calls round an argument of a function, whose relations make events, and round a relation or a jump of the function
 itself, which makes none."""
@@ -40,42 +41,6 @@ LONGEST = 100_000
 """Elements of an array, and steps of an algorithm."""
 
 
-SLOT = "#"
-"""Before the number of an argument in the law of a function."""
-
-
-@dataclass(frozen=True)
-class Law:
-    """The result of a function of arguments: an expression of slots, and whether subscripts in it demand something."""
-
-    result: Expr
-    demanding: bool = field(init=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "demanding", _demanding(self.result))
-
-    def of(self, arguments: tuple[Expr, ...]) -> Expr:
-        """Return the expression with arguments in the slots."""
-
-        def filled(node: Expr) -> Expr:
-            if node.kind in ("name", "condition"):
-                return arguments[int(node.args[0][0].removeprefix(SLOT))]
-            return with_operands(node, filled)
-
-        return filled(self.result)
-
-
-OUTSIDE = "outside"
-"""A value that is taken where a subscript is none of the array: the value, the subscript and the size."""
-
-
-def _demanding(node: Expr) -> bool:
-    if node.kind == OUTSIDE or (node.kind == "shared" and node.args[0].demanding):
-        return True
-    inner = node.args[1] if node.kind == "call" else node.args
-    return any(_demanding(operand) for operand in inner if isinstance(operand, Expr))
-
-
 class Unfit(ValueError):
     """Operands do not fit, in words."""
 
@@ -87,11 +52,6 @@ def known(expression: Expr) -> Expr:
         taken = (value for condition, value in zip(args[:-1:2], args[1::2], strict=True) if condition.args[0])
         return next(taken, args[-1])
     return expression if expression.kind in KNOWN else operation(expression.kind, args, expression.line)
-
-
-def slot(place: int, condition: bool, line: int) -> Expr:
-    """Return what stands for an argument in a law."""
-    return Expr("condition" if condition else "name", ((f"{SLOT}{place}", ()),), line)
 
 
 def jumps(expression: Expr) -> bool:

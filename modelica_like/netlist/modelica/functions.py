@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.algorithms import Algorithm
 from modelica_like.netlist.modelica.instance import GIVE, Given, Instance, refused
+from modelica_like.netlist.modelica.laws import closed, opened
 from modelica_like.netlist.modelica.members import value_of
 from modelica_like.netlist.modelica.natives import NATIVE
-from modelica_like.netlist.modelica.tree import ClassText, Empty, Expr, with_operands
+from modelica_like.netlist.modelica.tree import ClassText, Empty, Expr
 from modelica_like.netlist.modelica.types import basic_type, is_external_object, misfit
 
 if TYPE_CHECKING:
@@ -196,24 +197,9 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
 def _shared(resolver: Resolver, text: ClassText, given: tuple[Expr, ...], named: Mapping[str, Expr], line: int) -> Expr:
     """Return the result of a function whose law is large: its arguments stand beside it, once each."""
     arguments: list[Expr] = []
-
-    def opened(value: Expr) -> Expr:
-        if value.kind == "array":
-            return Expr("array", tuple(map(opened, value.args)), value.line)
-        if value.kind in (*fold.KNOWN, "record", "object"):
-            return value
-        arguments.append(value)
-        return fold.slot(len(arguments) - 1, fold.is_condition(value), value.line)
-
-    values, others = tuple(map(opened, given)), {key: opened(value) for key, value in named.items()}
-    law = fold.quiet(_Call(resolver, text).result(values, others, line))
-
-    def closed(value: Expr) -> Expr:
-        if value.kind in ("array", "tuple", "record"):
-            return with_operands(value, closed)
-        return value if value.kind in fold.KNOWN else Expr("shared", (fold.Law(value), *arguments), line)
-
-    return closed(law)
+    values = tuple(opened(value, arguments) for value in given)
+    others = {key: opened(value, arguments) for key, value in named.items()}
+    return closed(fold.quiet(_Call(resolver, text).result(values, others, line)), arguments, line)
 
 
 def _record(resolver: Resolver, text: ClassText, given: tuple[Expr, ...], named: Mapping[str, Expr]) -> Expr:
@@ -236,6 +222,8 @@ def _eventful(argument: Expr) -> Expr:
 
 
 class _Call(Algorithm):
+    silences = True
+
     def __init__(self, resolver: Resolver, text: ClassText) -> None:
         super().__init__(resolver.classes, text)
         self.resolver = resolver
@@ -247,7 +235,8 @@ class _Call(Algorithm):
         outputs = [name for name, d in self.declared.items() if "output" in d.prefixes]
         native = NATIVE.get(self.text.external) or NATIVE.get(self.text.path)
         if self.text.external and native is None:
-            raise refused(f"the function {self.text.name}, which is written in another language,", self.text, line)
+            what = f"{self.text.name}(…), a function of another language"
+            raise refused(what, self.text, line, "Write its algorithm in Modelica.")
         positional = dict(zip(inputs, given, strict=False))
         if len(given) > len(inputs) or any(name not in inputs or name in positional for name in named):
             raise refused(f"these arguments of {self.text.name}", self.resolver.text, line)

@@ -45,7 +45,7 @@ def _table(of_time: bool, axes: int) -> Native:
             path = Path(classes.file.parent, file)
             rows = read_rows(path, name, given["delimiter"].args[0], int(given["nHeaderLines"].args[0]))
         elif name != "NoName":
-            raise Unfit(f"The table {name} of a function usertab in C is not supported")
+            raise Unfit(f"The table {name} of a function usertab in C is not supported: give its numbers, or a file")
         else:
             rows = _numbers(given["table"])
         if rows.ndim != 2 or not rows.size or (axes == 2 and min(rows.shape) < 2):

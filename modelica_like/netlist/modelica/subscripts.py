@@ -8,6 +8,7 @@ from modelica_like.errors import ModelicaTextError
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.fold import OUTSIDE
 from modelica_like.netlist.modelica.instance import refused
+from modelica_like.netlist.modelica.laws import closed, opened
 from modelica_like.netlist.modelica.lifting import UP, height, owner_above
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import basic_type
@@ -15,6 +16,8 @@ from modelica_like.netlist.modelica.types import basic_type
 if TYPE_CHECKING:
     from modelica_like.netlist.modelica.resolve import Resolver
 
+_LONG = 10
+"""Numbers, names and operations of a subscript; a longer one is written once, and not for each element."""
 _WHOLE = ("floor", "integer", "ceil", "sign", "div")
 _AS_WHOLE = ("+", "-", "*", "neg")
 _CALLS_AS_WHOLE = ("pre", "noEvent", "previous", "hold", "mod", "rem", "min", "max", "abs", fold.ARGUMENT, fold.SILENT)
@@ -85,6 +88,8 @@ def _is_whole(resolver: Resolver, node: Expr) -> bool:
         return node.args[0] == int(node.args[0])
     if node.kind == "native":
         return node.args[0].whole
+    if node.kind == OUTSIDE:
+        return all_whole(node.args[:1])
     if node.kind == "if":
         return all_whole((*node.args[1::2], node.args[-1]))
     if node.kind == "call":
@@ -107,6 +112,10 @@ def picked(index: Expr, items: tuple[Expr, ...], line: int) -> Expr:
     """
     if not items:
         raise fold.Unfit("An array without elements has none at a subscript")
+    if index.size > _LONG:
+        arguments: list[Expr] = []
+        slot, *slots = (opened(value, arguments) for value in (index, *items))
+        return closed(fold.quiet(picked(slot, tuple(slots), line)), arguments, line)
     kept = [part for k, item in enumerate(items, 1) for part in (_is(index, k, line), item)]
     return fold.choice(kept, _outside(items[-1], index, len(items), line), line)
 
@@ -139,6 +148,15 @@ def _is(index: Expr, place: int, line: int) -> Expr:
 
 
 def _outside(value: Expr, index: Expr, size: int, line: int) -> Expr:
+    whole = fold.operation("==", (fold.function("floor", (index,), line), index), line)
+    ends = zip((">=", "<="), (1, size), strict=True)
+    low, high = (fold.operation(kind, (index, fold.number(end)), line) for kind, end in ends)
+    holds = fold.operation("and", (fold.operation("and", (low, high), line), whole), line)
+    return demanding(value, holds, f"has a subscript that is none of 1 to {size}", line)
+
+
+def demanding(value: Expr, holds: Expr, words: str, line: int) -> Expr:
+    """Return a value, of an array each element, that demands a condition where it is taken."""
     if value.kind == "array":
-        return Expr("array", tuple(_outside(item, index, size, line) for item in value.args), line)
-    return Expr(OUTSIDE, (value, index, fold.number(size, line)), line)
+        return Expr("array", tuple(demanding(item, holds, words, line) for item in value.args), line)
+    return Expr(OUTSIDE, (value, holds, words), line)

@@ -43,7 +43,8 @@ from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field, Parameter, Variable
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import InsideAssembly, inside
-from modelica_like.netlist.modelica.fold import OUTSIDE, SILENT, SLOT
+from modelica_like.netlist.modelica.fold import OUTSIDE, SILENT
+from modelica_like.netlist.modelica.laws import SLOT
 from modelica_like.netlist.modelica.tree import Expr as Node
 
 MEMORY = "_condition"
