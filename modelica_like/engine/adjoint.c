@@ -5,6 +5,7 @@
 
 #define MOST_EDGES 100  /* in a step: more are noise */
 #define MOST_ERROR 10   /* tolerances, as estimated, beside the largest effects on an output: results have less */
+#define OF_INTEGRANDS 8 /* further halvings, for waves that are integrated in a run that is quiet itself */
 #define SHORT 1e-11     /* of a piece that has landed on an edge: it ends behind that */
 #define MOST_HALVINGS 8 /* of a step: what begins on a kink is wrong in its first part only, of 4e-3 */
 
@@ -168,7 +169,8 @@ static void smoothly_back(Instance *c, double begin, double end, int halvings) {
         step_back(c, h, x, g->node_bars + (size_t)v * N_NODES * n, 0,
             integral ? g->integrand_slopes + (size_t)v * N_NODES * n : NULL);
     }
-    if (halvings > 0 && max_of(error, error_back(c, h, after)) > MOST_ERROR * c->state.tolerance) {
+    double most = MOST_ERROR * c->state.tolerance;
+    if ((error > most && halvings > -OF_INTEGRANDS) || (halvings > 0 && error_back(c, h, after) > most)) {
         smoothly_back(c, begin + 0.5 * h, end, halvings - 1);
         smoothly_back(c, begin, begin + 0.5 * h, halvings - 1);
         return;
