@@ -487,7 +487,7 @@ MESSAGES: dict[str, tuple[str, str]] = {
     ),
     "no simplified law": (
         model("Real x;", "homotopy(actual = x) = 1;"),
-        "homotopy(…) has 2 arguments, actual and simplified, not 1.\n  in a.mo:5 `homotopy(actual = x) = 1;`",
+        "homotopy(…) has 2 arguments, not 1.\n  in a.mo:5 `homotopy(actual = x) = 1;`",
     ),
     "a modification of nothing": (
         model("B b(kk = 3);", before="model B parameter Real k = 1; end B;"),

@@ -103,6 +103,7 @@ REFUSED = {
     "sum(v^2)": "Only a square matrix has powers, from 0 to 100: .^ is element by element",
     "sum([A; v])": "The rows of a matrix have different lengths",
     "sum([A, {1, 2, 3}])": "The parts of a matrix that stand side by side have different numbers of rows",
+    "size({{1, 2}, {3}}, 1)": "size(…) needs an array whose rows are of one length",
     "size(A, 3)": "size(…) has no dimension 3: the array has 2",
     "sum(if time > 0.5 then {1, 2} else {3, 4, 5})": "The values of an 'if' have different sizes",
     "mod(time, 0)": "mod by 0 has no value",

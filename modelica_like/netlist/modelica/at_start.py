@@ -83,10 +83,7 @@ class _AtOnce(Algorithm):
         self.owner = owner
         self.declared = {name: member.declaration for name, member in owner.members.items()}
         for name in set(targets_of(body)) & owner.members.keys():
-            value = fold.number(0)
-            for size in reversed(members.sizes(owner, owner.members[name])):
-                value = Expr("array", (value,) * size)
-            self.local[name] = value
+            self.local[name] = fold.filled(fold.number(0), members.sizes(owner, owner.members[name]))
         self.run(body)
 
     def here(self, text: ClassText | None = None) -> resolve.Resolver:

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
-from modelica_like.netlist.modelica.causal import Pair, bus_of, connections, parts_in, variable_at
+from modelica_like.netlist.modelica.causal import Pair, bus_of, connections, parts_below, variable_at
 from modelica_like.netlist.modelica.instance import DEEPEST, Given, Instance, Member
-from modelica_like.netlist.modelica.members import elements_of, exists, part_at, part_of, sizes
+from modelica_like.netlist.modelica.members import part_at, parts_in, sizes
 from modelica_like.netlist.modelica.signals import drives, is_inner
 from modelica_like.netlist.modelica.tree import Declaration, Expr, Modification
 from modelica_like.netlist.modelica.types import Basic, basic_type
@@ -28,7 +28,7 @@ def join_buses(root: Instance) -> None:
     Raises:
         ModelicaTextError: a variable has no source, or several.
     """
-    instances = {instance.path: instance for instance in (root, *(part for part, _ in parts_in(root)))}
+    instances = {instance.path: instance for instance in (root, *(part for part, _ in parts_below(root)))}
     buses = {bus.path: bus for instance in instances.values() for bus in _buses_in(instance)}
     if buses:
         _Buses(instances, buses).run()
@@ -47,14 +47,10 @@ def bus_equations(instance: Instance) -> Iterator[tuple[Expr, Expr, Source]]:
 
 def _buses_in(instance: Instance) -> Iterator[Instance]:
     """Yield the expandable connectors of an instance, and those within them."""
-    for name, member in instance.members.items():
-        if member.declaration.is_outer or not exists(instance, member) or basic_type(instance, member) is not None:
-            continue
-        for _, index in elements_of(name, sizes(instance, member)):
-            part = part_of(instance, member, index)
-            if isinstance(part, Instance) and part.text.expandable:
-                yield part
-                yield from _buses_in(part)
+    for _, part in parts_in(instance):
+        if isinstance(part, Instance) and part.text.expandable:
+            yield part
+            yield from _buses_in(part)
 
 
 def _is_bus(instance: Instance, end: str) -> bool:

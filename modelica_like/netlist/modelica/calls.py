@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-ELEMENTARY = {
+JUMPING = {"sign", "floor", "integer", "ceil", "mod", "div", "rem"}
+"""Functions of numbers whose values jump."""
+ELEMENTARY = JUMPING | {
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "log10", "sqrt", "abs",
-    "sign", "floor", "ceil", "integer", "mod", "rem", "div", "min", "max",
+    "min", "max",
 }  # fmt: skip
 """Functions of numbers."""
 KEPT = {
@@ -15,6 +17,7 @@ ARGUMENTS = {
     **dict.fromkeys(("der", "pre", "noEvent", "edge", "change", "previous", "hold"), (1, 1)),
     **dict.fromkeys(("initial", "terminal"), (0, 0)),
     **dict.fromkeys(("sample", "Clock", "size"), (1, 2)), "smooth": (2, 2), "reinit": (2, 2), "delay": (2, 3),
+    "homotopy": (2, 2),
 }  # fmt: skip
 """Least and largest number of arguments."""
 REFUSED = {

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.lifting import above
-from modelica_like.netlist.modelica.members import elements_of, exists, named_array, part_at, part_of, sizes
+from modelica_like.netlist.modelica.members import elements_of, named_array, part_at, parts_in, sizes
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
 from modelica_like.netlist.modelica.types import Basic, basic_type
@@ -91,7 +91,7 @@ def connections(instance: Instance) -> list[Pair]:
     if instance.pairs is None:
         instance.pairs = [pair for pair in _own(instance) if _outer(instance, pair) is None]
         if any("inner" in member.declaration.prefixes for member in instance.members.values()):
-            instance.pairs += [pair for part, way in parts_in(instance) for pair in _adopted(part, instance, way)]
+            instance.pairs += [pair for part, way in parts_below(instance) for pair in _adopted(part, instance, way)]
     return instance.pairs
 
 
@@ -155,7 +155,9 @@ def _pairs(instance: Instance, statement: Statement, text: ClassText, local: dic
         left, right = (end_of(side, resolver) for side in statement.parts)
         yield from ((*pair, source) for pair in pairs_of(left, right, instance, source) if "" not in pair)
     elif statement.kind == "for" and _connects(statement.parts[1]):
-        yield from _looped(instance, list(statement.parts[0]), statement.parts[1], text, local)
+        for known in rounds(resolver, statement.parts[0], statement.line):
+            for inner in statement.parts[1]:
+                yield from _pairs(instance, inner, text, known)
     elif statement.kind == "if" and any(_connects(body) for _, body in statement.parts):
         for condition, body in statement.parts:
             holds = (
@@ -169,18 +171,14 @@ def _pairs(instance: Instance, statement: Statement, text: ClassText, local: dic
                 return
 
 
-def _looped(
-    instance: Instance, iterators: list[tuple[str, Expr | None]], body: list[Statement], text: ClassText,
-    local: dict[str, Expr],
-) -> Iterator[Pair]:  # fmt: skip
+def rounds(resolver: Resolver, iterators: Sequence[tuple[str, Expr | None]], line: int) -> Iterator[dict[str, Expr]]:
+    """Yield what is known in each round of a loop of equations, the last of its iterators innermost."""
     (name, over), rest = iterators[0], iterators[1:]
-    for value in Resolver(instance, text, local, numeric=True).array(over) if over is not None else ():
-        inner = {**local, name: value}
-        if rest:
-            yield from _looped(instance, rest, body, text, inner)
-        else:
-            for statement in body:
-                yield from _pairs(instance, statement, text, inner)
+    if over is None:
+        raise refused("an iterator without a range", resolver.text, line)
+    for value in resolver.known().array(over):
+        inner = Resolver(resolver.instance, resolver.text, {**resolver.local, name: value})
+        yield from rounds(inner, rest, line) if rest else (inner.local,)
 
 
 def _connects(body: Iterable[Statement]) -> bool:
@@ -192,17 +190,12 @@ def _connects(body: Iterable[Statement]) -> bool:
     )
 
 
-def parts_in(instance: Instance, levels: int = 1) -> Iterator[tuple[Instance, int]]:
+def parts_below(instance: Instance, levels: int = 1) -> Iterator[tuple[Instance, int]]:
     """Yield the parts in an instance, with the levels from them up to it."""
-    for name, member in instance.members.items():
-        if member.declaration.is_outer or not exists(instance, member) or basic_type(instance, member) is not None:
-            continue
-        shape = sizes(instance, member)
-        for _, index in elements_of(name, shape):
-            part = part_of(instance, member, index)
-            if isinstance(part, Instance) and part.text.kind != "connector":
-                yield part, levels
-                yield from parts_in(part, levels + 1)
+    for _, part in parts_in(instance):
+        if isinstance(part, Instance) and part.text.kind != "connector":
+            yield part, levels
+            yield from parts_below(part, levels + 1)
 
 
 def cardinality(resolver: Resolver, argument: Expr) -> Expr:
@@ -220,8 +213,7 @@ def cardinality(resolver: Resolver, argument: Expr) -> Expr:
     head, _, last = path.rpartition(".")
     places = [(instance, path)]
     if head:
-        name, _, index = head.partition("[")
-        part = part_of(instance, instance.members[name], int(index.rstrip("]")) if index else 0)
+        part = part_at(instance, head)
         places += [(part, last)] if isinstance(part, Instance) else []
     elif instance.owner is not None:
         places.append((instance.owner, f"{instance.name}.{path}"))
@@ -269,25 +261,13 @@ class Joints:
             assert connector is not None
             for variable in variables(connector):
                 yield from self._equations(variable, wire.ends, wire.source)
-        for name, member in self.instance.members.items():
-            for end, connector in self._of_part(name, member):
-                place = connector.text.place(connector.text.line)
-                if end not in joined:
-                    yield from ((f"{end}.{v.name}", [], place) for v in variables(connector) if v.role == "flow")
-
-    def _of_part(self, name: str, member: Member) -> Iterator[tuple[str, Instance]]:
-        """Yield the causal connectors of the parts of a member."""
-        if (
-            member.declaration.is_outer
-            or not exists(self.instance, member)
-            or basic_type(self.instance, member) is not None
-        ):
-            return
-        for head, index in elements_of(name, sizes(self.instance, member)):
-            part = part_of(self.instance, member, index)
-            if isinstance(part, Instance) and part.text.kind != "connector":
-                for end, below in connectors(part):
-                    yield f"{head}.{end}", below
+        parts = (
+            (head, p) for head, p in parts_in(self.instance) if isinstance(p, Instance) and p.text.kind != "connector"
+        )
+        for end, connector in ((f"{head}.{end}", below) for head, part in parts for end, below in connectors(part)):
+            place = connector.text.place(connector.text.line)
+            if end not in joined:
+                yield from ((f"{end}.{v.name}", [], place) for v in variables(connector) if v.role == "flow")
 
     def _equations(
         self, variable: Variable, ends: list[str], source: Source
@@ -331,10 +311,4 @@ class Joints:
 
 def connectors(instance: Instance) -> Iterator[tuple[str, Instance]]:
     """Yield the own causal connectors of an instance by their names."""
-    for name, member in instance.members.items():
-        if member.declaration.is_outer or not exists(instance, member) or basic_type(instance, member) is not None:
-            continue
-        for path, index in elements_of(name, sizes(instance, member)):
-            part = part_of(instance, member, index)
-            if isinstance(part, Instance) and is_causal(part):
-                yield path, part
+    yield from ((path, part) for path, part in parts_in(instance) if isinstance(part, Instance) and is_causal(part))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from modelica_like.netlist.modelica.tree import Expr, joined, with_operands
+from modelica_like.netlist.modelica.calls import JUMPING
+from modelica_like.netlist.modelica.tree import Empty, Expr, joined, with_operands
 
 _BINARY: dict[str, Callable[[float, float], float]] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "^": operator.pow,
@@ -29,7 +30,6 @@ ARGUMENT, SILENT = "argument", "silent"
 itself, which makes none."""
 _SAME_TYPE = ("pre", "noEvent", "previous", "hold", ARGUMENT, SILENT)
 """Calls that have the type of their argument."""
-_JUMPING = ("sign", "floor", "integer", "ceil", "mod", "div", "rem")
 _ANSWERS = ("initial", "terminal", "edge", "change", "sample", "Clock")
 """Calls that are conditions."""
 KNOWN = ("number", "boolean", "literal", "string")
@@ -61,7 +61,7 @@ def jumps(expression: Expr) -> bool:
 
 
 def _jumps_itself(expression: Expr) -> bool:
-    return expression.kind in _RELATIONS or (expression.kind == "call" and expression.args[0] in _JUMPING)
+    return expression.kind in _RELATIONS or (expression.kind == "call" and expression.args[0] in JUMPING)
 
 
 def quiet(result: Expr) -> Expr:
@@ -77,6 +77,24 @@ def quiet(result: Expr) -> Expr:
 def number(value: float, line: int = 0) -> Expr:
     """Return a number as an expression."""
     return Expr("number", (float(value),), line)
+
+
+def filled(value: Expr, sizes: Sequence[int], line: int = 0) -> Expr:
+    """Return an array of one value."""
+    for size in reversed(sizes):
+        value = Expr("array", (value,) * size, line) if size else Empty("array", (), line, further=shape(value) or ())
+    return value
+
+
+def shape(value: Expr) -> tuple[int, ...] | None:
+    """Return the size of an array in each dimension, nothing of what is none; None if its rows differ."""
+    if value.kind != "array":
+        return ()
+    if isinstance(value, Empty):
+        return (0, *value.further)
+    inner = {shape(item) for item in value.args}
+    row = inner.pop() if inner else ()
+    return None if inner or row is None else (len(value.args), *row)
 
 
 def count(number: float) -> int:

@@ -11,7 +11,7 @@ from modelica_like.netlist.modelica.instance import GIVE, Given, Instance, refus
 from modelica_like.netlist.modelica.laws import closed, opened
 from modelica_like.netlist.modelica.members import value_of
 from modelica_like.netlist.modelica.natives import NATIVE
-from modelica_like.netlist.modelica.tree import ClassText, Empty, Expr
+from modelica_like.netlist.modelica.tree import ClassText, Expr
 from modelica_like.netlist.modelica.types import basic_type, is_external_object, misfit
 
 if TYPE_CHECKING:
@@ -23,19 +23,9 @@ _LARGE = 1000
 
 
 def _filled(value: Expr, shape: tuple[Expr, ...], line: int) -> Expr:
-    for size in reversed(shape):
-        if size.kind != "number":
-            raise fold.Unfit("The size of an array must be known")
-        count = fold.count(size.args[0])
-        value = Expr("array", (value,) * count, line) if count else Empty("array", (), line, further=_sizes(value))
-    return value
-
-
-def _sizes(value: Expr) -> tuple[int, ...]:
-    if value.kind != "array":
-        return ()
-    inner = _sizes(value.args[0]) if value.args else value.further if isinstance(value, Empty) else ()
-    return (len(value.args), *inner)
+    if any(size.kind != "number" for size in shape):
+        raise fold.Unfit("The size of an array must be known")
+    return fold.filled(value, [fold.count(size.args[0]) for size in shape], line)
 
 
 def _line(args: tuple[Expr, ...], line: int) -> Expr:
@@ -88,7 +78,7 @@ def _concatenated(args: tuple[Expr, ...], line: int) -> Expr:
 
 
 def _crossed(args: tuple[Expr, ...], line: int) -> Expr:
-    if any(_sizes(argument) != (3,) for argument in args):
+    if any(fold.shape(argument) != (3,) for argument in args):
         raise fold.Unfit("cross(…) needs two vectors of 3 elements")
     a, b = (argument.args for argument in args)
     pairs = ((1, 2), (2, 0), (0, 1))
@@ -153,9 +143,12 @@ def size(items: Expr, dimension: float | None, line: int) -> Expr:
     """Return the size of an array in one dimension, or in all as an array.
 
     Raises:
-        Unfit: there is no such dimension.
+        Unfit: there is no such dimension, or the rows differ.
     """
-    numbers = [fold.number(count, line) for count in _sizes(items)]
+    shape = fold.shape(items)
+    if shape is None:
+        raise fold.Unfit("size(…) needs an array whose rows are of one length")
+    numbers = [fold.number(count, line) for count in shape]
     if dimension is None:
         return Expr("array", tuple(numbers), line)
     if not 1 <= dimension <= len(numbers) or dimension != int(dimension):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -138,7 +139,7 @@ def _other_size(owner: Instance, member: Member, value: Expr) -> str:
         return ""
     if not dimensions:
         return "is no array, and its value is one"
-    shape = _shape(value)
+    shape = fold.shape(value)
     if shape is None:
         return "has a value whose rows are of different lengths"
     resolver = resolve.Resolver(owner, member.text, numeric=True)
@@ -154,15 +155,6 @@ def _other_size(owner: Instance, member: Member, value: Expr) -> str:
         return ""
     size, other = (", ".join(map(str, sizes)) for sizes in (wanted, shape))
     return f"has the size {size}, and its value {f'the size {other}' if shape else 'is no array'}"
-
-
-def _shape(value: Expr) -> tuple[int, ...] | None:
-    """Return the size of an array in each dimension, None if its rows differ."""
-    if value.kind != "array":
-        return ()
-    inner = {_shape(item) for item in value.args}
-    row = inner.pop() if inner else ()
-    return None if inner or row is None else (len(value.args), *row)
 
 
 def known_false(given: Given | None) -> bool:
@@ -279,6 +271,14 @@ def part_at(instance: Instance, path: str) -> Instance | Known | str | None:
             return None
         part = part_of(part, member, int(index.partition("]")[0]) if index else 0)
     return part
+
+
+def parts_in(owner: Instance) -> Iterator[tuple[str, Instance | Known | str]]:
+    """Yield the parts of an instance, elements of arrays one by one, by their paths."""
+    for name, member in owner.members.items():
+        if not member.declaration.is_outer and exists(owner, member) and basic_type(owner, member) is None:
+            for path, index in elements_of(name, sizes(owner, member)):
+                yield path, part_of(owner, member, index)
 
 
 def _instances(owner: Instance, member: Member, text: ClassText) -> Instance | list[Instance]:

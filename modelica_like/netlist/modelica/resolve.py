@@ -332,6 +332,9 @@ class Resolver:
             return cardinality(self, given[0])
         if short in REFUSED:
             raise refused(REFUSED[short], self.text, line)
+        if short == "homotopy":
+            others = dict(named)
+            given, named = (*given, *(others[key] for key in ("actual", "simplified") if key in others)), ()
         least, most = ARGUMENTS.get(short, (0, len(given)))
         if not least <= len(given) <= most:
             count = f"{least} to {most}" if most > least else str(least)
@@ -345,8 +348,7 @@ class Resolver:
         if short == "getInstanceName" and self.instance is not None:
             return Expr("string", (self.instance.full_name,), line)
         if short == "homotopy":
-            others = dict(named)
-            return self._homotopy([*given, *(others[key] for key in ("actual", "simplified") if key in others)], line)
+            return self._told(lambda: fold.kept(short, tuple(map(self, given)), line), line)
         if short in ("smooth", "noEvent"):
             value = self(given[1 if short == "smooth" else 0])
             return fold.kept("noEvent", (value,), line)
@@ -375,14 +377,6 @@ class Resolver:
             if self.numeric:
                 raise ModelicaTextError(error.what, where=error.where) from None
             return self.known()(expression)  # parameters are numbers then, and cannot change afterwards
-
-    def _homotopy(self, given: list[Expr], line: int) -> Expr:
-        """Resolve a homotopy; one of arrays element by element."""
-        if len(given) != 2:
-            what = f"homotopy(…) has 2 arguments, actual and simplified, not {len(given)}."
-            raise ModelicaTextError(what, where=self.text.place(line))
-        values = tuple(map(self, given))
-        return self._told(lambda: fold.kept("homotopy", values, line), line)
 
     def _sized(self, expression: Expr) -> Expr:
         """Resolve an array for its size; one of components counts, too."""

@@ -150,10 +150,7 @@ class Section(Algorithm):
 
 
 def _start(basic: Basic, shape: tuple[int, ...]) -> Expr:
-    value = Expr("boolean", (False,)) if basic.kind == "Boolean" else fold.number(0)
-    for size in reversed(shape):
-        value = Expr("array", (value,) * size)
-    return value
+    return fold.filled(Expr("boolean", (False,)) if basic.kind == "Boolean" else fold.number(0), shape)
 
 
 def _before_event(variable: Expr) -> Expr:

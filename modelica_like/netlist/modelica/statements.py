@@ -8,7 +8,7 @@ from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.before import Before, begin_late, begun
 from modelica_like.netlist.modelica.buses import bus_equations
-from modelica_like.netlist.modelica.causal import Joints, connections, declared_at, variable_at
+from modelica_like.netlist.modelica.causal import Joints, connections, declared_at, rounds, variable_at
 from modelica_like.netlist.modelica.demands import demanded_elements
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known
@@ -278,7 +278,9 @@ class Statements(Whens):
             if self.initially:
                 raise refused("a connection or a 'when' among initial equations", text, statement.line)
         elif statement.kind == "for":
-            self._loop(list(statement.parts[0]), statement.parts[1], text, local)
+            for known in rounds(resolver, statement.parts[0], statement.line):
+                for inner in statement.parts[1]:
+                    self.statement(inner, text, known)
         elif statement.kind == "if":
             self._branches(statement, text, local)
         elif statement.kind == "when":
@@ -297,20 +299,6 @@ class Statements(Whens):
                 )
         else:
             raise refused(f"'{statement.kind}' among equations", text, statement.line)
-
-    def _loop(
-        self, iterators: list[tuple[str, Expr | None]], body: list[Statement], text: ClassText, local: dict[str, Expr]
-    ) -> None:
-        (name, over), rest = iterators[0], iterators[1:]
-        if over is None:
-            raise refused("an iterator without a range", text, body[0].line if body else text.line)
-        for value in Resolver(self.instance, text, local, numeric=True).array(over):
-            inner = {**local, name: value}
-            if rest:
-                self._loop(rest, body, text, inner)
-            else:
-                for statement in body:
-                    self.statement(statement, text, inner)
 
     def _branches(self, statement: Statement, text: ClassText, local: dict[str, Expr]) -> None:
         """Take the branch that parameters decide; else make one equation of those at the same place in all branches."""
@@ -348,10 +336,7 @@ class Statements(Whens):
         for k in range(counts.pop()):
             rows = [(condition, *branch.equations[k]) for condition, branch in branches]
             left = rows[0][1]
-            if all(
-                row[1].kind == left.kind and left.kind in ("name", "condition") and _text(row[1]) == _text(left)
-                for row in rows
-            ):
+            if left.kind in ("name", "condition") and all(row[1].args == left.args for row in rows):
                 value = _choice([(row[0], row[2]) for row in rows], line)
                 self.equations.append((left, as_condition(value) if left.kind == "condition" else value, rows[0][3]))
                 continue
@@ -398,10 +383,3 @@ def _choice(branches: list[tuple[Expr | None, Expr]], line: int) -> Expr:
     for condition, value in branches:
         args += [value] if condition is None else [condition, value]
     return Expr("if", tuple(args), line)
-
-
-def _text(node: Expr) -> str:
-    inner = (f"({_text(argument)})" if isinstance(argument, Expr) else str(argument) for argument in node.args)
-    if node.kind == "call":
-        inner = (node.args[0], *(_text(argument) for argument in node.args[1]))
-    return f"{node.kind}:{','.join(inner)}"

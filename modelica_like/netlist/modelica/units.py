@@ -9,7 +9,7 @@ from modelica_like.language.inside import declarations
 from modelica_like.language.units import parse_unit, same_dimension
 from modelica_like.netlist.modelica.instance import Instance, Member
 from modelica_like.netlist.modelica.library import Known, connector_type
-from modelica_like.netlist.modelica.members import element, exists, part_of
+from modelica_like.netlist.modelica.members import element, exists, part_at
 from modelica_like.netlist.modelica.types import basic_type
 from modelica_like.netlist.modelica.values import known
 from modelica_like.netlist.modelica.wiring import INSIDE
@@ -59,15 +59,12 @@ def _units(instance: Instance, path: str) -> Iterator[tuple[str, tuple[str, Sour
     """Yield the variables at an end of a connection with their units."""
     head, _, rest = path.partition(".")
     name, _, index = head.removeprefix(INSIDE).partition("[")
-    place = int(index.partition("]")[0]) if index else 0
     member = instance.members.get(name)
-    if member is None or not exists(instance, member):
+    if member is None:
         return
-    if basic_type(instance, member) is not None:
-        yield from _unit(instance, member, place, "")
-        return
-    part = part_of(instance, member, place)
-    source = member.text.place(member.declaration.line)
+    part, source = part_at(instance, head.removeprefix(INSIDE)), member.text.place(member.declaration.line)
+    if part is None and exists(instance, member):
+        yield from _unit(instance, member, int(index.partition("]")[0]) if index else 0, "")
     if isinstance(part, Instance) and rest:
         yield from _units(part, rest)
     elif isinstance(part, Instance):
@@ -80,7 +77,7 @@ def _units(instance: Instance, path: str) -> Iterator[tuple[str, tuple[str, Sour
             yield "", (declared.fields[rest].unit_text, source)
         elif rest in declared.connectors:
             yield from ((key, (field.unit_text, source)) for key, field in declared.connectors[rest].fields.items())
-    elif kind := connector_type(part):
+    elif kind := connector_type(part) if part else None:
         yield from ((key, (field.unit_text, source)) for key, field in declarations(kind).fields.items())
 
 

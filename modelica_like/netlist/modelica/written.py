@@ -43,6 +43,7 @@ from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field, Parameter, Variable
 from modelica_like.language.formula import Formula
 from modelica_like.language.inside import InsideAssembly, inside
+from modelica_like.netlist.modelica.calls import JUMPING
 from modelica_like.netlist.modelica.fold import OUTSIDE, SILENT
 from modelica_like.netlist.modelica.laws import SLOT
 from modelica_like.netlist.modelica.tree import Expr as Node
@@ -264,7 +265,7 @@ class Written(Assembly):
         if name == "pre" and not (isinstance(values[0], Symbol) and is_a(values[0], Discrete)):
             varies = isinstance(values[0], Symbol) and is_a(values[0], Variable)
             return before(values[0]) if varies and events is None else values[0]
-        return _STEPPED[name](*values, events) if name in _STEPPED else FUNCTIONS[name](*values)
+        return _STEPPED[name](*values, events) if name in JUMPING else FUNCTIONS[name](*values)
 
     def _symbol(self, path: str) -> Any:
         if path == "time":
