@@ -33,7 +33,7 @@ equation
   annotation(Icon(graphics = {
     Rectangle(extent = {{-100, -10}, {100, 10}}, lineColor = {64, 64, 64}, fillColor = {192, 192, 192},
       fillPattern = FillPattern.HorizontalCylinder),
-    Rectangle(extent = {{-60, -60}, {60, 60}}, radius = 10, fillColor = {170, 213, 255}, fillPattern = FillPattern.Solid),
+    Rectangle(extent = {{-60, -60}, {60, 60}}, fillColor = {170, 213, 255}, fillPattern = FillPattern.Solid),
     Text(extent = {{-50, -30}, {50, 30}}, textString = "J %J", textColor = {200, 0, 0})}));
 end Rotor;
 """
