@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from modelica_like import load, simulate
+from modelica_like.netlist.modelica.read import read_modelica
 from modelica_like.show.report.plausible import drive_notes
 
 OTHERS = Path(__file__).parent / "others"
@@ -79,6 +80,7 @@ def test_a_missing_inner_part_is_told() -> None:
     notes = [drive_notes(load(f"{OTHERS / 'Planar.mo'}:Planar.{name}")) for name in ("Test", "WithoutWorld")]
     told = "There is no inner planarWorld: a PlanarWorld with its own values is taken."
     assert [told in note for note in notes] == [False, True]
+    assert told in read_modelica(OTHERS / "Planar.mo", "Planar.WithoutWorld")[1]
 
 
 def test_a_pendulum_of_matrices() -> None:

@@ -120,6 +120,26 @@ def test_units_of_inputs_and_outputs_in_connectors(tmp_path: Path) -> None:
         load(read(tmp_path, BUS, "N.m", "N"))
 
 
+def test_elements_of_one_input_of_a_component_have_no_units(tmp_path: Path) -> None:
+    # As in the standard library: `Move` takes an angle, a speed and an acceleration by one input of three elements.
+    (tmp_path / "a.mo").write_text("""
+model A
+  block Give
+    Modelica.Blocks.Interfaces.RealOutput y(unit = "deg") = 0;
+  end Give;
+  Give give[3];
+  Modelica.Mechanics.Rotational.Sources.Move move;
+  Modelica.Mechanics.Rotational.Components.Inertia J(J = 1);
+equation
+  for k in 1:3 loop
+    connect(give[k].y, move.u[k]);
+  end for;
+  connect(move.flange, J.flange_a);
+end A;
+""")
+    assert simulate(load(tmp_path / "a.mo"), 1.0).final["J.w"] == pytest.approx(0)
+
+
 def test_units_of_components_of_the_table(tmp_path: Path) -> None:
     text = """
 model A

@@ -54,7 +54,7 @@ def read_modelica(path: Path, name: str = "", *, table: bool = True) -> tuple[Wr
     for part in component.walk():
         if isinstance(part, Written):
             inside(part).origin = f"{path.resolve()}:{inside(part).text}"
-    return component, notes.told
+    return component, [*notes.told, *inside(component).remarks]
 
 
 def _built(classes: Classes, text: ClassText) -> tuple[Written, Notes]:

@@ -73,7 +73,7 @@ def _units(instance: Instance, path: str) -> Iterator[tuple[str, tuple[str, Sour
                 yield from _unit(part, inner, 0, key)
     elif isinstance(part, Known):
         declared = declarations(part.type)
-        if rest in declared.fields:
+        if rest in declared.fields and "[" not in part.there(rest):  # elements of one input have no units there
             yield "", (declared.fields[rest].unit_text, source)
         elif rest in declared.connectors:
             yield from ((key, (field.unit_text, source)) for key, field in declared.connectors[rest].fields.items())
