@@ -71,6 +71,7 @@ class _Builder(Fields):
         super().__init__(instance, notes, moved=moved)
         self.errors: list[ModelicaLikeError] = []
         self.absent: set[str] = set()
+        self.driven: dict[str, set[str]] = {}
 
     def run(self) -> Written:
         bind_at_start(self.instance)
@@ -84,6 +85,8 @@ class _Builder(Fields):
         for name, bound in self.statements.bound.items():
             declare(component, name, signal_out(unit_of(bound.basic, self.notes), f"value of {bound.end}"))
             self.wires.append(Wire([name, bound.end], bound.source))
+        for part, _, name in (end.rpartition(".") for wire in self.wires for end in wire.ends):
+            self.driven.setdefault(part, set()).add(name)
         for name, member in self.instance.members.items():
             place = member.text.place(member.declaration.line)
             Assembly.place(component, f"parts.{name}", place)
@@ -175,9 +178,7 @@ class _Builder(Fields):
     def _part(self, name: str, member: Member, part: Instance | Known | str, given: Given) -> Component | Connector:
         self.instance.classes.spend(50, member.text, member.declaration.line)
         if isinstance(part, Known):
-            driven = {
-                end.rpartition(".")[2] for wire in self.wires for end in wire.ends if end.rpartition(".")[0] == name
-            }
+            driven = self.driven.get(name, set())
             return library_part(self.instance, name, member, part, given, driven, self.notes, self.statements.initial)
         if isinstance(part, str):
             kind = connector_type(part)

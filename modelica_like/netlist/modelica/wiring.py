@@ -30,14 +30,20 @@ class Wire:
 
 
 def groups(pairs: list[tuple[str, str, Source]]) -> list[Wire]:
-    """Gather pairs of ends that share some."""
-    wires: list[Wire] = []
-    for *pair, source in pairs:
-        touched = [w for w in wires if set(pair) & set(w.ends)]
-        ends = dict.fromkeys((*(end for t in touched for end in t.ends), *pair))
-        wires = [w for w in wires if w not in touched]
-        wires.append(Wire([*ends], touched[0].source if touched else source))
-    return wires
+    """Gather pairs of ends that share some; a set stands where it has got its last end."""
+    sets: dict[int, Wire] = {}
+    number_of: dict[str, int] = {}
+    last: dict[int, int] = {}
+    for number, (*pair, source) in enumerate(pairs):
+        touched = sorted({number_of[end] for end in pair if end in number_of}, key=last.__getitem__)
+        place = touched[0] if touched else number  # its number stays, so that long sets are not gone through each time
+        wire = sets.pop(place, None) or Wire([], source)
+        added = [end for other in touched[1:] for end in sets.pop(other).ends]
+        added += [end for end in dict.fromkeys(pair) if end not in number_of]
+        wire.ends += added
+        number_of |= dict.fromkeys(added, place)
+        sets[place], last[place] = wire, number
+    return [*sets.values()]
 
 
 def end_of(end: Expr, resolver: Resolver) -> Expr:
