@@ -88,7 +88,6 @@ struct Gradient {
     double *integrand_slopes, *integrand_bars;      /* by states and implicit unknowns, and by the rest, at the nodes */
     double *later, *lanes;                          /* derivatives by the time of an instant; bars of several vectors */
     double *rests; /* of operations, then of guards: since when they are at their kinks, on the way back, or nan */
-    double *largest_guards;
     Kink *kinked, **kinks; /* of the rates; those that matter in the present modes */
     int n_kinked, n_kinks;
     uint64_t kinks_by;    /* behind which count of `decided_by` these were found */

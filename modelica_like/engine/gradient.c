@@ -145,8 +145,8 @@ static double *take_room(const Instance *c, size_t n_of) {
         {&g->motions, n}, {&g->rates, 2 * n_y}, {&g->points, N_NODES * n_y}, {&g->matrices, N_NODES * nonzeros},
         {&g->stages, (STAGES + 3) * n_y}, {&g->node_bars, vectors * N_NODES * n_y},
         {&g->integrand_slopes, integrals * n_y}, {&g->integrand_bars, integrals * n}, {&g->later, n_of},
-        {&g->rests, rests}, {&g->largest_guards, (size_t)c->model->n_guards},
-        {&g->guard_sizes, (size_t)c->model->n_guards}, {&g->edges, 3 * (size_t)c->model->tapes.edges.n_outputs},
+        {&g->rests, rests}, {&g->guard_sizes, (size_t)c->model->n_guards},
+        {&g->edges, 3 * (size_t)c->model->tapes.edges.n_outputs},
         {&g->lanes, (vectors < MOST_LANES ? vectors : MOST_LANES) * c->n_bars}};
     size_t total = 0;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) total += parts[k].size;

@@ -4,7 +4,8 @@
 #include "adjoint.h"
 
 #define RESTS 1e-3         /* of a run: for how long what is zero has to be so that it rests, and is looked at */
-#define AT_LIMIT 2e-10     /* of the largest value of a guard so far: it is zero, as a torque that is all friction */
+#define NEAR_LIMIT 5e-7    /* a guard that may be zero: surfaces do not break away for a faint excess */
+#define AT_LIMIT 2e-10     /* of its terms: it is so, as a torque that is all friction */
 #define SELDOM 0.02        /* of a run: when it is looked at again, if modes stay */
 #define NEARBY_KINK 3e-6   /* of sizes: how far slopes beside a kink are looked at */
 #define FELT_SLOPE 1e-9    /* of slopes, by which states change in the time of a run */
@@ -112,7 +113,6 @@ void find_kinked(Instance *c) {
         for (int n = 0; n < tape->runs[r].count && isfinite(kink_of(tape->runs[r].operation, 1, -2, by)); n++)
             g->kinked[g->n_kinked++] = (Kink){tape->runs[r].operation, k + n, 0, 0};
     for (int k = 0; k < tape->n_operations + c->model->n_guards; k++) g->rests[k] = NAN;
-    memset(g->largest_guards, 0, (size_t)c->model->n_guards * sizeof(double));
 }
 
 /* Is an operation at its kink, where the tape has been run last? */
@@ -145,10 +145,8 @@ static void note_rests(Instance *c, double t, const double *point) {
     rests += m->tapes.rates.n_operations;
     if (m->n_guards > 0) evaluate_special(c, &m->tapes.guards, t, point, c->edge_guards);
     for (int k = 0; k < m->n_guards; k++) {
-        int active = guard_active(c, k);
-        if (active) raise_to(&g->largest_guards[k], fabs(c->edge_guards[k]));
         double size = fabs(c->edge_guards[k]), change = fabs(c->edge_guards[m->n_guards + k]) * span_of(c);
-        int rest = active && (size <= AT_EDGE || max_of(size, change) <= AT_LIMIT * g->largest_guards[k]);
+        int rest = guard_active(c, k) && (size <= AT_EDGE || (size <= NEAR_LIMIT && change <= size));
         rests[k] = !rest ? NAN : isnan(rests[k]) ? t : rests[k];
     }
 }
@@ -202,8 +200,11 @@ static void check_guards(Instance *c, double *rests) {
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *to = &m->transitions[m->guard_transition[k]];
         if (!rests_long(c, &rests[k]) || !factor_implicit(c)) continue;
+        evaluate_special(c, &m->tapes.guards, c->state.t, c->x, c->edge_guards);
+        double size = fabs(c->edge_guards[k]), terms = 0;
         slope_of_output(c, &m->tapes.guards, k, c->edge_guards, slope);
-        if (direction_off(c, slope, direction) &&
+        for (size_t n = 0; n < c->n_smooth; n++) terms += fabs(slope[n] * c->numbers[n]);
+        if (size <= max_of(AT_EDGE, AT_LIMIT * terms) && direction_off(c, slope, direction) &&
             felt_beside(c, direction, NEARBY_KINK, FELT_KINK, to->mode, to->target) > 0)
             add_doubt(c, FAILURE_LOST_AT_KINK, slope);
     }
