@@ -148,7 +148,7 @@ class Trajectories(Measurement):
         sizes = [_of_column(model, self.uncertainty, name, columns[name]) for name in columns]
         run = quick_run(model, until=float(times.max()), parameters=self.parameters)
         wanted = [f"at({name}, {float(t)!r})" for name in columns for t in times]
-        sensitivity = sensitivities(run, wanted, names, method="forward")
+        sensitivity = sensitivities(run, wanted, names)
         scale = np.repeat(sizes, len(times))
         deviations = np.array([output.value for output in sensitivity.outputs]) - np.concatenate(list(columns.values()))
         shown, unit = table["time"]

@@ -80,7 +80,7 @@ class Runs(Designs):
             run = {"until": question.until, "start": question.start, "parameters": dict(case.values), "options": None}
             try:
                 function = SimulationFunction(
-                    problem.model, names, self.read, run, precision=PRECISION, any_sequence=True, steering=True
+                    problem.model, names, self.read, run, precision=PRECISION, any_sequence=True
                 )
             except ModelicaLikeError as error:
                 place = f" in the load case '{case.name}'" if case.name else ""
@@ -114,13 +114,6 @@ class Runs(Designs):
         if not np.all(np.isfinite(values)):
             raise does_not_happen(self.problem.outputs[int(np.argmin(np.isfinite(values).all(axis=0)))])
         return values, np.zeros((*values.shape, 0))
-
-    def certain(self, x: Vector) -> bool:
-        """Return whether the replay has the same derivatives at a design; if not, it gives those of all designs now."""
-        checks = [function.certain(x) for function in self.functions]
-        if not all(checks):
-            self._known.clear()
-        return all(checks)
 
     def values_at(self, x: Vector) -> Vector | None:
         """Return the outputs only, shape (cases, outputs), None where a run is refused: no derivatives are needed."""

@@ -104,10 +104,7 @@ class Search(Scale):
             prices = np.zeros((len(self.problem.cases), len(self.rows)))
             return Outcome(x, *self.measures(self._values(x)), prices, True, "")
         with self.runs.interruptible(self.measures, self.aim_scale):
-            outcome = self._from(x)
-            if outcome.optimal and not self.runs.certain(outcome.x):
-                return self._from(outcome.x)
-            return outcome
+            return self._from(x)
 
     def _from(self, x: Vector) -> Outcome:
         outcome = self._ipopt(x, elastic=False)
@@ -118,8 +115,6 @@ class Search(Scale):
             if least.excess > FEASIBLE:
                 return least
             outcome = self._ipopt(least.x, elastic=False)
-        if not outcome.optimal and not self.runs.certain(x):
-            return self._from(x)
         return outcome if outcome.optimal else self._polished(outcome)
 
     def _ipopt(self, x: Vector, *, elastic: bool) -> Outcome:

@@ -9,14 +9,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.replay.chain import Reading
+from modelica_like.analyse.replay.noise import rounding
 from modelica_like.analyse.sensitivity.at_kinks import kinks_of_outputs
 from modelica_like.analyse.sensitivity.moving_kinks import kinks_at
 from modelica_like.analyse.sensitivity.of_formulas import formula_kinks
 from modelica_like.analyse.sensitivity.values import slopes_of
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import TERMINAL, CompiledDae
 from modelica_like.errors import ExportError, InitializationError, LanguageError, MissingExtra, NoGradient, SolveError
 from modelica_like.native.along import Row, Seed
@@ -26,14 +29,22 @@ from modelica_like.native.start import initialize
 from modelica_like.options import Options
 from modelica_like.runs.collect import Number
 from modelica_like.runs.conserve import find_astray
-from modelica_like.runs.readings import CONDITIONS, INTEGRATED, Output, by_output, joined, leaves
+from modelica_like.runs.readings import CONDITIONS, INTEGRATED, Output, Part, by_output, joined, leaves
 from modelica_like.runs.solution import Solution
 from modelica_like.runs.trajectories import Statistics
 from modelica_like.solve.initialize import Point, StartKind
 from modelica_like.solve.initialize.slopes import Sizes, Slopes, slopes
+from modelica_like.solve.recorder import Event
 
+_EXTREMES = ("max", "min", "peak")
 _NEAR = 1e-9
 """Distance of two times, relative to the run, that are one."""
+_TOGETHER = 1e-9
+"""The same, of changes whose order means nothing."""
+_FINER = 1e-2
+"""Tolerance of a run relative to that of its derivatives: what the adjoint adds to it is about ten times as large."""
+_DIGITS = 1e-13
+"""What is zero, relative to the terms whose difference it is."""
 _ALIKE = 1e-6
 """Difference of how the times of two kinks move, relative to their changes, that is rounding."""
 _TRIALS = 12
@@ -42,13 +53,19 @@ _TOP = 1e-11
 """Last one of them, relative to the time."""
 _AT_KINK = 1e-7
 """Argument of a kink of a formula, relative to its operands, that may be at it: values are known that well."""
+_ROUNDING = 1e-13
+"""Of integrands, over their errors in units of the last digit: hundreds of roundings."""
+_OF_INTEGRALS = 0.01
+"""Their error in tolerances of the run over that of states: derivatives of waves are larger than these."""
+_ZERO = 1e-30
+"""Rounding of what is zero by zeros: everything moves it."""
 _RESULTS = 100
 """Of a run: enough to judge its energies by."""
 
 
 @dataclass(frozen=True)
 class Differentiated:
-    """A run, its outputs, and their derivatives, shape (outputs, names)."""
+    """A run, its outputs, and their derivatives, shape (outputs, names): nan where the replay has to tell."""
 
     solution: Solution
     values: Vector
@@ -71,21 +88,40 @@ def differentiated_run(
     if TERMINAL in model.discrete_position or model.events.delay_parts or not model.states:
         return None
     parts = leaves(outputs)
-    wanted = [part for leaf in parts if leaf.kind in INTEGRATED for part in leaf.parts(model)]
+    along = (*INTEGRATED, *_EXTREMES)
+    wanted = [part for leaf in parts if leaf.kind in along for part in leaf.parts(model)]
     try:
         run = _kept(model, with_expressions(model, wanted, edges=True), end, options, start, names)
-        if run is None or _stands_at_kink(run.solution, outputs, names):
+        if run is None:
             return None
         values = run.solution.read(*(leaf.name for leaf in parts))
         rows = [run.row(leaf, value) for leaf, value in zip(parts, values, strict=True)]
         if not np.all(np.isfinite(values)) or any(row is None for row in rows) or _at_kinks(outputs, values):
             return None
-        of_leaves = run.slopes([row for row in rows if row is not None])
+        *of_leaves, off = run.slopes([*(row for row in rows if row is not None), _off_kinks(run.solution, outputs)])
     except (ExportError, InitializationError, LanguageError, MissingExtra, NoGradient, SolveError):
         return None
-    if not np.all(np.isfinite(of_leaves)):
-        return None
-    return Differentiated(run.solution, np.ravel(joined(outputs, values)), _chained(outputs, values, of_leaves))
+    given = np.abs(np.concatenate([model.p, model.u])[[model.fixed_position[name] for name in names]])
+    led = ~(np.abs(off) * np.where(given, given, 1.0) <= 1.0)
+    slopes = np.where(led, np.nan, _chained(outputs, values, np.array(of_leaves)))
+    return Differentiated(run.solution, np.ravel(joined(outputs, values)), slopes)
+
+
+def tightened(options: Options, precision: float) -> Options:
+    """Return options of a run whose derivatives are to have a precision."""
+    rtol = min(options.rtol, precision * _FINER)
+    return replace(options, rtol=rtol, atol=min(options.atol, rtol / 100))
+
+
+def mode_sequence(events: Sequence[Event]) -> list[tuple[str, str, str]]:
+    """Return mode, name before and name after of all mode changes; those at one instant in alphabetical order."""
+    groups: list[list[Event]] = []
+    for event in events:
+        if not groups or event.time - groups[-1][0].time > _TOGETHER * max(1.0, abs(event.time)):
+            groups.append([])
+        groups[-1].append(event)
+    ordered = (event for group in groups for event in sorted(group, key=lambda transition: transition.mode))
+    return [(event.mode, event.before, event.after) for event in ordered]
 
 
 def _kept(
@@ -108,25 +144,30 @@ def _kept(
     return None if refused or astray else _Run(solution, extended, loop)
 
 
-def _stands_at_kink(solution: Solution, outputs: Sequence[Output], names: Sequence[str]) -> bool:
-    """Whether a parameter leads off a kink of an output at which the run stays all along a segment."""
+def _off_kinks(solution: Solution, outputs: Sequence[Output]) -> _Read:
+    """Return what is zero at kinks of outputs at which the run stays all along a segment, over its rounding."""
     model = solution.model
     key, function = kinks_of_outputs(model, outputs)
     if not function.size1_out(0):
-        return False
+        return _Read()
     fast = model.fast(key, lambda: function)
 
     def at(point: Point) -> Vector:
         return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0].copy()
 
     along = [np.array([at(segment.point(k)) for k in range(len(segment.times))]) for segment in solution.segments]
-    near = _NEAR * np.max([np.abs(values).max(axis=0) for values in along], axis=0)
-    columns = [len(model.states) + model.fixed_position[name] for name in names]
+    end = solution.segments[-1].point(-1)
+    part = slopes(model, end, key, None, lambda: function)
+    terms = np.abs(part.by) @ np.abs(np.concatenate([end.x, model.p, model.u, end.d])) + np.abs(part.t * end.t)
+    near = np.maximum(_NEAR * np.max([np.abs(values).max(axis=0) for values in along], axis=0), _DIGITS * terms)
+    seeds: list[Seed] = []
     for segment, values in zip(solution.segments, along, strict=True):
-        still = np.flatnonzero(np.all(np.abs(values) <= near, axis=0)).tolist()
-        if still and np.any(slopes(model, segment.point(-1), key, still, lambda: function).by[:, columns]):
-            return True
-    return False
+        still, end = np.flatnonzero(np.all(np.abs(values) <= near, axis=0)).tolist(), segment.point(-1)
+        sizes = np.abs(np.concatenate([end.x, model.p, model.u, end.d]))
+        for by in slopes(model, end, key, still, lambda: function).by if still else ():
+            factor = 1 + 0.6180339887498949 * len(seeds) % 1  # so that they do not cancel each other
+            seeds.append(Seed(factor * by / max(_NEAR * float(np.abs(by) @ sizes), _ZERO), end.t))
+    return _Read(tuple(seeds))
 
 
 def _at_kinks(outputs: Sequence[Output], values: Sequence[float]) -> bool:
@@ -182,7 +223,7 @@ class _Run:
             return self._integral(leaf, value)
         if leaf.kind == "time":
             return self._time(leaf)
-        if leaf.kind in ("max", "min", "peak"):
+        if leaf.kind in _EXTREMES:
             return self._extreme(leaf.path, value)
         moment = {"end": self._end, "at": leaf.moment}.get(leaf.kind, value)
         if self._at_event(moment) or not self._begin <= moment <= self._end:
@@ -222,8 +263,22 @@ class _Run:
             return None
         total = {"mean": value * span, "rms": value**2 * span}.get(leaf.kind, value)
         weight = {"mean": 1.0 / span, "rms": 1.0 / (2.0 * value * span) if value else 0.0}.get(leaf.kind, 1.0)
-        places = [self.extended.position[key_of(part)] for part in leaf.parts(self.model) if part.kind == "integral"]
-        return _Read(integrals=tuple((place, weight, abs(total) or 1.0) for place in places))
+        parts = [part for part in leaf.parts(self.model) if part.kind == "integral"]
+        places = [self.extended.position[key_of(part)] for part in parts]
+        sizes = [self._size(part, total) for part in parts]
+        return _Read(integrals=tuple((place, weight, size) for place, size in zip(places, sizes, strict=True)))
+
+    def _size(self, part: Part, total: float) -> float:
+        """Return the size of an integral beside which errors count: rounding of the integrand is none."""
+        model, given = self.model, [*self.model.arguments.values()]
+        key = Cached.ROUNDING, part.text, part.form, part.change
+        function = model.along(key, lambda: ca.Function("rounding", given, [rounding(given, part.expression(model))]))
+        size = abs(total)
+        for segment in self.solution.segments:
+            d = np.repeat(segment.d[:, None], len(segment.times), axis=1)
+            (noise,) = function(segment.times, segment.x, segment.z, model.p, model.u, d)
+            size += _ROUNDING / self.solution.options.rtol * float(np.trapezoid(noise[0], segment.times))
+        return _OF_INTEGRALS * size or 1.0
 
     def _time(self, leaf: Output) -> _Read | None:
         changes = [event for event in self.solution.events if leaf.is_change(event)]
@@ -267,7 +322,7 @@ class _Run:
         """Find where a rate is zero near a time, by the secant method; None if it is not found."""
         step = 1e-6 * (self._end - self._begin)
         here = self._node(t)
-        rate = float(slopes_of(self.model, path, here).rate[0])
+        rate = most = float(slopes_of(self.model, path, here).rate[0])
         for _ in range(_TRIALS):
             if not self._begin <= here.t + step <= self._end:
                 return None
@@ -276,6 +331,7 @@ class _Run:
             here, rate, step = there, rate + change, -(rate + change) * step / change if change else 0.0
             if abs(here.t + step - t) > 1e-3 * (self._end - self._begin):
                 return None
+            most = max(abs(most), abs(rate))
             if abs(step) <= _TOP * max(1.0, abs(t)):
-                return here
+                return here if abs(rate) <= _ALIKE * most else None  # at a kink it jumps over zero
         return None

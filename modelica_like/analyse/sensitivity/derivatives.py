@@ -14,6 +14,7 @@ from modelica_like.analyse.replay.make import replay
 from modelica_like.analyse.replay.tolerances import Tolerances
 from modelica_like.analyse.sensitivity.at_instants import at_instants
 from modelica_like.analyse.sensitivity.at_kinks import Candidate, Sides, kinks, natural_size
+from modelica_like.analyse.sensitivity.by_run_time import differentiated_run, mode_sequence, tightened
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
 from modelica_like.analyse.sensitivity.of_formulas import formula_kinks, formulas
 from modelica_like.analyse.sensitivity.replayed import read_off
@@ -79,14 +80,90 @@ def sensitivities(
         freed = free_formulas(drive, to, parameters)
         settings = {"parameters": freed.values, "start": start, "options": options}
         solution = quick_run(freed.model, until, **settings, readings=[name for name in of if not is_series(name)])
+    Tolerances(precision)  # refuses what is out of range
     model = solution.model
     outputs = [read_output(model, name) for name in of]
     chosen = chosen_parameters(model, to)
-    column, name = quadratures(model, outputs)
+    result = None
+    if method != "forward" and not any(output.kind == "series" for output in outputs):
+        result = _along_the_run(solution, outputs, chosen, freed, start, precision)
+    certain = [k for k in range(len(chosen)) if result is not None and np.all(np.isfinite(result.derivatives[:, k]))]
+    if result is not None and len(certain) == len(chosen):
+        return result
+    if result is None or not certain:
+        return replayed(solution, outputs, chosen, method, freed, start=start, precision=precision, named=bool(to))
+    others = [pair for k, pair in enumerate(chosen) if k not in certain]
+    told = replayed(solution, outputs, others, method, start=start, precision=precision, named=bool(to), alone=False)
+    return _joined(result, certain, told)
+
+
+def replayed(
+    solution: Solution, outputs: list[Output], chosen: list[tuple[int, Quantity]], method: Method = "auto",
+    freed: Freed | None = None, *, start: StartKind | None, precision: float, named: bool, alone: bool = True,
+) -> Sensitivities:  # fmt: skip
+    """Differentiate by a replay, for which see `sensitivities`.
+
+    Args:
+        solution: the run.
+        outputs: what is differentiated.
+        chosen: by what, as `chosen_parameters` returns it.
+        method: as in `sensitivities`.
+        freed: slopes of formulas.
+        start: kind of start; by default that of the run.
+        precision: relative tolerance of the steps.
+        named: parameters without a derivative are refused, and not left out.
+        alone: there are no derivatives by anything else.
+
+    Raises:
+        NoGradient: a derivative does not exist.
+    """
+    column, name = quadratures(solution.model, outputs)
     moments = [output.moment for output in outputs if output.kind == "at"]
     stops = [*moments, *solution.time] if any(output.kind == "series" for output in outputs) else moments
     chain = replay(solution, column, name, start=start, stops=stops, tolerances=Tolerances(precision))
-    return _differentiate(solution, chain, outputs, chosen, method, freed, named=bool(to))
+    freed = freed or Freed(solution.model, {})
+    return _differentiate(solution, chain, outputs, chosen, method, freed, named=named, alone=alone)
+
+
+def _joined(result: Sensitivities, certain: list[int], others: Sensitivities) -> Sensitivities:
+    """Put the replay's derivatives and reasons in the places of those that the run-time does not have."""
+    told = {quantity.name: k for k, quantity in enumerate(others.parameters)}
+    columns, kept = list[Vector](), list[Quantity]()
+    for k, quantity in enumerate(result.parameters):
+        if k in certain or quantity.name in told:
+            kept.append(quantity)
+            columns.append(result.derivatives[:, k] if k in certain else others.derivatives[:, told[quantity.name]])
+    remarks = tuple(dict.fromkeys((*result.remarks, *others.remarks)))
+    return replace(
+        result, parameters=tuple(kept), derivatives=np.array(columns).T, left_out=others.left_out, remarks=remarks
+    )
+
+
+def _along_the_run(
+    solution: Solution, outputs: list[Output], chosen: list[tuple[int, Quantity]], freed: Freed,
+    start: StartKind | None, precision: float,
+) -> Sensitivities | None:  # fmt: skip
+    """Differentiate by the adjoint of the run-time; None where the replay has to tell."""
+    model, names = solution.model, [quantity.name for _, quantity in chosen]
+    if solution.time[0] or solution.ended is not None or not names:
+        return None
+    options = tightened(solution.options, precision)
+    kind = start or solution.start
+    result = differentiated_run(model, float(solution.time[-1]), options, kind, outputs, names)
+    if result is None or mode_sequence(result.solution.events) != mode_sequence(solution.events):
+        return None
+    values = _finite(solution, outputs)
+    derivatives = result.derivatives
+    if freed.slopes:
+        if not np.all(np.isfinite(derivatives)):
+            return None
+        derivatives = derivatives @ freed.taken_along(names)
+    named = zip(outputs, values, strict=True)
+    return Sensitivities(
+        model.name, tuple(Quantity(output.name, float(value), output.unit) for output, value in named),
+        tuple(quantity for _, quantity in chosen), derivatives, "adjoint",
+        remarks=tuple(_of_rounding(solution, outputs, values)),
+    )  # fmt: skip
 
 
 def chosen_parameters(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantity]]:
@@ -121,8 +198,9 @@ def chosen_parameters(model: CompiledDae, names: Sequence[str]) -> list[tuple[in
 
 def _differentiate(
     solution: Solution, chain: Replay, outputs: list[Output], chosen: list[tuple[int, Quantity]], method: Method,
-    freed: Freed, *, named: bool,
+    freed: Freed, *, named: bool, alone: bool = True,
 ) -> Sensitivities:  # fmt: skip
+    """Differentiate by a replay; `alone`: there are no derivatives by anything else."""
     plain = [output for output in outputs if output.kind != "series"]
     series = [output for output in outputs if output.kind == "series"]
     nodes = [*chain.nodes] if series else []
@@ -143,7 +221,7 @@ def _differentiate(
         # Somewhere along the run everything is felt.
         on_edge = [replace(edge, matters=lambda: True) for edge in on_edge]
     of_outputs, of_edges, of_kinks = np.split(derivatives, np.cumsum([len(readings) + len(over_time), len(on_edge)]))
-    kept, left_out = _by_existence(on_edge, of_edges, [quantity for _, quantity in chosen], named)
+    kept, left_out = _by_existence(on_edge, of_edges, [quantity for _, quantity in chosen], named, alone)
     ends = [*range(len(plain)), *(len(plain) - 1 + len(nodes) * k for k in range(1, len(series) + 1))]
     sides = Sides(solution, [*plain, *series], [total[k] for k in ends])
     candidates = dict[Candidate, int]()
@@ -151,7 +229,7 @@ def _differentiate(
         size = abs(chosen[k][1].value) or natural_size(chain, outputs, positions[k])
         if np.isfinite(size) and _at_a_kink(at_kink, of_kinks[:, k] * size):
             candidates[Candidate(chosen[k][1], size, of_outputs[ends, k])] = k
-    kept, left_at_kinks = _by_sides(sides, candidates, kept, named)
+    kept, left_at_kinks = _by_sides(sides, candidates, kept, named, alone)
     derivatives, chosen = of_outputs[:, kept], [chosen[k] for k in kept]
     if freed.slopes:
         derivatives = derivatives @ freed.taken_along([quantity.name for _, quantity in chosen])
@@ -188,13 +266,13 @@ def _derivatives(chain: Replay, readings: Sequence[Reading], positions: Sequence
 
 
 def _by_sides(
-    sides: Sides, candidates: dict[Candidate, int], kept: list[int], named: bool
+    sides: Sides, candidates: dict[Candidate, int], kept: list[int], named: bool, alone: bool
 ) -> tuple[list[int], dict[str, str]]:
     """Positions of the parameters whose derivatives are the same on both sides; names and reasons of the others."""
     left_out: dict[str, str] = {}
     for candidate in sides.suspects([*candidates]):
         error = sides.error(candidate)
-        if error is not None and (named or len(kept) == 1):
+        if error is not None and (named or (alone and len(kept) == 1)):
             raise error
         if error is not None:
             kept = [k for k in kept if k != candidates[candidate]]
@@ -221,7 +299,7 @@ def _at_a_kink(at_kink: list[Edge], changes: Vector) -> bool:
 
 
 def _by_existence(
-    on_edge: list[Edge], derivatives: Vector, chosen: list[Quantity], named: bool
+    on_edge: list[Edge], derivatives: Vector, chosen: list[Quantity], named: bool, alone: bool
 ) -> tuple[list[int], dict[str, str]]:
     """Positions of the parameters with derivatives; names and reasons of the others."""
     weights = [abs(quantity.value) or 1.0 for quantity in chosen]
@@ -231,7 +309,7 @@ def _by_existence(
         error = edge.error
         if not moving or not edge.matters():
             continue
-        if named or len(reasons.keys() | moving) == len(chosen):
+        if named or (alone and len(reasons.keys() | moving) == len(chosen)):
             raise NoGradient(
                 error.what, where=error.where, why=error.why,
                 advice=f"Leave out {' and '.join(moving[:_NAMED])}, or {error.advice[0].lower()}{error.advice[1:]}",

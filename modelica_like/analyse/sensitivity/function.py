@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.sensitivity.by_run_time import differentiated_run
+from modelica_like.analyse.sensitivity.by_run_time import differentiated_run, mode_sequence, tightened
 from modelica_like.analyse.sensitivity.callback import NamedCallback
-from modelica_like.analyse.sensitivity.derivatives import Sensitivities, chosen_parameters, sensitivities
+from modelica_like.analyse.sensitivity.derivatives import Sensitivities, chosen_parameters, replayed
 from modelica_like.analyse.sensitivity.formulas import free_formulas
 from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.analyse.sensitivity.second import SecondDerivatives
@@ -28,20 +28,13 @@ from modelica_like.solve.recorder import Event
 
 Found = TypeVar("Found")
 
-_TOGETHER = 1e-9
-_AGREE = 1e-5
-"""Difference of the derivatives of run-time and replay, beyond which one of them has gone over something."""
-_FINER = 1e-2
-"""Tolerance of a run relative to that of its derivatives: what the adjoint adds to it is about ten times as large."""
-
 
 class SimulationFunction(NamedCallback):
     """y = f(p): simulates with all events; its Jacobian is exact through the events.
 
-    It is that of the replay. `steering` takes the adjoint of the run-time instead, several times as fast; `certain`
-    compares both where a search has ended. Second derivatives are extrapolated differences of the exact Jacobian. The
-    object must live as long as anything built from it. CasADi rewrites an error of the simulation; `refusal` has the
-    original.
+    Both come from one run where the adjoint of the run-time has all of it, elsewhere the Jacobian from a replay. Second
+    derivatives are extrapolated differences of the exact Jacobian. The object must live as long as anything built from
+    it. CasADi rewrites an error of the simulation; `refusal` has the original.
 
     Attributes:
         inputs: paths of the parameters p.
@@ -55,7 +48,7 @@ class SimulationFunction(NamedCallback):
 
     def __init__(
         self, drive: Model, inputs: Sequence[str], outputs: Sequence[str], run: Mapping[str, Any], *,
-        precision: float, any_sequence: bool, nan_where_refused: bool = False, steering: bool = False,
+        precision: float, any_sequence: bool, nan_where_refused: bool = False,
     ) -> None:  # fmt: skip
         super().__init__()
         self.inputs = tuple(inputs)
@@ -68,22 +61,19 @@ class SimulationFunction(NamedCallback):
         self._run = {**run, "parameters": freed.values}
         self.precision = precision
         self._nan_where_refused = nan_where_refused
-        self._agrees = steering
         self._simulated: tuple[bytes, Solution] | None = None
         self._sequence: list[tuple[str, str, str]] | None = None
         self._read = [read_output(self._model, name) for name in outputs]
         end, chosen = plan(self._model, run["until"], options=run["options"])
-        rtol = min(chosen.rtol, precision * _FINER)
-        self._tight = {"until": end, "rtol": rtol, "atol": min(chosen.atol, rtol / 100)}
-        self._options = replace(chosen, rtol=rtol, atol=self._tight["atol"])
+        self._options = tightened(chosen, precision)
+        self._tight = {"until": end, "rtol": self._options.rtol, "atol": self._options.atol}
         self._chosen = chosen_parameters(self._model.with_parameters(dict(freed.values)), inputs)
         self.start_values = np.array([parameter.value for _, parameter in self._chosen])
-        result = self._by_run_time(self.start_values)
+        result, events = self._by_run_time(self.start_values)
         if result is None:
-            self._agrees = False
-            solution = quick_run(self._model, **{**self._run, **self._tight}, readings=outputs)
-            self._sequence = None if any_sequence else mode_sequence(solution.events)
-            result = self._differentiate(solution)
+            solution = self._simulate(self.start_values)
+            result, events = self._replayed(solution), solution.events
+        self._sequence = None if any_sequence else mode_sequence(events)
         self._last = self.start_values.tobytes(), result
         self.runs = 0
         self._second = SecondDerivatives(self, (len(self.outputs), len(self.inputs)))
@@ -91,32 +81,35 @@ class SimulationFunction(NamedCallback):
         dense = ca.Sparsity.dense
         self.declare("simulation", {"p": dense(len(self.inputs))}, {"y": dense(len(self.outputs))})
 
-    def _differentiate(self, solution: Solution) -> Sensitivities:
-        start = self._run.get("start")
-        return sensitivities(solution, self.outputs, self.inputs, start=start, precision=self.precision)
+    def _replayed(self, solution: Solution) -> Sensitivities:
+        kind = self._run["start"] or solution.start
+        chosen = chosen_parameters(solution.model, self.inputs)
+        return replayed(solution, self._read, chosen, start=kind, precision=self.precision, named=True)
 
-    def _by_run_time(self, values: Vector) -> Sensitivities | None:
+    def _by_run_time(self, values: Vector) -> tuple[Sensitivities | None, Sequence[Event]]:
         """Simulate at parameter values with derivatives by the run-time; None where the replay has to tell."""
-        if not self._agrees:
-            return None
         model = self._model.with_parameters(self._given(values))
         kind = self._run["start"] or model.settings.get("start", "given")
         names = [parameter.name for _, parameter in self._chosen]
         result = differentiated_run(model, self._tight["until"], self._options, kind, self._read, names)
-        if result is None or self._sequence not in (None, mode_sequence(result.solution.events)):
-            return None
+        if result is None or np.isnan(result.derivatives).any():
+            return None, ()
+        events = result.solution.events
+        if self._sequence not in (None, mode_sequence(events)):
+            return None, events
         numbers = result.values
         if self._simulated is not None and self._simulated[0] == values.tobytes():
             numbers = self._simulated[1].read(*self.outputs)  # the same name has the same number everywhere
         else:
             self.runs += 1
         fixed = np.concatenate([model.p, model.u])
-        return Sensitivities(
+        differentiated = Sensitivities(
             model.name,
             tuple(Quantity(read.name, float(v), read.unit) for read, v in zip(self._read, numbers, strict=True)),
             tuple(replace(parameter, value=float(fixed[k])) for k, parameter in self._chosen),
             result.derivatives, "adjoint",
         )  # fmt: skip
+        return differentiated, events
 
     def _given(self, values: Vector) -> dict[str, Any]:
         return {**self._run["parameters"], **dict(zip(self.inputs, map(float, values), strict=True))}
@@ -130,26 +123,9 @@ class SimulationFunction(NamedCallback):
         """
         values = np.asarray(p, float).ravel()
         if self._last[0] != values.tobytes():
-            result = self._by_run_time(values)
-            self._last = values.tobytes(), result or self._differentiate(self._simulate(values))
+            result, _ = self._by_run_time(values)
+            self._last = values.tobytes(), result or self._replayed(self._simulate(values))
         return self._last[1]
-
-    def certain(self, p: Vector) -> bool:
-        """Return whether the replay has the same derivatives at parameter values; if not, all come from it now.
-
-        What the replay refuses is not certain; `at` raises its reason then.
-        """
-        if not self._agrees:
-            return True
-        values = np.asarray(p, float).ravel()
-        try:
-            known, replayed = self.at(values), self._differentiate(self._simulate(values))
-        except ModelicaLikeError:
-            self._agrees, self._last = False, (b"", self._last[1])
-            return False
-        self._agrees = _agree(known, replayed)
-        self._last = values.tobytes(), replayed
-        return self._agrees
 
     def values_at(self, p: Vector | Sequence[float]) -> list[float]:
         """Return only the outputs.
@@ -290,26 +266,6 @@ def simulation_function(
     return SimulationFunction(
         drive, inputs, outputs, run, precision=precision, any_sequence=any_sequence, nan_where_refused=nan_where_refused
     )
-
-
-def mode_sequence(events: Sequence[Event]) -> list[tuple[str, str, str]]:
-    """Return mode, name before and name after of all mode changes; those at one instant in alphabetical order."""
-    groups: list[list[Event]] = []
-    for event in events:
-        if not groups or event.time - groups[-1][0].time > _TOGETHER * max(1.0, abs(event.time)):
-            groups.append([])
-        groups[-1].append(event)
-    ordered = (event for group in groups for event in sorted(group, key=lambda transition: transition.mode))
-    return [(event.mode, event.before, event.after) for event in ordered]
-
-
-def _agree(some: Sensitivities, others: Sensitivities) -> bool:
-    """Whether the run-time and the replay have the same derivatives, relative to the largest of each output."""
-    effects = np.array([abs(parameter.value) or 1.0 for parameter in others.parameters])
-    values = np.array([abs(output.value) for output in others.outputs])
-    first, second = some.derivatives * effects, others.derivatives * effects
-    sizes = np.maximum(np.abs(second).max(axis=1), values)
-    return bool(np.all(np.abs(first - second).max(axis=1) <= _AGREE * sizes))
 
 
 def first_difference(expected: Sequence[Any], results: Sequence[Any]) -> tuple[int, str]:

@@ -11,8 +11,8 @@ import numpy as np
 
 from modelica_like.analyse.optimize.sized import Outputs, Sized
 from modelica_like.analyse.optimize.terms import Limit, read_limits
+from modelica_like.analyse.sensitivity.by_run_time import mode_sequence
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
-from modelica_like.analyse.sensitivity.function import mode_sequence
 from modelica_like.analyse.sensitivity.result import Quantity
 from modelica_like.analyse.sweeps.plan import Samples, Sobol
 from modelica_like.analyse.sweeps.sweep import sweep
