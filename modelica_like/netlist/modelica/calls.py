@@ -28,3 +28,12 @@ REFUSED = {
     "backSample": "a clock that follows another",
     "transition": "a state machine", "initialState": "a state machine",
 }  # fmt: skip
+
+
+def wrong_count(name: str, count: int) -> str:
+    """Return that a built-in function does not have so many arguments, in words; empty if it does."""
+    least, most = ARGUMENTS.get(name, (0, count))
+    if least <= count <= most:
+        return ""
+    wanted = f"{least} to {most}" if most > least else str(least)
+    return f"{name}(…) has {wanted} argument{'s' if most != 1 else ''}, not {count}."

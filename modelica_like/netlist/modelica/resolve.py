@@ -8,7 +8,7 @@ from typing import Any
 from modelica_like.errors import ModelicaTextError, did_you_mean
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import algorithms, constants, fold, members
-from modelica_like.netlist.modelica.calls import ARGUMENTS, ELEMENTARY, KEPT, REFUSED
+from modelica_like.netlist.modelica.calls import ARGUMENTS, ELEMENTARY, KEPT, REFUSED, wrong_count
 from modelica_like.netlist.modelica.classes import Classes
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
@@ -68,16 +68,7 @@ class Resolver:
         if kind == "for":
             return self._built(args[0], list(args[1]))
         if kind == "if":
-            kept, otherwise = list[Expr](), args[-1]
-            for condition, value in zip(args[:-1:2], args[1::2], strict=True):
-                choice = self.condition(condition, "if", line)
-                if choice.kind != "boolean":
-                    kept += [choice, self(value)]
-                elif choice.args[0]:
-                    otherwise = value
-                    break
-            last = self(otherwise)
-            return self._told(lambda: fold.choice(kept, last, line), line) if kept else last
+            return self._choice(args, line)
         if kind == "range":
             numbers = [self.number(argument) for argument in args]
             start, step, stop = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
@@ -93,6 +84,19 @@ class Resolver:
             return Expr(kind, values, line)
         values = tuple(value.args[0] if value.kind == "tuple" else value for value in values)
         return self._told(lambda: fold.operation(kind, values, line), line)
+
+    def _choice(self, args: tuple[Expr, ...], line: int) -> Expr:
+        """Resolve an `if`: only the branches that may be taken."""
+        kept, otherwise = list[Expr](), args[-1]
+        for condition, value in zip(args[:-1:2], args[1::2], strict=True):
+            choice = self.condition(condition, "if", line)
+            if choice.kind != "boolean":
+                kept += [choice, self(value)]
+            elif choice.args[0]:
+                otherwise = value
+                break
+        last = self(otherwise)
+        return self._told(lambda: fold.choice(kept, last, line), line) if kept else last
 
     def condition(self, expression: Expr, word: str, line: int) -> Expr:
         """Return the resolved condition of an `if` and the like.
@@ -335,11 +339,8 @@ class Resolver:
         if short == "homotopy":
             others = dict(named)
             given, named = (*given, *(others[key] for key in ("actual", "simplified") if key in others)), ()
-        least, most = ARGUMENTS.get(short, (0, len(given)))
-        if not least <= len(given) <= most:
-            count = f"{least} to {most}" if most > least else str(least)
-            what = f"{short}(…) has {count} argument{'s' if most != 1 else ''}, not {len(given)}."
-            raise ModelicaTextError(what, where=self.text.place(line))
+        if wrong := wrong_count(short, len(given)):
+            raise ModelicaTextError(wrong, where=self.text.place(line))
         if named and short in {*ARGUMENTS, *KEPT, *functions.OF_ARRAYS, *ELEMENTARY}:
             raise ModelicaTextError(f"{short}(…) has no argument '{named[0][0]}'.", where=self.text.place(line))
         if short in (fold.SILENT, fold.ARGUMENT):
@@ -353,12 +354,7 @@ class Resolver:
             value = self(given[1 if short == "smooth" else 0])
             return fold.kept("noEvent", (value,), line)
         if short in KEPT:
-            values = tuple(self(argument) for argument in given)
-            interval = values[-1] if (short, len(values)) in (("sample", 2), ("Clock", 1)) else fold.number(1)
-            if interval.kind == "number" and not interval.args[0] > 0:
-                what = f"{short}(…) needs an interval above 0, not {interval.args[0]:g}."
-                raise ModelicaTextError(what, where=self.text.place(line))
-            return self._told(lambda: fold.each(short, values, line, lambda items: fold.call(short, items, line)), line)
+            return self._kept(short, given, line)
         if short == "size":
             items = self._sized(given[0])
             dimension = self.number(given[1]) if len(given) > 1 else None
@@ -377,6 +373,15 @@ class Resolver:
             if self.numeric:
                 raise ModelicaTextError(error.what, where=error.where) from None
             return self.known()(expression)  # parameters are numbers then, and cannot change afterwards
+
+    def _kept(self, short: str, given: tuple[Expr, ...], line: int) -> Expr:
+        """Resolve a call that only a run has a value of."""
+        values = tuple(self(argument) for argument in given)
+        interval = values[-1] if (short, len(values)) in (("sample", 2), ("Clock", 1)) else fold.number(1)
+        if interval.kind == "number" and not interval.args[0] > 0:
+            what = f"{short}(…) needs an interval above 0, not {interval.args[0]:g}."
+            raise ModelicaTextError(what, where=self.text.place(line))
+        return self._told(lambda: fold.each(short, values, line, lambda items: fold.call(short, items, line)), line)
 
     def _sized(self, expression: Expr) -> Expr:
         """Resolve an array for its size; one of components counts, too."""
