@@ -8,7 +8,7 @@
 enum { N_NODES = LAST_POINTS }; /* of stages: the last ones have one */
 #define DOUBTFUL 1e-9   /* effect of a parameter, by relative changes, on what has no derivative: less is rounding */
 #define MOST_DOUBTFUL 8 /* reasons that are told apart */
-#define MOST_TOUCHES 16 /* in a step */
+#define MOST_TOUCHES 3  /* of a guard in a piece: its polynomial has no more tops */
 #define MOST_LANES 16   /* vectors that go over a tape together */
 
 typedef struct Record { /* a part of a piece along which the run has moved, or an instant */
@@ -78,7 +78,7 @@ struct Gradient {
     double present, cause_speed; /* time from which it goes; of the guard of an event */
     double singular_at, speed;   /* how fast the guard of an event comes to zero, where it matters; or 0 */
     Doubt doubts[MOST_DOUBTFUL];
-    Touch touches[MOST_TOUCHES];    /* of a piece, or an instant */
+    Touch *touches;                 /* of a piece, or an instant */
     int n_touches, measured, lands; /* lands: steps that end at edges, instead of a piece that went over them */
     double *edges;
     double *guard_sizes;      /* if `measured` */

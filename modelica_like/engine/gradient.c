@@ -148,9 +148,9 @@ static double *take_room(const Instance *c, size_t n_of) {
         {&g->rests, rests}, {&g->guard_sizes, (size_t)c->model->n_guards},
         {&g->edges, 3 * (size_t)c->model->tapes.edges.n_outputs},
         {&g->lanes, (vectors < MOST_LANES ? vectors : MOST_LANES) * c->n_bars}};
-    size_t total = 0;
+    size_t total = 0, touches = MOST_TOUCHES * (size_t)c->model->n_guards * (sizeof(Touch) / sizeof(double));
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) total += parts[k].size;
-    double *room = c->allocate(total + 2 * n + vectors + 3 * operations, sizeof(double));
+    double *room = c->allocate(total + 2 * n + vectors + 3 * operations + touches, sizeof(double));
     double *next = room;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0] && room != NULL; next += parts[k++].size)
         *parts[k].array = next;
@@ -159,6 +159,7 @@ static double *take_room(const Instance *c, size_t n_of) {
     g->still = (unsigned char *)(void *)(next + 2 * n);
     g->kinked = (Kink *)(void *)(next + 2 * n + vectors);
     g->kinks = (Kink **)(void *)(g->kinked + operations);
+    g->touches = (Touch *)(void *)(next + 2 * n + vectors + 3 * operations);
     return room;
 }
 

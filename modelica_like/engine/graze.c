@@ -167,7 +167,7 @@ static void note_touches(Instance *c, double begin, const double *before, double
     Gradient *g = c->gradient;
     double brief = SHORT * (c->piece->end - c->piece->begin);
     int n = c->model->n_guards, corner = end - begin <= brief;
-    for (int k = 0; k < n && g->n_touches < MOST_TOUCHES; k++) {
+    for (int k = 0; k < n && g->n_touches < MOST_TOUCHES * n; k++) {
         double first = before[k], last = after[k], size = max_of(fabs(first), fabs(last));
         double rise = (end - begin) * before[n + k], fall = (end - begin) * after[n + k];
         if (!guard_active(c, k) || size <= AT_EDGE) continue;
@@ -254,7 +254,7 @@ int find_touches_at(Instance *c, const Record *at, double rate) {
     evaluate_now(c, &m->tapes.guards, behind);
     state_copy_in(c, at->before);
     evaluate_now(c, &m->tapes.guards, before);
-    for (int k = 0; k < m->n_guards && g->n_touches < MOST_TOUCHES; k++) {
+    for (int k = 0; k < m->n_guards; k++) {
         int mode = m->transitions[m->guard_transition[k]].mode, n = m->n_guards + k, fires = 0;
         for (int round = 0; round < at->n_rounds; round++)
             fires |= at->rounds[round * m->n_transitions + m->guard_transition[k]];
