@@ -9,7 +9,6 @@ from modelica_like.errors import (
     ContradictingStart,
     ModelicaLikeError,
     NetlistError,
-    SingularAtStart,
     UnitError,
     UnknownName,
     ValueOutOfRange,
@@ -86,10 +85,12 @@ T must be a finite number, not inf.
     "a parameter of a part that is out of range": (ValueOutOfRange, ('"0.1 kg.m2"', '"(z - 1)*1 kg.m2"'), """\
 a.J = -1 is out of range: it must be at least 0 kg.m2.
   in d.toml:7 `a = { is = "Inertia", J = "(z - 1)*1 kg.m2" }`"""),
-    "an inertia of zero": (SingularAtStart, ('"0.1 kg.m2"', "0"), """\
-The derivative of a.w is not finite at t = 0 s.
-  in d.toml:7 `a = { is = "Inertia", J = 0 }`
-Look for a mass, inertia or ratio of zero, or a function outside its domain."""),
+    "an inertia of zero, which has no speed of its own": (ContradictingStart, ('"0.1 kg.m2"', "0"), """\
+a.w = 0 and s.phi_rel = 0 and b.w = 0 contradict each other: b.w would be -10.
+  in d.toml:13 `"a.w" = "0 rpm"`
+  in d.toml:14 `"s.phi_rel" = 0`
+  in d.toml:9 `b = { is = "Inertia", J = "0.2 kg.m2", w = 0 }`
+Remove one of the start values, or make one a guess."""),
 }  # fmt: skip
 
 

@@ -61,12 +61,13 @@ class Designs(Bounded, ABC):
         told: called after each design.
 
     Attributes:
+        told: what counts designs; it may interrupt.
         designs: in the order in which they were tried.
         refusals: designs at which a run fails or has no derivative, and the reasons.
     """
 
     def __init__(self, free: tuple[Free, ...], told: Callable[[], None]) -> None:
-        self.free, self._told = free, told
+        self.free, self.told = free, told
         self.designs: list[Design] = []
         self.refusals: list[tuple[Vector, ModelicaLikeError]] = []
         self._known: dict[bytes, Design | ModelicaLikeError] = {}
@@ -93,7 +94,7 @@ class Designs(Bounded, ABC):
             self.refusals.append((x, error))
             return error
         self.designs.append(design)
-        self._told()
+        self.told()
         return design
 
     def from_starts(self, starts: Sequence[Vector], search: Callable[[Vector], Outcome]) -> list[Outcome]:

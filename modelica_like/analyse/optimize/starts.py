@@ -20,12 +20,16 @@ from modelica_like.compile.buffers import Vector
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.runs.readings import read_output
 
+_EACH = 16
+"""Points for each start at most: a search takes about as many runs with derivatives."""
+_CHUNK = 32
+"""Points that are run before they are counted, so that an interrupt does not wait."""
 _APART = 0.5
 """Distance of two starts, relative to that of as many points spread evenly between the bounds."""
 
 
 def promising_starts(runs: Runs, scale: Scale, number: int, seed: int) -> list[Vector]:
-    """Return starts in SI units: the drive as it is, and the best of the square of as many points that are apart.
+    """Return starts in SI units: the drive as it is, and the best of many points that are apart.
 
     Args:
         runs: of the problem; they are counted there.
@@ -34,7 +38,8 @@ def promising_starts(runs: Runs, scale: Scale, number: int, seed: int) -> list[V
         seed: of the Latin hypercube between the bounds.
     """
     problem = runs.problem
-    points = np.array([_in_order(problem, x) for x in starts_of(problem.free, number**2, seed)])
+    count = number * min(number, _EACH)
+    points = np.array([_in_order(problem, x) for x in starts_of(problem.free, count, seed)])
     values = _outputs(runs, points[1:]) if number > 1 else None
     if values is None:  # there is no run-time for it
         return [*points[:number]]
@@ -71,11 +76,23 @@ def _outputs(runs: Runs, points: Vector) -> Vector | None:
         for c, case in enumerate(problem.cases):
             model = problem.model.with_parameters(dict(case.values))
             native = NativeRuns(model, names, [read_output(model, name) for name in alone.read], given)
-            chunks = np.array_split(points, min(len(points), 4 * cores()))
-            with ThreadPoolExecutor(cores()) as pool:
-                numbers = np.vstack([done[0] for done in pool.map(native.run, chunks)])
-            values[:, c] = alone.of_runs.values(numbers)[:, alone.places]
+            values[:, c] = alone.of_runs.values(_in_threads(runs, native, points))[:, alone.places]
     except ModelicaLikeError:
         return None
     runs.others += len(points) * len(problem.cases)
     return values
+
+
+def _in_threads(runs: Runs, native: NativeRuns, points: Vector) -> Vector:
+    """Return what native runs at points read, and count them."""
+    chunks = np.array_split(points, -(-len(points) // _CHUNK))
+    numbers: list[Vector] = []
+    pool = ThreadPoolExecutor(cores())
+    try:
+        for done in pool.map(native.run, chunks):
+            numbers.append(done[0])
+            for _ in done[0]:
+                runs.told()
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return np.vstack(numbers)
