@@ -8,6 +8,7 @@
 enum { N_NODES = LAST_POINTS }; /* of stages: the last ones have one */
 #define DOUBTFUL 1e-9   /* effect of a parameter, by relative changes, on what has no derivative: less is rounding */
 #define MOST_DOUBTFUL 8 /* reasons that are told apart */
+#define CLOSER 0.01     /* the part of a way where a kink or jump is as large */
 #define MOST_TOUCHES 3  /* of a guard in a piece: its polynomial has no more tops */
 #define MOST_LANES 16   /* vectors that go over a tape together */
 

@@ -20,8 +20,8 @@ _ENGINE = Path(__file__).parents[1] / "engine"
 RUNTIME = (
     "model.c", "resources.c", "tape.c", "special.c", "code.c", "linear.c", "start.c", "steady.c", "holds.c",
     "impacts.c", "ideal.c", "events.c", "crowd.c", "resets.c", "panels.c", "locate.c", "edges.c", "integrate.c",
-    "fixed.c", "values.c", "delay.c", "derivatives.c", "series.c", "adjoint.c", "kinks.c", "graze.c", "integrals.c",
-    "instants.c", "gradient.c", "instance.c",
+    "fixed.c", "values.c", "delay.c", "derivatives.c", "series.c", "adjoint.c", "kinks.c", "meetings.c", "graze.c",
+    "integrals.c", "instants.c", "gradient.c", "instance.c",
 )  # fmt: skip
 LOG_CATEGORIES = {
     "logStatusError": "errors: what went wrong, where, and what to do",
