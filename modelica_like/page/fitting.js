@@ -115,7 +115,7 @@ function showBest(answer, there, fits) {
   at("dialog").onclose = null;
   const words = answer.failed ?? answer.about, stale = answer.text && !fits
     ? [element("p", { className: "refused" }, "The netlist has changed since, and stays as it is.")] : [];
-  at("dialog").replaceChildren(element("h2", {}, "Best design"), element("pre", { className: "scroll" }, words), ...stale,
+  at("dialog").replaceChildren(element("h2", {}, "Best design"), element("div", { className: "page scroll" }, element("pre", {}, words)), ...stale,
     element("div", { className: "row" }, ...answer.text && fits ? [other] : [], close));
 }
 
