@@ -3,11 +3,11 @@
  * event would change less than the square of the time that it lasts, as a spring does that begins without a force. */
 #include "adjoint.h"
 
-#define ACCURACY 10    /* tolerances of its states by which a guard may be wrong */
-#define ROUNDING 1e-13 /* of its terms */
-#define FLAT 1e-9      /* of a guard: a smaller change over a step is none */
-#define SHORT 1e-9     /* of a piece: no more than an edge between two looks */
-#define BACK 1e-2      /* of a piece: how far before the touch its event is tried, and a tenth of it */
+#define ACCURACY 10             /* tolerances of its states by which a guard may be wrong */
+#define ROUNDING_OF_TERMS 1e-13 /* of its terms */
+#define FLAT 1e-9               /* of a guard: a smaller change over a step is none */
+#define SHORT 1e-9              /* of a piece: no more than an edge between two looks */
+#define BACK 1e-2               /* of a piece: how far before the touch its event is tried, and a tenth of it */
 #define NEARER 0.1
 #define BESIDE 1e-3        /* of the run: a guard that is farther from zero by its rate is not looked at */
 #define NOTHING_FELT 1e-12 /* of what outputs feel of states: rounding */
@@ -48,7 +48,7 @@ static void measure_guards(Instance *c) {
 static double uncertainty(const Instance *c, int guard, const double *slope) {
     double terms = fabs(slope[c->n_smooth]) * max_of(1, fabs(c->state.t));
     for (size_t n = 0; n < c->n_smooth; n++) terms += fabs(slope[n] * c->numbers[n]);
-    return ACCURACY * c->state.tolerance * c->gradient->guard_sizes[guard] + ROUNDING * terms;
+    return ACCURACY * c->state.tolerance * c->gradient->guard_sizes[guard] + ROUNDING_OF_TERMS * terms;
 }
 
 /* Goes to a time of a piece, in the modes of a copy. */

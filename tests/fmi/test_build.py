@@ -126,7 +126,7 @@ def test_zig_exports_the_fmi_functions_only_and_needs_an_old_glibc(monkeypatch, 
     assert len(declared) == count
     assert newest_glibc(library) <= (2, 17)
     # Its compiler unrolls the solver of dense systems wherever it is used.
-    assert library.stat().st_size < 460_000
+    assert library.stat().st_size < 500_000
 
 
 @pytest.mark.slow

@@ -188,7 +188,7 @@ def test_a_library_is_built_once(nothing_built):
     assert list(library.parent.iterdir()) == [library]
     assert runtime_library(NATIVE, said.append) == library
     assert said == [f"compiling the run-time for {NATIVE}, once"]
-    assert library.stat().st_size < 300_000  # every FMU carries one
+    assert library.stat().st_size < 330_000  # every FMU carries one
 
 
 @pytest.mark.slow

@@ -55,7 +55,8 @@ def sensitivities(
             Parameters with a formula are decoupled from it, but still follow it where other parameters change.
         until: end time, as in `simulate`.
         parameters: other values of parameters, as in `simulate`.
-        method: `forward` (cost grows with the parameters), `adjoint` (with the outputs), or `auto` (the cheaper one).
+        method: `auto`: back along a native run, and a replay where that does not tell. `forward` (cost grows with the
+            parameters) and `adjoint` (with the outputs) are those of the replay.
         start: kind of start, as in `simulate`; by default, that of the run or of the netlist.
         options: as in `simulate`.
         precision: relative tolerance of the steps of the replay.
@@ -85,7 +86,7 @@ def sensitivities(
     outputs = [read_output(model, name) for name in of]
     chosen = chosen_parameters(model, to)
     result = None
-    if method != "forward" and not any(output.kind == "series" for output in outputs):
+    if method == "auto" and not any(output.kind == "series" for output in outputs):
         result = _along_the_run(solution, outputs, chosen, freed, start, precision)
     certain = [k for k in range(len(chosen)) if result is not None and np.all(np.isfinite(result.derivatives[:, k]))]
     if result is not None and len(certain) == len(chosen):
