@@ -39,6 +39,10 @@ BUS = (
     "connector U = input Real; connector Y = output Real; expandable connector B end B; block G U u; end G; "
     "block S Y y = 1; end S;"
 )
+NESTED = (
+    "connector Y = output Real; expandable connector I end I; expandable connector B I sub; end B; "
+    "block S Y y = 1; end S;"
+)
 ENDLESS = "while true loop y := 1; end while"
 GROWING = "function f input Real u; output Real y; algorithm y := u; for i in 1:60 loop y := y*y + y; end for; end f;"
 LESS = (
@@ -74,6 +78,11 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("B bus; S s;", "connect(bus.sub.x, s.y);", BUS),
         "There is no connector bus.sub.\n  in a.mo:5 `connect(bus.sub.x, s.y);`\n"
         "Declare it in the class of the bus, or join it with a connector.",
+    ),
+    "a bus and one that is in it": (
+        model("B bus; S s;", "connect(bus, bus.sub);\nconnect(bus.sub.x, s.y);", NESTED),
+        f"A bus is joined with one that is in it.\n  in a.mo:1 `{NESTED}`\n"
+        "Connect it with a bus that stands beside it.",
     ),
     "transport": (
         model("Real x; Real y;", "(x, y) = spatialDistribution(time, 0, time, true);"),

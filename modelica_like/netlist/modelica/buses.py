@@ -176,7 +176,10 @@ class _Buses:
                 return {bus: wire.ends for wire in wires for bus in wire.ends}
             buses |= more
         bus = next(iter(self.buses.values()))
-        raise ModelicaTextError("A bus is joined with one that is in it.", where=bus.text.place(bus.text.line))
+        raise ModelicaTextError(
+            "A bus is joined with one that is in it.", where=bus.text.place(bus.text.line),
+            advice="Connect it with a bus that stands beside it.",
+        )  # fmt: skip
 
     def _add_buses(self, same: dict[str, list[str]]) -> None:
         """Declare the buses within buses that only those have that they are joined with."""
