@@ -369,9 +369,6 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
             if (c->integrator != NULL) far = min_of(far, next_moment(c, 0));
             if (!(c->integrator != NULL ? take_given(c, limit, far) : take_step(c, limit))) return FAILED;
         }
-        /* An event was located a rounding error behind the target. */
-        if (s->event_pending && c->piece->end > target && c->piece->end - target < least_step(s))
-            c->piece->end = target;
         if (c->piece->end > target) return move_to(c, target) ? REACHED : FAILED;
         keep_piece(c, c->piece->end);
         if (!move_to(c, c->piece->end)) return FAILED;

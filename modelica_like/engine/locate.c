@@ -6,7 +6,6 @@
 #define DEPTH 6     /* divisions of a step in which guards do not behave */
 #define BEHAVES 0.05
 #define LOCATED 1e-13
-#define BEYOND 1e-15 /* events are where their guards are positive, else what comes to rest there would fall back */
 #define MAX_TRIALS 60
 #define NEAR 0.1
 #define ROUNDING_OF_STATES 1e-14
@@ -155,15 +154,12 @@ static int locate(Instance *c, const Look *before, const Look *after, Look *look
         if (c->kinds[g] != QUIET) t = min_of(t, guess(before, after, g));
     t = min_of(t, last);
     for (int rough = 1; rough >= 0; rough--) {
-        double low = before->t, high = last, beyond = BEYOND / LOCATED * tolerance;
+        double low = before->t, high = last;
         for (int n = 0; n < MAX_TRIALS; n++) {
             if (!(rough ? look_inside(c, t, 1, look) : step_to(c, t, look))) return 0;
-            positive = newton(c, look, &step);
-            *(positive ? &high : &low) = t;
-            int near = fabs(step) <= tolerance;
-            if (near && positive && !rough) return 1;
-            if ((near && rough) || high - low <= tolerance) break;
-            if (near) step += beyond *= 2;
+            *(newton(c, look, &step) ? &high : &low) = t;
+            if (fabs(step) <= tolerance && !rough) return 1;
+            if (fabs(step) <= tolerance || high - low <= tolerance) break;
             t = t + step > low && t + step < high ? t + step : 0.5 * (low + high);
         }
         last = rough ? last : high;
