@@ -39,7 +39,7 @@ BUS = (
     "connector U = input Real; connector Y = output Real; expandable connector B end B; block G U u; end G; "
     "block S Y y = 1; end S;"
 )
-NESTED = (
+BUS_IN_BUS = (
     "connector Y = output Real; expandable connector I end I; expandable connector B I sub; end B; "
     "block S Y y = 1; end S;"
 )
@@ -80,8 +80,8 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "Declare it in the class of the bus, or join it with a connector.",
     ),
     "a bus and one that is in it": (
-        model("B bus; S s;", "connect(bus, bus.sub);\nconnect(bus.sub.x, s.y);", NESTED),
-        f"A bus is joined with one that is in it.\n  in a.mo:1 `{NESTED}`\n"
+        model("B bus; S s;", "connect(bus, bus.sub);\nconnect(bus.sub.x, s.y);", BUS_IN_BUS),
+        f"A bus is joined with one that is in it.\n  in a.mo:1 `{BUS_IN_BUS}`\n"
         "Connect it with a bus that stands beside it.",
     ),
     "transport": (
