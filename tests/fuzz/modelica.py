@@ -28,7 +28,7 @@ WORDS = (
     parameter constant flow stream input output inner outer replaceable redeclare constrainedby each final public
     protected import within annotation connect assert terminate time true false and or not enumeration external
     operator partial discrete StateSelect.prefer start fixed unit displayUnit Clock previous hold delay initial()
-    connectorSizing scalar vector ones semiLinear integer ceil rem cardinality terminal() delay(x,1)""".split(),  # noqa: SIM905
+    connectorSizing scalar vector ones expandable Icon Placement visible extent points xorshift128plus semiLinear integer ceil rem cardinality terminal() delay(x,1)""".split(),  # noqa: SIM905
     "0", "1", "-1", "2.5", "1e400", "1e-400", "100000000", "1:0:2", "1:3", "[1]", "[end]", "[:]", "[1, 2; 3]", "{}",
     "{1}", "{1, {2}}", "{i for i in 1:3}", "(", ")", "((((", "{", "}", "[", "]", ";", ",", ".", "=", ":=", "+", "-",
     "*", "/", "^", ".*", "<", "<=", "==", "<>", '"', '"x"', "'", "'q'", "/*", "//", "*/", "\\", "$", "é", "\0", "\r",
@@ -39,7 +39,7 @@ _TOKEN = re.compile(r"\s+|[\w.]+|.", re.DOTALL)
 @cache
 def texts() -> list[str]:
     """Return texts of this repository, of written examples, and of the standard library where it is at hand."""
-    found = [path.read_text(encoding="utf-8") for path in sorted((HERE.parent / "modelica_text").glob("*.mo"))]
+    found = [path.read_text(encoding="utf-8") for path in sorted((HERE.parent / "modelica_text").rglob("*.mo"))]
     found += [path.read_text(encoding="utf-8") for path in sorted((SHARED / "repros").glob("*.mo"))]
     library = sorted((SHARED / "modelica_text" / "Modelica" / "Mechanics").rglob("*.mo"))
     found += [text for path in library if len(text := path.read_text(encoding="utf-8")) < LARGEST][::3]
