@@ -149,13 +149,19 @@ def test_a_class_that_draws_nothing_is_a_box(tmp_path: Path) -> None:
 
 BROKEN = ["Line(points = {{0, 0}})", "Line(points = 3)", "Rectangle(extent = {{0, 0}, {0, 0}})", "Text(textString = 3)",
           "Ellipse(extent = {1, 2})", "Line(points = {{0, 0}, {1e999, 0}})", "1", "Polygon()",
-          "Rectangle(extent = {{0, 0}, {9, 9}}, visible = nothing)"]  # fmt: skip
+          "Rectangle(extent = {{0, 0}, {9, 9}}, visible = nothing)", "Line(points = {{0, -sin()}, {9, 9}})"]  # fmt: skip
 
 
 @pytest.mark.parametrize("graphics", BROKEN)
 def test_what_cannot_be_drawn_is_left_out(graphics: str, tmp_path: Path) -> None:
     component = drive(tmp_path, graphics)
     assert "</svg>" in schematic(component)
+
+
+@pytest.mark.parametrize("extent", ["{{0, 0}, {100, 0}}", "{{7, -20}, {7, 30}}"])
+def test_a_sheet_without_height_or_width_is_drawn(extent: str, tmp_path: Path) -> None:
+    before = f"coordinateSystem(extent = {extent}), "
+    assert "</svg>" in schematic(drive(tmp_path, "Line(points = {{0, 0}, {9, 9}})", before=before))
 
 
 def test_symbols_and_names_do_not_meet(tmp_path: Path) -> None:

@@ -28,7 +28,9 @@ WORDS = (
     parameter constant flow stream input output inner outer replaceable redeclare constrainedby each final public
     protected import within annotation connect assert terminate time true false and or not enumeration external
     operator partial discrete StateSelect.prefer start fixed unit displayUnit Clock previous hold delay initial()
-    connectorSizing scalar vector ones expandable Icon Placement visible extent points xorshift128plus semiLinear integer ceil rem cardinality terminal() delay(x,1)""".split(),  # noqa: SIM905
+    connectorSizing scalar vector ones
+    expandable semiLinear integer ceil rem cardinality terminal() delay(x,1)""".split(),  # noqa: SIM905
+    "Icon", "Placement", "visible", "extent", "points", "xorshift128plus",
     "0", "1", "-1", "2.5", "1e400", "1e-400", "100000000", "1:0:2", "1:3", "[1]", "[end]", "[:]", "[1, 2; 3]", "{}",
     "{1}", "{1, {2}}", "{i for i in 1:3}", "(", ")", "((((", "{", "}", "[", "]", ";", ",", ".", "=", ":=", "+", "-",
     "*", "/", "^", ".*", "<", "<=", "==", "<>", '"', '"x"', "'", "'q'", "/*", "//", "*/", "\\", "$", "é", "\0", "\r",

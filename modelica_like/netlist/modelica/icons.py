@@ -17,7 +17,7 @@ from modelica_like.netlist.modelica.instance import Instance
 from modelica_like.netlist.modelica.parse import parse_tokens
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tokens import Token
-from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, names_in
+from modelica_like.netlist.modelica.tree import ClassText, Declaration, Expr, calls_in, names_in
 
 _LARGE = 56.0
 """Length of the longer side of a symbol, in 1/96 inch: about that of the symbols of components."""
@@ -92,8 +92,8 @@ def _drawn(instance: Instance) -> _Drawn:
     layers = [(text, _annotation(text.icon)) for text in instance.lineage if text.icon]
     boxes = [box for _, layer in layers if (box := _box(_dict(layer.get("coordinateSystem")).get("extent")))]
     (west, low), (east, high) = boxes[-1] if boxes else ((-100.0, -100.0), (100.0, 100.0))
-    half = abs(east - west) / 2, abs(high - low) / 2
-    sheet = _Sheet(((west + east) / 2, (low + high) / 2), half, _LARGE / (2 * max(*half, 1.0)))
+    half = max(abs(east - west) / 2, 1.0), max(abs(high - low) / 2, 1.0)  # one unit where there is no extent
+    sheet = _Sheet(((west + east) / 2, (low + high) / 2), half, _LARGE / (2 * max(half)))
     shapes: list[tuple[Any, tuple[Figure, ...], ClassText]] = []
     keys: list[str] = []
     for text, layer in layers:
@@ -159,7 +159,7 @@ def _plain(node: Expr) -> Any:
     if kind == "call":
         inner = {each.args[0]: _plain(each) for each in args[1] if each.kind == "call"}
         return {"": args[0], **inner, **{name: _plain(value) for name, value in args[2]}}
-    if not any(True for _ in names_in(node)):
+    if next(names_in(node), None) is None and next(calls_in(node), None) is None:
         with suppress(fold.Unfit, ModelicaLikeError, ArithmeticError):
             return fold.known(node).args[0]
     return node
