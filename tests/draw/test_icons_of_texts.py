@@ -149,7 +149,8 @@ def test_a_class_that_draws_nothing_is_a_box(tmp_path: Path) -> None:
 
 BROKEN = ["Line(points = {{0, 0}})", "Line(points = 3)", "Rectangle(extent = {{0, 0}, {0, 0}})", "Text(textString = 3)",
           "Ellipse(extent = {1, 2})", "Line(points = {{0, 0}, {1e999, 0}})", "1", "Polygon()",
-          "Rectangle(extent = {{0, 0}, {9, 9}}, visible = nothing)", "Line(points = {{0, -sin()}})"]  # fmt: skip
+          "Rectangle(extent = {{0, 0}, {9, 9}}, visible = nothing)", "Line(points = {{0, -sin()}})",
+          "Line(points = {{0, -{}}, {1, 1}})"]  # fmt: skip
 
 
 @pytest.mark.parametrize("graphics", BROKEN)

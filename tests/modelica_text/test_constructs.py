@@ -357,3 +357,13 @@ def test_arrays_of_records_are_given_with_names(tmp_path):
     result = run(tmp_path, RECORDS, 6.0)
     assert [result[f"s.e[{k}].x"][-1] for k in (1, 2)] == pytest.approx([1 - np.exp(-2), 1 - np.exp(-1)])
     assert result["left"][-1] == pytest.approx(2 - 0.4 - 0.2)
+
+
+@pytest.mark.parametrize(
+    "annotation", ["experiment", "experiment StopTime = 1", "experiment, Icon", "Icon, experiment(3)"]
+)
+def test_annotations_that_say_nothing_are_skipped(annotation: str, tmp_path: Path) -> None:
+    text = (
+        f"model A\n  Real x(start = 1, fixed = true);\nequation\n  der(x) = -x;\n  annotation({annotation});\nend A;\n"
+    )
+    assert run(tmp_path, text)["x"][-1] == pytest.approx(np.exp(-1), rel=1e-6)

@@ -161,7 +161,8 @@ def _plain(node: Expr) -> Any:
         return {"": args[0], **inner, **{name: _plain(value) for name, value in args[2]}}
     if next(names_in(node), None) is None and next(calls_in(node), None) is None:
         with suppress(fold.Unfit, ModelicaLikeError, ArithmeticError):
-            return fold.known(node).args[0]
+            value = fold.known(node)
+            return value.args[0] if value.kind in fold.KNOWN else node
     return node
 
 

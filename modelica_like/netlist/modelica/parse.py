@@ -315,7 +315,8 @@ class _Parser(Expressions):
         class_text.icon = self.part(parts, "Icon") or class_text.icon
         if "experiment" in parts:
             end, self.at = self.at, parts["experiment"].start
-            for name, value in self.expression().args[2]:
+            experiment = self.expression()
+            for name, value in experiment.args[2] if experiment.kind == "call" else ():
                 number, sign = (value.args[0], -1.0) if value.kind == "neg" else (value, 1.0)
                 if number.kind == "number":
                     class_text.experiment[name] = sign * number.args[0]
