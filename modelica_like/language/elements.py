@@ -9,6 +9,7 @@ from typing import Any, cast
 import casadi as ca
 import numpy as np
 
+from modelica_like.errors import LanguageError
 from modelica_like.language.expr import Expr, Scalar
 
 _NAME = "element_of_{}"
@@ -25,7 +26,15 @@ def element(values: Sequence[float], index: Scalar) -> Expr:
         values: the numbers, at least one; they are data, no parameters.
         index: from 0; below and beyond, the first and last element count. Between whole numbers that below counts: if
             it moves, they are events.
+
+    Raises:
+        LanguageError: there are no values, or they are no numbers.
     """
+    if len(values) == 0 or not all(isinstance(value, int | float | np.number) for value in values):
+        raise LanguageError(
+            "element takes a list of numbers, at least one.",
+            advice="Of expressions, `where` chooses one; of a table over a variable, `interpolate` is the value.",
+        )
     data = np.asarray(values, float)
     number = int.from_bytes(hashlib.sha256(data.tobytes()).digest()[:8], "big") >> (64 - _BITS)
     if number not in _LISTS:

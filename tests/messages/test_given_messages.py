@@ -21,6 +21,8 @@ from modelica_like.errors import (
     ValueOutOfRange,
     WiringErrors,
 )
+from modelica_like.language import element
+from modelica_like.language.expr import TIME
 from modelica_like.netlist import loads
 
 BRAKE = """[parts]
@@ -114,6 +116,12 @@ Write alpha20, with the same value."""),
     "a list of tuples as a drive": (LanguageError, lambda: build(cast(Any, [("a", Fixed())])), """\
 Something of type list is no drive: write a component, a built model, or a netlist's path.
 Parts become a drive as Assembly(parts={"motor": …, "load": …}, series={"shaft": ["motor", "load"]})."""),
+    "an element of no list": (LanguageError, lambda: element([], 0.0), """\
+element takes a list of numbers, at least one.
+Of expressions, `where` chooses one; of a table over a variable, `interpolate` is the value."""),
+    "an element of expressions": (LanguageError, lambda: element([1.0, cast(Any, TIME)], 0.0), """\
+element takes a list of numbers, at least one.
+Of expressions, `where` chooses one; of a table over a variable, `interpolate` is the value."""),
     "a class as a drive": (LanguageError, lambda: build(cast(Any, Fixed)), """\
 Fixed is a class, not a drive.
 Create one: Fixed(…)."""),
