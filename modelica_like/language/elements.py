@@ -30,7 +30,9 @@ def element(values: Sequence[float], index: Scalar) -> Expr:
     Raises:
         LanguageError: there are no values, or they are no numbers.
     """
-    if len(values) == 0 or not all(isinstance(value, int | float | np.number) for value in values):
+    # Whoever does not check types may hand in anything.
+    given = list[object](values)
+    if len(given) == 0 or not all(isinstance(value, int | float | np.number) for value in given):
         raise LanguageError(
             "element takes a list of numbers, at least one.",
             advice="Of expressions, `where` chooses one; of a table over a variable, `interpolate` is the value.",
