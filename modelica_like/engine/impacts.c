@@ -92,16 +92,23 @@ static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
     }
 }
 
-static void book(Instance *c, const Strike *strike, int first) {
+/* Energy that each motion loses which is held. One that moved apart is hit by another first, and its own impulse begins
+ * when it has stopped: what the mean of its speeds would give it comes off what the others lose. */
+static void book(Instance *c, Strike *strike, int first) {
+    const Model *m = c->model;
     const double *after = variables_now(c);
-    int any = 0;
-    for (int k = 0; k < c->model->n_holds; k++) {
-        double energy = 0.5 * (strike->before[k] + after[c->model->holds[k].motion]) * strike->impulse[k];
-        if (!strike->held[k] || strike->approach[k] == 0 || energy == 0) continue;
-        if (!any) c->struck(c, -1, 0, first);
-        c->struck(c, k, energy, 0);
-        any = 1;
+    double *energy = strike->energy, lost = 0, given = 0;
+    for (int k = 0; k < m->n_holds; k++) {
+        energy[k] = strike->held[k] && strike->approach[k] != 0
+                        ? 0.5 * (strike->before[k] + after[m->holds[k].motion]) * strike->impulse[k]
+                        : 0;
+        lost += max_of(energy[k], 0);
+        given += max_of(-energy[k], 0);
     }
+    if (lost <= given) return;
+    c->struck(c, -1, 0, first);
+    for (int k = 0; k < m->n_holds; k++)
+        if (energy[k] > 0) c->struck(c, k, energy[k] * ((lost - given) / lost), 0);
 }
 
 /* Carries out the impact; `loose` then tells what was knocked loose, bounces, or was moved in passing. */

@@ -77,7 +77,8 @@ enum { N_SPECIALS = 7, N_SETS = 256, MORE_SETS = 9, MORE_OPERATIONS = 1 << 16 };
 #define FIELD(name, size) *name
 
 /* An impact: of all motions that modes hold, and its jump of the states; `knocked` is let go in the impact itself. */
-#define STRIKE_NUMBERS(A) A(before, holds), A(approach, holds), A(impulse, holds), A(reaction, holds), A(jump, n)
+#define STRIKE_NUMBERS(A) \
+    A(before, holds), A(approach, holds), A(impulse, holds), A(reaction, holds), A(jump, n), A(energy, holds)
 #define STRIKE_MARKS(A) A(entering, holds), A(loose, holds), A(held, holds), A(knocked, holds)
 typedef struct {
     double STRIKE_NUMBERS(FIELD);

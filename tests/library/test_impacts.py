@@ -1,6 +1,6 @@
 """Impacts: momentum is conserved, and what is lost stands where it was lost."""
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -365,3 +365,21 @@ def test_a_bar_lands_on_one_stop(solver: str) -> None:
     impulse = (1 + 0.5) * 2 / (1 / 3 + 1)
     assert run.final["right"] == pytest.approx(-2 + impulse / 3 - impulse, rel=1e-9)
     assert run.final["left"] == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("solver", get_args(Solver))
+def test_nothing_that_is_struck_gives_energy(seed: int, solver: Solver) -> None:
+    """Freewheels in both directions between any two of three wheels: each loses, together what the wheels have lost."""
+    rng = np.random.default_rng(seed)
+    masses, speeds = rng.integers(1, 4, 3), rng.integers(-4, 5, 3)
+    wheels = {f"J{k}": Inertia(J=float(masses[k]), phi=0, w=float(speeds[k])) for k in range(3)}
+    pairs = [rng.choice(3, 2, replace=False) for _ in range(3)]
+    series = {f"s{k}": (f"J{a}", f"f{k}", f"J{b}") for k, (a, b) in enumerate(pairs)}
+    freewheels: dict[str, Component] = {f"f{k}": Freewheel() for k in range(3)}
+    drive = simulate(Assembly("drive", parts=wheels | freewheels, series=series), 0.1, solver=solver)
+    after = [drive.final[f"J{k}.w"] for k in range(3)]
+    assert masses @ after == pytest.approx(masses @ speeds, abs=1e-9)
+    assert all(impact.energy > 0 for impact in drive.impacts)
+    lost = float(0.5 * masses @ (speeds**2 - np.square(after)))
+    assert sum(impact.energy for impact in drive.impacts) == pytest.approx(lost, abs=1e-8)
