@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import CyclicAssembly, MissingValue, UnitError, UnitMismatch, ValueOutOfRange
+from modelica_like.errors import CyclicAssembly, MissingValue, UnitError, UnitMismatch, UnknownName, ValueOutOfRange
 from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.dimensions import expect_unit
 from modelica_like.flatten.model import FlatParameter
@@ -17,7 +17,7 @@ from modelica_like.flatten.template import column
 from modelica_like.language.assembly import Assembly
 from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
-from modelica_like.language.fields import Input, Parameter, Value
+from modelica_like.language.fields import Input, Parameter, Value, Variable
 from modelica_like.language.inside import inside
 from modelica_like.language.scopes import scope_for, scopes_of
 from modelica_like.language.units import ANY, Unit, coherent, read_quantity
@@ -138,6 +138,11 @@ class Parameters:
         owner_path, _, name = path.rpartition(".")
         owner = scope_for(scopes, path).find(owner_path)
         field = owner.fields.get(name)
+        if isinstance(field, Variable) and not isinstance(field, Input):
+            raise UnknownName(
+                f"{label}: {path} is no parameter: it changes over time, and a value does not.",
+                advice=f'If {label} is an input, connect them: name = ["{path}", "{label}"] in [connect].',
+            )
         if not isinstance(field, Parameter | Input):
             names = [key for key, f in owner.fields.items() if isinstance(f, Parameter)]
             raise unknown("parameter", f"{label}: {owner.label}", path, names, {path: owner.renamed.get(name, "")})

@@ -41,6 +41,11 @@ PUSH = '  in bench.toml:7 `push = { is = "Torque" }`'
             {"a": '"2 kg.m2"', "w": '"exp(a)"'},
             f"disc.w = exp(a): 'exp(a)' takes a number; 'a' is in kg.m2.\n{DISC % 'b'}",
         ),
+        (
+            {"J": '"push.phi"'},
+            f"disc.J: push.phi is no parameter: it changes over time, and a value does not.\n{DISC % 'push.phi'}\n"
+            'If disc.J is an input, connect them: name = ["push.phi", "disc.J"] in [connect].',
+        ),
         ({"w": '"b"'}, f"disc.w = b expects rad/s; the expression is kg.m2.\n{DISC % 'b'}"),
         (
             {},
@@ -54,6 +59,7 @@ PUSH = '  in bench.toml:7 `push = { is = "Torque" }`'
         "circle",
         "numbers that cancel",
         "function of a quantity",
+        "variable",
         "wrong unit of a start value",
         "free flange and missing input",
     ],
