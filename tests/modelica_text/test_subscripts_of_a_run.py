@@ -94,3 +94,16 @@ def test_an_assertion_of_a_function_in_a_branch_that_is_not_taken(tmp_path: Path
     )
     run = simulate(load(written(tmp_path, function + model("Real y = f(time);"))), 1.0)
     assert run.final["x"] == pytest.approx(0.5, rel=1e-7)
+
+
+def test_a_condition_is_kept_where_the_subscript_has_no_element(tmp_path: Path) -> None:
+    """The standard library's MathBoolean.MultiSwitch: true from 0.2 s to 0.5 s by u[1], which is kept until 0.7 s."""
+    text = (
+        "block S input Boolean u[2]; output Boolean y; Integer first; initial equation pre(y) = false; "
+        "equation first = if u[1] then 1 else if u[2] then 2 else 0; "
+        "y = if first == 0 then pre(y) else first == 1 or not u[first]; end S;\n"
+        "model M S s(u = {time > 0.2 and time < 0.5, time > 0.7}); Real x(start = 0, fixed = true); "
+        "equation der(x) = if s.y then 1 else 0; end M;\n"
+    )
+    run = simulate(load(written(tmp_path, text)), 1.0)
+    assert run.final["x"] == pytest.approx(0.5, rel=1e-9)

@@ -10,7 +10,7 @@ from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.fold import OUTSIDE
 from modelica_like.netlist.modelica.laws import Law
 from modelica_like.netlist.modelica.lifting import height
-from modelica_like.netlist.modelica.tree import Expr
+from modelica_like.netlist.modelica.tree import Expr, with_operands
 from modelica_like.netlist.modelica.whens import is_ending
 from modelica_like.netlist.modelica.written import ASSERT, Happening
 
@@ -47,8 +47,15 @@ def demanded_elements(equations: Equations, initial: Equations, happenings: list
     for (holds, words), source in dict.fromkeys(every):
         if height(holds):
             raise ModelicaTextError("A subscript of what is outside of a class must be known.", where=source)
-        result.append(Happening((((holds,), {}),), source, _at(words, source).args[0]))
+        result.append(Happening((((_settled(holds),), {}),), source, _at(words, source).args[0]))
     return result
+
+
+def _settled(holds: Expr) -> Expr:
+    """Return a condition as it is when an event is over: the values before are the values."""
+    if holds.kind == "call" and holds.args[0] == "pre":
+        return holds.args[1][0]
+    return with_operands(holds, _settled)
 
 
 def _at(words: Expr, source: Source) -> Expr:
