@@ -307,6 +307,23 @@ def test_connectors_within_connectors_are_joined_one_by_one(tmp_path: Path) -> N
         assert final[f"low.plug.pin[{k}].i"] == pytest.approx(4 * k * 3 / 4)
 
 
+def test_connectors_within_connectors_of_arrays_are_joined_in_their_order(tmp_path: Path) -> None:
+    """Poles of 4 V and 8 V over two conductors each: 3 and 6 S, then 5 and 10 S."""
+    head, _, _ = PLUGS.partition("model A")
+    final = run(tmp_path, head + """model A
+  Pole high[2](v = {4, 8});
+  Pole low[2];
+  Conductors c[2](g = {3, 5});
+equation
+  connect(high.plug, c.p);
+  connect(c.n, low.plug);
+end A;
+""").final  # fmt: skip
+    for place, volts, siemens in ((1, 4, 3), (2, 8, 5)):
+        for k in (1, 2):
+            assert final[f"low[{place}].plug.pin[{k}].i"] == pytest.approx(volts * siemens * k)
+
+
 def test_a_record_may_be_of_a_class_that_extends_the_declared_one(tmp_path: Path) -> None:
     result = run(tmp_path, """
 record Base

@@ -144,23 +144,23 @@ def _of_bus(end: Expr, instance: Instance) -> list[str] | None:
 
 def _of_bundle(end: Expr, instance: Instance) -> list[str] | None:
     """Return the paths of the connectors within a connector that an end means, None if it means none."""
-    owner, path = instance, ""
+    owner, heads = instance, [""]
     for depth, (name, subscripts) in enumerate(end.args):
         member = owner.members.get(name)
         if member is None or depth > 1 or not exists(owner, member) or basic_type(owner, member) is not None:
             return None
         indices = _indices(subscripts, sizes(owner, member), instance, end.line)
-        part = part_of(owner, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0)
-        if len(indices) > 1 or not isinstance(part, Instance):
+        part = part_of(owner, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0) if indices else None
+        if not isinstance(part, Instance):
             return None
-        path += f"{name}{indices[0]}."
+        heads = [f"{head}{name}{index}." for head in heads for index in indices]
         if part.text.kind == "connector":
             leaves = bundled(part)
             if len(end.args) > depth + 1:
                 wanted = _inside(end.args[depth + 1 :], instance, end.line)
                 leaves = [leaf for leaf in leaves if leaf in wanted or leaf.partition("[")[0] in wanted]
             side = INSIDE if depth == 0 else ""
-            return [f"{path}{side}{leaf}" for leaf in leaves] or None
+            return [f"{head}{side}{leaf}" for head in heads for leaf in leaves] or None
         owner = part
     return None
 
