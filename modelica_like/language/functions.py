@@ -19,6 +19,7 @@ from modelica_like.language.expr import (
     Symbol,
     flag_name,
     is_expression,
+    operands,
     symbol_of,
     symbols_in,
 )
@@ -77,6 +78,22 @@ def prescribed(motion: Expr) -> Expr:
     return symbol_of(motion.owner, flag_name(motion.name))
 
 
+def above_zero(function: Callable[[Any], Any], x: Any) -> Any:
+    """Return a root of an expression; that of what is cut off at zero, sqrt(max(0, h)), has no slope below.
+
+    The slope of the root is infinite at zero and that of the rest is zero: their product is not a number.
+    """
+    sides = operands(x) if is_expression(x) and x.is_op(ca.OP_FMAX) else []
+    inner = next((one for one, other in zip(sides, reversed(sides), strict=True) if other.is_zero()), None)
+    return function(x) if inner is None else where(inner > 0, function(inner), 0, events=False)
+
+
+def power(base: Any, exponent: Any) -> Any:
+    """Return a power; below one it is a root."""
+    number = float(exponent) if _sx(exponent).is_constant() else 1.0
+    return above_zero(lambda x: x**exponent, base) if 0 < number < 1 else base**exponent
+
+
 def _rate(symbol: Symbol) -> Expr | float:
     constant = symbol.owner.is_constant(symbol.name)
     return 0.0 if constant else symbol.derivative()
@@ -86,7 +103,7 @@ def _elementary(function: Callable[[Any], Any], doc: str) -> Callable[[Scalar], 
     """Return a function of an expression or a number."""
 
     def of(x: Scalar) -> Expr:
-        return function(_sx(x))
+        return above_zero(function, _sx(x)) if function is ca.sqrt else function(_sx(x))
 
     of.__name__, of.__doc__ = function.__name__, f"{doc}\n\nArgs:\n    x: an expression or a number.\n"
     return of

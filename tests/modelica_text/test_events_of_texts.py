@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from modelica_like import load, simulate
@@ -168,3 +169,27 @@ def test_what_decides_equations_follows_from_an_initial_algorithm(tmp_path):
     """Without the limit of power: one switch, from the current's limit to the voltage's."""
     result = run(tmp_path, SUPPLY.replace("P0 = 1200", "P0 = 4000"), 0.3)
     assert result.events[0].time == pytest.approx(result.events[-1].time, abs=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["native", "idas"])
+@pytest.mark.parametrize(("root", "exponent"), [
+    ("sqrt(max(0, h))", 0.5), ("sqrt(max(h, 0))", 0.5), ("max(0, h)^0.5", 0.5), ("max(0, h)^0.6", 0.6),
+])  # fmt: skip
+def test_a_tank_runs_empty_and_stays_so(tmp_path: Path, solver: Any, root: str, exponent: float) -> None:
+    """Torricelli's law, der(h) = -k*h^n: h^(1 - n) falls evenly, and is zero at 1/(k*(1 - n))."""
+    (tmp_path / "a.mo").write_text(f"""
+model A
+  Real h(start = 1, fixed = true), filled(start = 0, fixed = true), out = 0.8*{root};
+equation
+  der(h) = -out;
+  der(filled) = (if time > 0.5 then 1 else 0) - {root.replace("h", "filled")};
+end A;
+""")
+    result = simulate(load(tmp_path / "a.mo"), 5.0, rtol=1e-8, solver=solver)
+    rest = 1 - exponent
+    wanted = [max(0.0, 1 - 0.8 * rest * time) ** (1 / rest) for time in result.time]
+    assert np.max(np.abs(np.array(result["h"]) - wanted)) < 2e-8
+    assert result.at(0.5)["filled"] == 0.0
+    if exponent == 0.5:  # der(f) = 1 - sqrt(f) from zero
+        speed = math.sqrt(result.final["filled"])
+        assert -2 * speed - 2 * math.log(1 - speed) == pytest.approx(4.5, rel=1e-6)

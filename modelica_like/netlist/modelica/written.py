@@ -42,6 +42,7 @@ from modelica_like.language.equation import Equation
 from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field, Parameter, Variable
 from modelica_like.language.formula import Formula
+from modelica_like.language.functions import above_zero, power
 from modelica_like.language.inside import InsideAssembly, inside
 from modelica_like.netlist.modelica.calls import JUMPING
 from modelica_like.netlist.modelica.fold import OUTSIDE, SILENT
@@ -294,12 +295,13 @@ _RELATIONS: dict[str, Callable[..., Any]] = {
 }  # fmt: skip
 _OPERATIONS: dict[str, Callable[..., Any]] = {
     "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "/": lambda a, b: a / b,
-    "^": lambda a, b: a**b, "neg": lambda a: -a,
+    "^": power, "neg": lambda a: -a,
     **_RELATIONS, "and": ca.logic_and, "or": ca.logic_or, "not": ca.logic_not,
 }  # fmt: skip
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(ca, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")},
-    **{name: getattr(ca, name) for name in ("tanh", "exp", "log", "log10", "sqrt")},
+    **{name: getattr(ca, name) for name in ("tanh", "exp", "log", "log10")},
+    "sqrt": lambda x: above_zero(ca.sqrt, x),
     "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax, "noEvent": lambda x: x,
     "der": der, "pre": pre, "edge": edge, "change": change, "initial": initial, "terminal": terminal,
     "delay": lambda value, time, most=None: delay(value, time),
