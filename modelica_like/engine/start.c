@@ -267,8 +267,9 @@ Result complete_start(Instance *c) {
 /* States from start values, which may depend on modes, and modes, which depend on states. */
 static Result find_start(Instance *c) {
     for (int round = 0; round < MODE_ROUNDS; round++) {
-        if (!apply_fixed(c) || !solve_start_system(c) || !solve_now(c, 0) || !check_dependent(c)) return RESULT_ERROR;
-        if (!choose_start_modes(c, NULL, 0)) return complete_start(c);
+        Result found = apply_fixed(c) && solve_start_system(c) && solve_now(c, 0) && check_dependent(c);
+        /* What is not found may be found in the modes that belong to the guesses. */
+        if (!choose_start_modes(c, NULL, 0)) return found && complete_start(c);
         share(c);
     }
     return fail(c, START_NOT_SETTLED, 0);

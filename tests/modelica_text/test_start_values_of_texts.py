@@ -225,3 +225,33 @@ end A;
     result = simulate(load(tmp_path / "a.mo"), 0.5, solver=solver)
     assert result["v"][0] == pytest.approx(1)
     assert result.final["x"] == pytest.approx(0.1 * 1 + 0.4 * 2)
+
+
+@pytest.mark.parametrize("solver", ["native", "idas"])
+def test_a_start_in_the_modes_of_the_guesses(tmp_path: Path, solver: Solver) -> None:
+    """In the gap nothing holds the torque, so equilibrium is found only from flanks that touch: b/2 + 2/1000 apart."""
+    (tmp_path / "a.mo").write_text("""
+model A
+  import Modelica.Mechanics.Rotational.*;
+  Components.Inertia a(J = 0.1, phi(start = 0.1)), b(J = 0.3);
+  Components.ElastoBacklash play(c = 1000, d = 0, b = 0.02, phi_rel(start = -0.1));
+  Components.Spring spring(c = 50);
+  Components.Fixed wall;
+  Sources.ConstantTorque torque(tau_constant = 2);
+initial equation
+  a.w = 0;
+  b.w = 0;
+  a.a = 0;
+  b.a = 0;
+equation
+  connect(torque.flange, a.flange_a);
+  connect(a.flange_b, play.flange_a);
+  connect(play.flange_b, b.flange_a);
+  connect(b.flange_b, spring.flange_a);
+  connect(spring.flange_b, wall.flange);
+end A;
+""")
+    result = simulate(load(tmp_path / "a.mo"), 0.5, solver=solver)
+    for point in (0, -1):
+        assert result["b.phi"][point] == pytest.approx(2 / 50, abs=1e-9)
+        assert result["a.phi"][point] == pytest.approx(2 / 50 + 0.01 + 2 / 1000, abs=1e-9)
