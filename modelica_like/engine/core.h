@@ -19,10 +19,11 @@
 #define AT_EDGE 1e-12         /* an edge or guard so close to zero rests there: rounding of values of about one */
 #define MOST_DOUBTS 200 /* between two events, each of which makes a step shorter: a signal has decayed with fewer */
 #define NOISE 1e-30     /* a decaying signal ends by swinging around zero with such values; that is no event */
-#define INSTANT 1e-9    /* duration of an impact; finite forces cancel whatever it is */
-#define IDEAL_HEAD 3    /* numbers of an ideal element before its combination of equations, see row_of */
-#define MAX_DAMPED 200  /* short steps follow a bend */
-#define LEAST_PART 1e-6 /* of a step of Newton's method: shorter ones mean that nothing leads nearer */
+#define ROUNDING_OF_STATES 1e-14
+#define INSTANT 1e-9        /* duration of an impact; finite forces cancel whatever it is */
+#define IDEAL_HEAD 3        /* numbers of an ideal element before its combination of equations, see row_of */
+#define MAX_DAMPED 200      /* short steps follow a bend */
+#define LEAST_PART 1e-6     /* of a step of Newton's method: shorter ones mean that nothing leads nearer */
 #define SOLVED_DAMPED 1e-12 /* next step of such, in the unknowns: rounding of a condition of 1e3 */
 #define CROWD 24            /* further instants in a short time follow each other ever faster */
 
@@ -147,7 +148,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located);
 int count_clocks(const Instance *c);
 Result tick(Instance *c, double *step);
 Result update_discrete(Instance *c, int *restart, double *next);
-Result check_turned_back(Instance *c, const double *before);
+Result check_turned_back(Instance *c);
 void note_change(Instance *c, int name, int transition, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
 /* resets.c */

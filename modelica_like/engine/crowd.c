@@ -2,16 +2,15 @@
 #include "core.h"
 
 #define CONVERGES 0.9 /* length of a crowd over the one before: rebounds come to their end, chattering does not */
-#define NOISY 255     /* instead of a count: all that a guard does is rounding */
 #define OFTEN 4       /* changes of a relation in a crowd, of which it is a cause */
 #define ROUNDED 1e-13 /* of values of about a hundred: what a relation that crowds may be by rounding */
 #define CROWDED 1e-6  /* of the run: in less time, CROWD further instants follow each other ever faster */
 
 /* A guard that is not a number is false; what is nothing but rounding is zero. */
 double number_or_false(const Instance *c, int guard, double value) {
-    double noise = c->noisy[guard] == NOISY ? ROUNDED : NOISE;
     if (isnan(value)) return -1;
-    return fabs(value) < noise && fabs(value) > JUST_TRUE ? 0 : value;
+    if (fabs(value) < c->noise[guard]) return 0;
+    return fabs(value) < NOISE && fabs(value) > JUST_TRUE ? 0 : value;
 }
 
 /* Counts how often a state event has fired in a crowd. */
@@ -28,7 +27,7 @@ void leave_crowd(Instance *c) {
     double last = s->n_instants > 0 ? s->instants[(s->n_instants - 1) % CROWD] : s->t;
     if (s->t - last < CROWDED * span) return;
     s->resting = 0;
-    for (int g = 0; g < c->model->n_guards; g++) c->noisy[g] = c->noisy[g] == NOISY ? NOISY : 0;
+    memset(c->noisy, 0, (size_t)c->model->n_guards);
 }
 
 /* Relations that make a crowd though they do not leave zero by more than rounding wait from now on until they do: the
@@ -39,7 +38,7 @@ static int drop_noise(Instance *c) {
     values_now(c, &m->tapes.guards, c->guards);
     for (int g = 0; g < m->n_guards; g++) {
         if (c->noisy[g] != OFTEN || !m->modes[m->transitions[m->guard_transition[g]].mode].hidden) continue;
-        if (fabs(c->guards[g]) < ROUNDED) any = c->noisy[g] = NOISY;
+        if (fabs(c->guards[g]) < ROUNDED && c->noise[g] < ROUNDED) c->noise[g] = ROUNDED, any = 1;
     }
     return any;
 }

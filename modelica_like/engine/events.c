@@ -6,10 +6,11 @@
 #define ALONE 6    /* further rounds per motion that may be held, in which only one fires */
 #define BALANCED 1e-3
 #define SAME_TIME 1e-12
-#define LATER 1e3   /* time resolutions, for the difference of a rate: what turns round in less is at rest */
-#define CLEARS 0.5  /* least height of a rebound above zero, in its whole height: less of it is rounding */
-#define NEVER 1e29  /* s: a moment that does not come */
-#define JUMPED 1e-6 /* share of what a guard was before an update: a jump to less is one to zero */
+#define LATER 1e3      /* time resolutions, for the difference of a rate: what turns round in less is at rest */
+#define CLEARS 0.5     /* least height of a rebound above zero, in its whole height: less of it is rounding */
+#define STAYS_WITHIN 2 /* how far from zero a guard at rest may be: as it came in so many time resolutions */
+#define NEVER 1e29     /* s: a moment that does not come */
+#define JUMPED 1e-6    /* share of what a guard was before an update: a jump to less is one to zero */
 
 int is_source(const Instance *c, const Transition *one) {
     double mode = c->d[one->mode];
@@ -107,6 +108,25 @@ void drop_balanced(Instance *c, double *soon) {
         if (number_or_false(c, k, now[k]) < 0 && soon[k] > 0 && soon[k] <= BALANCED * fabs(now[k])) soon[k] = now[k];
 }
 
+/* What rounding of the states makes of a guard. */
+static double rounding_of_guard(Instance *c, int guard) {
+    double *point = c->vector + c->model->n_z;
+    for (int k = 0; k < c->model->n_unknowns; k++)
+        point[k] = c->x[k] * (k < c->model->n_x ? 1 + ROUNDING_OF_STATES : 1);
+    values_at(c, &c->model->tapes.guards, c->state.t, point, c->looks);
+    return fabs(c->looks[guard] - c->guards_begun[guard]);
+}
+
+/* Is a relation that changed in this instant still where its event was located, which is not quite at zero, and does
+ * nothing move it any more? What comes to rest at a limit stays there: from now on so little counts as zero. */
+static int rests_at_edge(Instance *c, int guard, double now, double rate) {
+    double begun = c->guards_begun[guard], came = -c->guards_begun[c->model->n_guards + guard];
+    if (rate != 0 || now != begun || !(now <= STAYS_WITHIN * TIME_RESOLUTION * max_of(1, fabs(c->state.t)) * came))
+        return 0;
+    c->noise[guard] = max_of(c->noise[guard], max_of(STAYS_WITHIN * now, rounding_of_guard(c, guard)));
+    return 1;
+}
+
 /* At the same edge a mode that was left in this round is not wanted back where that soon is no longer so, and a
  * relation that changed in this instant neither, in later rounds, which updates ask for: what settles within few time
  * resolutions moves so much within one that both modes want the other. Without `modes`, at the begin of an instant and
@@ -124,7 +144,9 @@ void drop_returning(Instance *c, const double *modes, double *soon) {
         int relation = m->modes[one->mode].hidden, begun = !modes || c->d_begun[one->mode] == one->target;
         int left = (modes && modes[one->mode] == one->target) || (relation && begun);
         int returns = guard_active(c, k) && left && now[k] > 0;
-        if (returns && soon[k] > 0 && now[k] < LATER * (now[k] - soon[k])) soon[k] = -now[k];
+        if (!returns || !(soon[k] > 0)) continue;
+        int rests = modes && relation && rests_at_edge(c, k, now[k], now[m->n_guards + k]);
+        if (rests || now[k] < LATER * (now[k] - soon[k])) soon[k] = -now[k];
     }
 }
 
@@ -278,6 +300,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     c->stopped = 0;
     memset(c->entered, 0, (size_t)m->n_holds);
     leave_crowd(c);
+    if (m->n_guards > 0) values_now(c, &m->tapes.guards, c->guards_begun);
     if (find_wanting(c, wanting, !located)) {
         if (!located && !c->bounded && m->n_guards > 0) {
             drop_returning(c, NULL, c->guards);
@@ -337,10 +360,10 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
 /* An error if a relation became true and stays true, because what it sets is at rest and is turned back too late: a
    ball rebounds ever more slowly, or not at all, until the acceleration a of the guard turns it back within few time
    resolutions. With value g and rate r < 0 after that, g - r^2 / 2a is the least value that comes; above zero the
-   relation fires no more, and the ball falls through the floor. `before`: guards and rates before the instant; its
-   modes are in d_begun. */
-Result check_turned_back(Instance *c, const double *before) {
+   relation fires no more, and the ball falls through the floor. Its modes before the instant are in d_begun. */
+Result check_turned_back(Instance *c) {
     const Model *m = c->model;
+    const double *before = c->guards_begun;
     double step = LATER * TIME_RESOLUTION * max_of(1, fabs(c->state.t)), *now = c->guards_before;
     double *rates = now + m->n_guards, *later = c->edge_guards + m->n_guards;
     values_now(c, &m->tapes.guards, now);

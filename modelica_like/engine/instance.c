@@ -129,6 +129,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
     SMOOTH_NUMBERS(OF_INSTANCE);
     c->n_smooth = (size_t)used;
     TAKE(c->end_look, m->settings->fixed_step > 0 ? 2 * guards : 0);
+    TAKE(c->noise, guards);
     TAKE(c->past, delays > 0 ? MOST_PAST * (2 + delays) : 0);
     TAKE(c->past_sizes, delays);
     STATE_MARKS(OF_INSTANCE);

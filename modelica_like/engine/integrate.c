@@ -266,11 +266,10 @@ Result take_changes(Instance *c) {
 Result pass_instant(Instance *c, unsigned char *wanting, int located) {
     int whens = c->model->n_updates > 0 && c->model->n_guards > 0;
     size_t size = (size_t)c->model->n_x * sizeof(double);
-    if (whens) values_now(c, &c->model->tapes.guards, c->looks);
     memcpy(c->first, c->x, size);
     memcpy(c->d_begun, c->d, (size_t)c->model->n_d * sizeof(double));
     if (!iterate_events(c, wanting, located)) return RESULT_ERROR;
-    return whens && memcmp(c->first, c->x, size) != 0 ? check_turned_back(c, c->looks) : RESULT_OK;
+    return whens && memcmp(c->first, c->x, size) != 0 ? check_turned_back(c) : RESULT_OK;
 }
 
 /* Has this instant changed nothing that equations of motion read? Of ticks that fall together, those have that did

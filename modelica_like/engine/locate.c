@@ -8,7 +8,6 @@
 #define LOCATED 1e-13
 #define MAX_TRIALS 60
 #define NEAR 0.1
-#define ROUNDING_OF_STATES 1e-14
 
 typedef struct { /* guards and their rates at a time within a step; behind them room for one more number per guard */
     double t, *values, *rates;

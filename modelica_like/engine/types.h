@@ -91,25 +91,25 @@ typedef struct {
  * and a point, and where the step begins (`first`); motions that may be held have `begun`, where the search for a
  * steady state began; `impact_x` and `impact_d` are states before the first impact at an instant, `trials` points
  * without and with it, whose powers differ by what sources give in its duration. */
-#define WORK_NUMBERS(A)                                                                                             \
-    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),        \
-        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system), \
-        A(qr_work, 2 * system), A(lu, m->lu.n_rows), A(lu_pivots, n), A(lu_sizes, n), A(lu_last, last *last),       \
-        A(dense_matrix, dense), A(implicit_matrix, dense), A(implicit_lu, dense), A(square, square),                \
-        A(vector, n + n_z), A(residual, n_z), A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n),  \
-        A(first, n), A(first_rates, n), A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards),   \
-        A(looks, 3 * guards * MOST_LOOKS), A(seen_rates, n), A(seen_indicators, guards),                            \
-        A(seen_derived, m->n_derived), A(outputs, outputs), A(start_unknowns, system), A(start_errors, system),     \
-        A(start_sizes, system), A(start_kept, system), A(start_next, system),                                       \
-        A(kept_starts, N_KEPT_STARTS *(n + 2 * n_d)), A(start_values, starts),                                      \
-        A(start_residual, larger(m->n_start_values, resets)), A(delayed, 2 * delays),                               \
-        A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(motions, holds), A(d_before, n_d), A(d_begun, n_d), \
-        A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),                      \
-        A(target_missing, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x),               \
-        A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d), \
-        A(kept_z, n_z), A(damped_z, n_z), A(damped_step, n_z), A(reactions, members), A(sizes, members),            \
-        A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n), A(changes, n),       \
-        A(step_error, n), A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d)), A(known_values, m->n_known),        \
+#define WORK_NUMBERS(A)                                                                                               \
+    A(slots, slots + left), A(dots, 3 * slots + left), A(jacobian, jacobian), A(matrix, m->step.n_nonzeros),          \
+        A(qr_v, larger(m->step.n_v, m->start.n_v)), A(qr_r, larger(m->step.n_r, m->start.n_r)), A(qr_beta, system),   \
+        A(qr_work, 2 * system), A(lu, m->lu.n_rows), A(lu_pivots, n), A(lu_sizes, n), A(lu_last, last *last),         \
+        A(dense_matrix, dense), A(implicit_matrix, dense), A(implicit_lu, dense), A(square, square),                  \
+        A(vector, n + n_z), A(residual, n_z), A(rhs, larger(n, m->n_determinants)), A(stages, 9 * n), A(point, n),    \
+        A(first, n), A(first_rates, n), A(variables, m->n_nodes), A(guards, small), A(guards_before, 2 * guards),     \
+        A(guards_begun, 2 * guards), A(looks, 3 * guards * MOST_LOOKS), A(seen_rates, n), A(seen_indicators, guards), \
+        A(seen_derived, m->n_derived), A(outputs, outputs), A(start_unknowns, system), A(start_errors, system),       \
+        A(start_sizes, system), A(start_kept, system), A(start_next, system),                                         \
+        A(kept_starts, N_KEPT_STARTS *(n + 2 * n_d)), A(start_values, starts),                                        \
+        A(start_residual, larger(m->n_start_values, resets)), A(delayed, 2 * delays),                                 \
+        A(series, 2 * delays * DELAY_TERMS), A(begun, holds), A(motions, holds), A(d_before, n_d), A(d_begun, n_d),   \
+        A(d_earlier, n_d), A(d_fired, n_d), A(reset_values, resets), A(target_values, resets),                        \
+        A(target_missing, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x),                 \
+        A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d),   \
+        A(kept_z, n_z), A(damped_z, n_z), A(damped_step, n_z), A(reactions, members), A(sizes, members),              \
+        A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n), A(changes, n),         \
+        A(step_error, n), A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d)), A(known_values, m->n_known),          \
         A(set_keys, N_SETS *(n_d + 1))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; jolted: what new
@@ -149,7 +149,7 @@ typedef struct { /* of something for which there may be another way */
 typedef enum { KEPT_FAILED, KEPT_LED, KEPT_SETTLING, KEPT_TICK, N_KEPT_STARTS } KeptStart;
 
 /* Inputs are u + u_rate * (t - u_time); x is a point: states and implicit unknowns; `wanting` transitions fire at the
- * end of the piece; `noisy`: how often a guard has fired in a crowd, or that all it does is noise. */
+ * end of the piece; `noisy`: how often a guard has fired in a crowd. */
 #define SMOOTH_NUMBERS(A) \
     A(x, n), A(p, m->n_p), A(u, m->n_u), A(u_rate, m->n_u), A(d, n_d), A(mode_value, n_d), A(start_value, starts)
 #define STATE_MARKS(A) A(mode_given, n_d), A(start_given, starts), A(wanting, m->n_transitions), A(noisy, guards)
@@ -165,6 +165,7 @@ typedef struct Instance {
     Piece *piece;
     double *past, *past_sizes;     /* what delayed values were, see delay.c; their sizes */
     double *end_look;              /* guards and their rates at the end of the last fixed step */
+    double *noise;                 /* of each guard: less counts as zero */
     double *z;                     /* in x: together they are a point */
     const double *values[N_KINDS]; /* of variables by kind; of inputs only at u_time */
 

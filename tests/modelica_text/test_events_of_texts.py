@@ -4,10 +4,11 @@ import math
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import numpy as np
 import pytest
 
-from modelica_like import load, simulate
+from modelica_like import export_fmu, load, simulate
 from modelica_like.errors import LimitPassed
 
 
@@ -169,6 +170,135 @@ def test_what_decides_equations_follows_from_an_initial_algorithm(tmp_path):
     """Without the limit of power: one switch, from the current's limit to the voltage's."""
     result = run(tmp_path, SUPPLY.replace("P0 = 1200", "P0 = 4000"), 0.3)
     assert result.events[0].time == pytest.approx(result.events[-1].time, abs=1e-9)
+
+
+LIMITED = """
+model A
+  parameter Real k = 1;
+  parameter Real most = 1;
+  Real y(start = 0, fixed = true);
+  Real u = k*cos(time);
+equation
+  der(y) = if y < -most and u < 0 or y > most and u > 0 then 0 else u;
+end A;
+"""
+
+
+@pytest.mark.parametrize("solver", ["native", "idas"])
+@pytest.mark.parametrize("size", [1.0, 7.3, 1e-3, 1e-8, 1e6])
+def test_what_rests_at_a_limit_stays_there(tmp_path: Path, solver: Any, size: float) -> None:
+    """A quarter of the period leads to the limit; where the speed turns, it goes back, and to the other limit."""
+    (tmp_path / "a.mo").write_text(LIMITED)
+    model = load(tmp_path / "a.mo")
+    for part in (0.11, 0.37, 0.5, 0.701, 0.93):
+        model.give("k", size)
+        model.give("most", part * size)
+        result = simulate(model, 2 * math.pi, rtol=1e-9, atol=1e-12 * size, solver=solver)
+        for time, wanted in ((math.pi / 2, part), (math.pi, max(part - 1, -part)), (2 * math.pi, min(1 - part, part))):
+            assert result.at(time)["y"] == pytest.approx(wanted * size, abs=1e-7 * size)
+
+
+@pytest.mark.parametrize("solver", ["native", "idas"])
+def test_delays_in_a_row_and_a_step_at_the_same_instant(tmp_path: Path, solver: Any) -> None:
+    """Each takes what was before: of the one before it, and of what jumps just then."""
+    (tmp_path / "a.mo").write_text("""
+model A
+  connector In = input Real;
+  connector Out = output Real;
+  block Delay
+    In u; Out y;
+  initial equation
+    y = 0;
+  equation
+    when sample(0, 0.25) then
+      y = pre(u);
+    end when;
+  end Delay;
+  block Step
+    Out y = if time < 0.5 then 1 else 3;
+  end Step;
+  Delay a, b, c;
+  Step step;
+equation
+  a.u = time + 1;
+  connect(a.y, b.u);
+  connect(step.y, c.u);
+end A;
+""")
+    result = simulate(load(tmp_path / "a.mo"), 1.1, solver=solver)
+    for time, values in ((0.1, (1, 0, 1)), (0.3, (1.25, 1, 1)), (0.6, (1.5, 1.25, 1)), (0.8, (1.75, 1.5, 3))):
+        assert [result.at(time)[f"{name}.y"] for name in "abc"] == pytest.approx(values, abs=1e-9)
+
+
+def test_what_changes_all_the_time_has_a_value_before_an_event(tmp_path: Path) -> None:
+    """A slope begins anew from where the one before has come to, also where that was not at its end."""
+    result = run(tmp_path, """
+model A
+  parameter Real rate = 2;
+  discrete Real begun(start = 0, fixed = true), from(start = 1, fixed = true), to(start = 1, fixed = true);
+  Real size = if time < begun + 0.5 then from + (to - from)*(time - begun)*rate else to;
+  Real y = 3*size + x;
+  Real x(start = 0, fixed = true);
+equation
+  der(x) = 1;
+  when {time > 0.25, time > 0.5, time > 1.5} then
+    from = pre(size);
+    to = pre(y);
+    begun = time;
+  end when;
+end A;
+""", 3.0)  # fmt: skip
+    first = 1.0, 3.25  # at 0.25 s: size is 1, y is 3 + 0.25
+    second = first[0] + (first[1] - first[0]) * 0.25 * 2
+    third = 3 * second + 0.5  # what it has come to until 1.5 s
+    assert result.at(1.5)["size"] == pytest.approx(third, abs=1e-9)
+    assert (result.final["from"], result.final["to"]) == pytest.approx((third, 3 * third + 1.5), abs=1e-9)
+
+
+def test_other_classes_see_what_a_part_has_before_the_start(tmp_path: Path) -> None:
+    """It is 3*u, which only a run knows, with u = 2 + x = 3 at the start."""
+    result = run(tmp_path, """
+model A
+  block B
+    input Real u;
+    discrete Real n;
+  initial equation
+    pre(n) = 3*u;
+  equation
+    when time > 0.5 then
+      n = pre(n) + 1;
+    end when;
+  end B;
+  model Around
+    B b(u = 2 + x);
+    Real x(start = 1, fixed = true);
+  equation
+    der(x) = 1;
+  end Around;
+  Around around;
+  discrete Real first(start = 0), last(start = 0);
+  Boolean large = pre(around.b.n) > 8 and pre(around.b.n) < 9.5;
+equation
+  when initial() then
+    first = pre(around.b.n);
+  end when;
+  when time > 0.5 then
+    last = pre(around.b.n);
+  end when;
+end A;
+""")  # fmt: skip
+    assert (result["first"][0], result.final["last"], result.final["around.b.n"]) == pytest.approx((9, 9, 10))
+    assert result.at(0.25)["large"] == 1
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_what_rests_at_a_limit_stays_there_in_an_fmu(tmp_path: Path, kind: str) -> None:
+    """An importer stops a time resolution before the limit."""
+    (tmp_path / "a.mo").write_text(LIMITED.replace("most = 1", "most = 0.37"))
+    export_fmu(load(tmp_path / "a.mo"), tmp_path / "a.fmu", check=False)
+    run = fmpy.simulate_fmu(str(tmp_path / "a.fmu"), stop_time=6.0, fmi_type=kind, relative_tolerance=1e-8)
+    at = [float(np.interp(time, run["time"], run["y"])) for time in (1.5, 4.5, 6.0)]
+    assert at == pytest.approx([0.37, -0.37, math.sin(6.0) + 1 - 0.37], abs=1e-5)
 
 
 @pytest.mark.parametrize("solver", ["native", "idas"])
