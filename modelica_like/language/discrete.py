@@ -86,12 +86,13 @@ def _owner_in(expression: Expr) -> Any:
 
 def moves(expression: Expr) -> bool:
     """Return whether an expression changes between events: it has time or a variable in it."""
-    return any(s is TIME or (s.owner is not None and is_a(s, Variable)) for s in symbols_in(expression))
+    return any(s is TIME or is_a(s, Variable) for s in symbols_in(expression))
 
 
 def is_a(symbol: Symbol, kind: type | tuple[type, ...]) -> bool:
     """Return whether a symbol stands for a field of a kind itself."""
-    return not isinstance(symbol, Pre) and isinstance(symbol.owner.fields.get(symbol.name), kind)
+    owner = None if isinstance(symbol, Pre) else symbol.owner
+    return owner is not None and isinstance(owner.fields.get(symbol.name), kind)
 
 
 _JOINS = {ca.OP_AND: ca.logic_and, ca.OP_OR: ca.logic_or}
@@ -172,9 +173,7 @@ def pre(value: Expr) -> Expr:
     Raises:
         LanguageError: it is something else.
     """
-    if not isinstance(value, Marker) and not (
-        isinstance(value, Symbol) and value.owner is not None and is_a(value, Discrete)
-    ):
+    if not isinstance(value, Marker) and not (isinstance(value, Symbol) and is_a(value, Discrete)):
         what = f"pre({value}): only a discrete, Boolean or integer variable has a value before an event."
         raise LanguageError(what, where=caller(), advice="For a mode, declare boolean(…) and set it by an equation.")
     return before(cast(Symbol, value))

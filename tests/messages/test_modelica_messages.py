@@ -59,6 +59,7 @@ SIGNALS = (
     'block P Modelica.Blocks.Interfaces.RealOutput y(unit = "kW") = 3; end P; '
     'block Q Modelica.Blocks.Interfaces.RealInput u(unit = "W"); end Q;'
 )
+F = "function f input Real speed; output Real y; algorithm y := speed; end f;"
 MESSAGES: dict[str, tuple[str, str]] = {
     "a variable of a bus without a source": (
         model("B bus; G g;", "connect(bus.x, g.u);", BUS),
@@ -393,7 +394,8 @@ MESSAGES: dict[str, tuple[str, str]] = {
     ),
     "an algorithm that grows": (
         model("Real x = f(time);", before=GROWING),
-        f"A formula has more than 500000 numbers, names and operations.\n  in a.mo:1 `{GROWING}`",
+        f"A formula has more than 500000 numbers, names and operations.\n  in a.mo:1 `{GROWING}`\n"
+        "The loops of a function are written out, and so is what it gives on: take shorter loops and arrays.",
     ),
     "no end of steps": (
         model("Real x = f(time);", before=GROWING.replace("for i in 1:60 loop y := y*y + y; end for", ENDLESS)),
@@ -418,9 +420,41 @@ MESSAGES: dict[str, tuple[str, str]] = {
             "zeros()": "zeros(…) has at least 1 argument, not 0",
             "fill(1)": "fill(…) has at least 2 arguments, not 1",
             "Integer()": "Integer(…) has 1 argument, not 0",
+            "Integer(x)": "Integer(…) needs a value of an enumeration: integer(…) takes whole numbers of others",
+            "homotopy(actual = x, simplified = x, other = 1)": "homotopy(…) has no argument 'other'",
+            "homotopy(x, actual = x)": "homotopy(…) is given actual twice",
+            "getInstanceName(1)": "getInstanceName(…) has 0 arguments, not 1",
+            "pre(2*x)": "pre(…) needs a variable: a formula has no value before an event",
+            "if edge(x) then 1 else 0": "edge(…) needs a Boolean variable",
+            "der(x > 1)": "der(…) needs a number, and a condition is none",
+            "reinit(x, 1)": "reinit(…) is a statement, and no value",
+            "smooth(order = 0, expr = x)": "smooth(…) has no argument 'order'",
             "x[1]": "x is no array and has no subscript",
         }.items()
     },
+    **{
+        f"inputs: {formula}": (model("Real x;", f"x = {formula};", F), f"{what}\n  in a.mo:5 `x = {formula};`")
+        for formula, what in {
+            "f(1, 2)": "f has 1 input, not 2.",
+            "f(speeds = 1)": "f has no input 'speeds'; did you mean 'speed'?",
+            "f(1, speed = 1)": "f is given speed twice.",
+            "f()": "f needs a value for its input speed.",
+        }.items()
+    },
+    **{
+        f"statements: {statement}": (model("Real x = 1;", statement), f"{what}\n  in a.mo:5 `{statement}`")
+        for statement, what in {
+            "assert(x > 0);": "assert(…) has 2 to 3 arguments, not 1.",
+            'assert(x > 0, "low", lvl = AssertionLevel.warning);': "assert(…) has no argument 'lvl'.",
+            'Modelica.Utilities.Streams.error("low", x);': "Streams.error(…) has 1 argument, not 2.",
+            "when x > 1 then terminate(); end when;": "terminate(…) has 1 argument, not 0.",
+            "when x > 1 then reinit(x); end when;": "reinit(…) has 2 arguments, not 1.",
+        }.items()
+    },
+    "a value before of the time": (
+        model("Real x;", "x = pre(time);"),
+        "pre(time): only what changes at events has a value before them.\n  in a.mo:5 `x = pre(time);`",
+    ),
     "a sample without an interval": (
         model("Real x;", "when sample(0, 0) then x = time; end when;"),
         "sample(…) needs an interval above 0, not 0.\n  in a.mo:5 `when sample(0, 0) then x = time; end when;`",
@@ -619,6 +653,18 @@ def test_errors_of_the_drive_point_into_the_text(tmp_path: Path) -> None:
         "A declares 3 equations for 2 unknowns (x, y).\n"
         "  in a.mo:6 `y = x; y = 2;`\n"
         "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."
+    )
+
+
+def test_the_value_before_an_event_of_what_changes_between_them(tmp_path: Path, check_message) -> None:
+    (tmp_path / "a.mo").write_text(
+        model("G g; Real x;", "x = pre(g.v);", "model G Real v; equation der(v) = 1; end G;")
+    )
+    check_message(
+        LanguageError,
+        lambda: build(load(tmp_path / "a.mo")),
+        "pre(v): only what changes at events has a value before them.\n  in a.mo:5 `x = pre(g.v);`\n"
+        "In a 'when', name a variable.",
     )
 
 

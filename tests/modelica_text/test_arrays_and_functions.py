@@ -151,7 +151,7 @@ WRONG = {
     "y := n;": ("f(1, n = 2.5)", "n of f is an Integer, and 2.5 is none."),
     "y := w[1];": ("f(1, w = {1, 2})", "w of f has 3 elements, not 2."),
     "y := w[2];": ("f(1, w = 1)", "w of f is an array."),
-    "y := u;": ("f(1, u = 2)", "These arguments of f: that is not supported here."),
+    "y := u;": ("f(1, u = 2)", "f is given u twice."),
     'assert(\nu < 0.5,\n"too large"); y := u;': ("f(2)", "f refuses its arguments: too large."),
     'assert(u < 0.5, "too large"); y := u;': ("f(2)", "f refuses its arguments: too large."),
     "if u > 1 then z := {1, 2, 3}; else z := zeros(2); end if; y := z[1];": (

@@ -204,3 +204,49 @@ equation
 end A;
 """)  # fmt: skip
     assert result.final["count.n"] == 4 + 1 * (result.time[-1] >= 1)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        "BooleanInput u; Tick unused; equation connect(u, bus.tick);",
+        "BooleanInput u; protected BooleanOutput y = u; equation connect(y, bus.tick);",
+        "BooleanInput u; protected BooleanOutput y = sample(0.125, 0.25); equation connect(y, bus.tick);",
+    ],
+)
+def test_a_truth_value_for_an_instant_enters_through_a_signal_of_the_class(part: str, tmp_path: Path) -> None:
+    """All that count see it in the same instant, in the bus and outside."""
+    result = run(
+        tmp_path,
+        f"""
+block Tick
+  BooleanOutput y = sample(0.125, 0.25);
+end Tick;
+block Count
+  BooleanInput u; discrete Real n(start = 0, fixed = true);
+equation
+  when u then
+    n = pre(n) + 1;
+  end when;
+end Count;
+model Part
+  Bus bus; {part}
+end Part;
+model A
+  Bus bus; Part part; Tick tick; Count count, direct;
+  Integer n(start = 0, fixed = true), apart(start = 0, fixed = true);
+equation
+  connect(tick.y, part.u);
+  connect(tick.y, direct.u);
+  connect(part.bus, bus);
+  connect(bus.tick, count.u);
+  when bus.tick then
+    n = pre(n) + 1;
+  end when;
+  when direct.n <> count.n then
+    apart = pre(apart) + 1;
+  end when;
+end A;
+""",
+    )
+    assert [result.final[name] for name in ("count.n", "n", "direct.n", "apart")] == [4, 4, 4, 0]

@@ -323,3 +323,35 @@ end A;
     if exponent == 0.5:  # der(f) = 1 - sqrt(f) from zero
         speed = math.sqrt(result.final["filled"])
         assert -2 * speed - 2 * math.log(1 - speed) == pytest.approx(4.5, rel=1e-6)
+
+
+def test_the_value_before_an_event_in_an_algorithm_is_not_that_of_the_assignment_above(tmp_path):
+    """`pre`, `edge` and `change` ask for the variable before the event, whatever the algorithm has given it since."""
+    result = run(tmp_path, """
+model A
+  Integer n[3](each start = 0, each fixed = true), m[3](each start = 0, each fixed = true);
+  Boolean b, rises; Integer count(start = 0, fixed = true), changes(start = 0, fixed = true);
+  Integer k(start = 2, fixed = true); Real picked(start = 0, fixed = true);
+algorithm
+  when sample(0.1, 0.2) then
+    for i in 1:3 loop
+      n[i] := pre(n[i]) + i;
+      m[i] := pre(n[i]);
+    end for;
+    changes := if change(n[2]) then pre(changes) + 1 else pre(changes);
+  end when;
+  b := sin(20*time) > 0;
+  rises := edge(b);
+equation
+  when rises then
+    count = pre(count) + 1;
+  end when;
+  when time > 0.6 then
+    k = 3;
+    picked = pre(n[k]);
+  end when;
+end A;
+""")  # fmt: skip
+    assert [result.final[f"n[{i}]"] for i in (1, 2, 3)] == [5, 10, 15]
+    assert [result.final[f"m[{i}]"] for i in (1, 2, 3)] == [4, 8, 12]
+    assert (result.final["changes"], result.final["count"], result.final["picked"]) == (5, 4, 9)

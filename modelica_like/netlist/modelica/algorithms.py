@@ -136,13 +136,13 @@ class Algorithm:
 
     def insist(self, statement: Statement) -> None:
         """Refuse what an assertion excludes; what only a run knows is not checked, nor whether it comes to it."""
+        from modelica_like.netlist.modelica import operators
+
         if self.guards:
             return
-        given = statement.parts[0].args[1]
-        holds = self.here()(given[0]) if given else None
-        if holds is not None and holds.kind == "boolean" and not holds.args[0]:
-            said = given[1].args[0] if len(given) > 1 and given[1].kind == "string" else "no reason is given"
-            raise fold.Unfit(f"{self.text.name} refuses its arguments: {said}")
+        demand = operators.demand_of(self.here(), statement.parts[0])
+        if demand is not None and demand[0].kind == "boolean" and not demand[0].args[0]:
+            raise fold.Unfit(f"{self.text.name} refuses its arguments: {demand[1]}")
 
     def assign(self, target: Expr, value: Expr) -> None:
         """Give a variable, an element of an array or several results of a function their values."""

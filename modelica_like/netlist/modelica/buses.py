@@ -14,10 +14,11 @@ from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.causal import Pair, bus_of, connections, parts_below, variable_at
 from modelica_like.netlist.modelica.instance import DEEPEST, Given, Instance, Member
 from modelica_like.netlist.modelica.members import part_at, parts_in, sizes
-from modelica_like.netlist.modelica.signals import drives, is_inner
+from modelica_like.netlist.modelica.signals import drives, is_inner, kept
 from modelica_like.netlist.modelica.tree import Declaration, Expr, Modification
 from modelica_like.netlist.modelica.types import Basic, basic_type
 from modelica_like.netlist.modelica.wiring import groups
+from modelica_like.netlist.modelica.written import MEMORY
 
 _NO_PLACE = Source("")
 
@@ -40,6 +41,8 @@ def bus_equations(instance: Instance) -> Iterator[tuple[Expr, Expr, Source]]:
         left, right = variable_at(instance, path), variable_at(instance, other)
         if left.kind == "condition":
             right = Expr("condition", right.args)
+        elif _truth_of_bus(instance, path):  # the value itself, also one that is true for an instant only
+            left, right = kept(path), Expr("condition", right.args)
         elif right.kind == "condition":
             right = Expr("if", (right, fold.number(1), fold.number(0)))
         yield left, right, source
@@ -56,6 +59,11 @@ def _buses_in(instance: Instance) -> Iterator[Instance]:
 def _is_bus(instance: Instance, end: str) -> bool:
     part = part_at(instance, end)
     return isinstance(part, Instance) and part.text.expandable
+
+
+def _truth_of_bus(instance: Instance, path: str) -> bool:
+    bus = part_at(instance, _above(path)) if "." in path else None
+    return isinstance(bus, Instance) and f"{_last(path)}{MEMORY}" in bus.lent
 
 
 def _within(instance: Instance, end: str) -> str:
@@ -253,8 +261,11 @@ class _Buses:
             bus, name = self.buses[_above(first)], _last(first).partition("[")[0]
             member = bus.members[name]
             bus.members[name] = replace(member, declaration=replace(member.declaration, prefixes=frozenset({"output"})))
-            bus.balance += 1
-            giver.instance.balance -= 1
+            if member.declaration.type == "Boolean":
+                bus.lent.add(f"{_last(first)}{MEMORY}")
+            else:
+                bus.balance += 1
+                giver.instance.balance -= 1
             giver.instance.bus_equations.append((giver.variable, giver.path, giver.source))
         taking = [end for end in ends if end is not giver]
         for end in taking:

@@ -210,6 +210,10 @@ def cardinality(resolver: Resolver, argument: Expr) -> Expr:
     if instance is None or len(paths) != 1:
         raise refused("cardinality(…) of what is no single connector", resolver.text, argument.line)
     path = paths[0][0]
+    variable = declared_in(instance, path)
+    basic = basic_type(*variable) if variable is not None else None
+    if basic is not None and not basic.prefixes & {"input", "output"}:
+        raise refused("cardinality(…) of what is no single connector", resolver.text, argument.line)
     head, _, last = path.rpartition(".")
     places = [(instance, path)]
     if head:

@@ -7,7 +7,7 @@ import operator
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from modelica_like.netlist.modelica.calls import JUMPING
+from modelica_like.netlist.modelica.calls import JUMPING, Unfit
 from modelica_like.netlist.modelica.tree import Empty, Expr, joined, with_operands
 
 _BINARY: dict[str, Callable[[float, float], float]] = {
@@ -39,10 +39,6 @@ _KINDS = {"number": "a number", "boolean": "a truth value", "literal": "a value 
 _LARGEST_POWER = 100
 LONGEST = 100_000
 """Elements of an array, and steps of an algorithm."""
-
-
-class Unfit(ValueError):
-    """Operands do not fit, in words."""
 
 
 def known(expression: Expr) -> Expr:

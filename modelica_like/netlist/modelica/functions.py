@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+from modelica_like.errors import did_you_mean
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.algorithms import Algorithm
 from modelica_like.netlist.modelica.instance import GIVE, Given, Instance, refused
@@ -170,10 +171,6 @@ def called(resolver: Resolver, expression: Expr, given: tuple[Expr, ...], named:
     """
     name, line = expression.args[0], expression.line
     text = resolver.find(name)
-    if name == "Integer":
-        if len(given) != 1:
-            raise fold.Unfit(f"Integer(…) has 1 argument, not {len(given)}")
-        return fold.numbered(given[0])
     if isinstance(text, ClassText) and is_external_object(text) and "constructor" in text.classes:
         text = text.classes["constructor"]
     if not isinstance(text, ClassText) or text.kind not in ("function", "record"):
@@ -231,8 +228,14 @@ class _Call(Algorithm):
             what = f"{self.text.name}(…), a function of another language"
             raise refused(what, self.text, line, "Write its algorithm in Modelica.")
         positional = dict(zip(inputs, given, strict=False))
-        if len(given) > len(inputs) or any(name not in inputs or name in positional for name in named):
-            raise refused(f"these arguments of {self.text.name}", self.resolver.text, line)
+        if len(given) > len(inputs):
+            plural = "s" * (len(inputs) != 1)
+            raise fold.Unfit(f"{self.text.name} has {len(inputs)} input{plural}, not {len(given)}")
+        for name in named:
+            if name not in inputs:
+                raise fold.Unfit(f"{self.text.name} has no input '{name}'{did_you_mean(name, inputs)}")
+            if name in positional:
+                raise fold.Unfit(f"{self.text.name} is given {name} twice")
         taken = {**positional, **named}
         if native is not None:
             self.local.update(taken)
@@ -292,7 +295,7 @@ class _Call(Algorithm):
         if entry.value is not None:
             return self.here(entry.scope[1] if entry.scope else member.text)(entry.value)
         if "input" in declaration.prefixes:
-            raise refused(f"{self.text.name} without its argument {name}", self.resolver.text, line)
+            raise fold.Unfit(f"{self.text.name} needs a value for its input {name}")
         text = self.inside.find(declaration.type, member.text)
         if isinstance(text, ClassText) and text.kind == "record" and not declaration.dimensions:
             inner = Instance(self.classes, text, Given())

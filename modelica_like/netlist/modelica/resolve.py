@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from modelica_like.errors import ModelicaTextError, did_you_mean
 from modelica_like.language.inside import declarations
-from modelica_like.netlist.modelica import algorithms, constants, fold, members
-from modelica_like.netlist.modelica.calls import ARGUMENTS, ELEMENTARY, KEPT, REFUSED, wrong_count
+from modelica_like.netlist.modelica import constants, fold, members
 from modelica_like.netlist.modelica.classes import Classes
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
@@ -18,6 +17,7 @@ from modelica_like.netlist.modelica.subscripts import elements_at, subscript_of
 from modelica_like.netlist.modelica.tree import ClassText, Expr
 from modelica_like.netlist.modelica.types import Basic, basic_type
 
+_Made = TypeVar("_Made")
 _STATE_SELECT = ("never", "avoid", "default", "prefer", "always")
 
 
@@ -53,7 +53,9 @@ class Resolver:
         if kind in ("name", "condition"):
             return self._name(Expr("name", args, line))
         if kind == "call":
-            return self._call(expression)
+            from modelica_like.netlist.modelica.operators import called
+
+            return called(self, expression)
         if kind == "native":
             return fold.native(args[0], tuple(map(self, args[1:])), line)
         if kind == "shared":
@@ -72,7 +74,7 @@ class Resolver:
         if kind == "range":
             numbers = [self.number(argument) for argument in args]
             start, step, stop = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
-            return self._told(lambda: fold.row(start, step, stop, line), line)
+            return self.told(lambda: fold.row(start, step, stop, line), line)
         if kind in ("and", "or"):
             left = self(args[0])
             if left.kind == "boolean" and left.args[0] is (kind == "or"):  # the other side may have no value
@@ -83,7 +85,7 @@ class Resolver:
         if kind == "tuple":
             return Expr(kind, values, line)
         values = tuple(value.args[0] if value.kind == "tuple" else value for value in values)
-        return self._told(lambda: fold.operation(kind, values, line), line)
+        return self.told(lambda: fold.operation(kind, values, line), line)
 
     def _choice(self, args: tuple[Expr, ...], line: int) -> Expr:
         """Resolve an `if`: only the branches that may be taken."""
@@ -96,7 +98,7 @@ class Resolver:
                 otherwise = value
                 break
         last = self(otherwise)
-        return self._told(lambda: fold.choice(kept, last, line), line) if kept else last
+        return self.told(lambda: fold.choice(kept, last, line), line) if kept else last
 
     def condition(self, expression: Expr, word: str, line: int) -> Expr:
         """Return the resolved condition of an `if` and the like.
@@ -109,11 +111,14 @@ class Resolver:
             raise ModelicaTextError(f"The condition of this '{word}' is a number.", where=self.text.place(line))
         return resolved
 
-    def _told(self, make: Callable[[], Expr], line: int) -> Expr:
+    def told(self, make: Callable[[], _Made], line: int) -> _Made:
+        """Return what is made; errors have the line."""
         try:
             return make()
         except fold.Unfit as error:
-            raise ModelicaTextError(f"{error}.", where=self.text.place(line)) from None
+            sentence = f"{error}".removesuffix("?")
+            end = "." if sentence == f"{error}" else "?"
+            raise ModelicaTextError(f"{sentence}{end}", where=self.text.place(line)) from None
         except ModelicaTextError as error:
             error.where = error.where or (self.text.place(line),)
             raise
@@ -125,9 +130,8 @@ class Resolver:
             raise refused("an iterator without a range", self.text, element.line)
         items = []
         for value in self.array(over):
-            inner = Resolver(
-                self.instance, self.text, {**self.local, name: value}, numeric=self.numeric, classes=self.classes
-            )
+            inner = self.like(numeric=self.numeric)
+            inner.local[name] = value
             items.append(inner._built(element, rest) if rest else inner(element))
         return Expr("array", tuple(items), element.line)
 
@@ -163,12 +167,16 @@ class Resolver:
         if resolved.kind == "array" and all(item.kind == "literal" for item in resolved.args):
             return len(resolved.args)
         size = self.number(expression)
-        self._told(lambda: fold.number(fold.count(size)), expression.line)
+        self.told(lambda: fold.number(fold.count(size)), expression.line)
         return int(size)
 
     def known(self) -> Resolver:
         """Return the same resolver with parameters as values."""
-        return Resolver(self.instance, self.text, self.local, numeric=True, classes=self.classes, depth=self.depth)
+        return self.like(numeric=True)
+
+    def like(self, *, numeric: bool) -> Resolver:
+        """Return a resolver of the same place, with local values of its own."""
+        return Resolver(self.instance, self.text, self.local, numeric=numeric, classes=self.classes, depth=self.depth)
 
     # -- names -------------------------------------------------------------------------------------------------------
 
@@ -191,7 +199,7 @@ class Resolver:
 
     def indexed(self, value: Expr, subscripts: tuple[Expr, ...], line: int) -> Expr:
         """Return an element of an array."""
-        return self._told(lambda: elements_at(self, value, subscripts, line), line)
+        return self.told(lambda: elements_at(self, value, subscripts, line), line)
 
     def index(self, expression: Expr, size: int, *, known: bool = False) -> int | Expr:
         """Return a subscript; see `subscript_of`."""
@@ -321,72 +329,3 @@ class Resolver:
     def find(self, name: str) -> Any:
         """Return the class that a name means."""
         return self.instance.find(name, self.text) if self.instance else self.classes.find(name, self.text)
-
-    # -- calls -------------------------------------------------------------------------------------------------------
-
-    def _call(self, expression: Expr) -> Expr:
-        from modelica_like.netlist.modelica import functions
-
-        name, given, named = expression.args
-        line = expression.line
-        short = name.removeprefix("Modelica.Math.").removeprefix("Math.")
-        if short == "cardinality" and len(given) == 1:
-            from modelica_like.netlist.modelica.causal import cardinality
-
-            return cardinality(self, given[0])
-        if short in REFUSED:
-            raise refused(REFUSED[short], self.text, line)
-        if short == "homotopy":
-            others = dict(named)
-            given, named = (*given, *(others[key] for key in ("actual", "simplified") if key in others)), ()
-        if wrong := wrong_count(short, len(given)):
-            raise ModelicaTextError(wrong, where=self.text.place(line))
-        if named and short in {*ARGUMENTS, *KEPT, *functions.OF_ARRAYS, *ELEMENTARY}:
-            raise ModelicaTextError(f"{short}(…) has no argument '{named[0][0]}'.", where=self.text.place(line))
-        if short in (fold.SILENT, fold.ARGUMENT):
-            value = self(given[0])
-            return value if value.kind in fold.KNOWN else fold.call(short, (value,), line)
-        if short == "getInstanceName" and self.instance is not None:
-            return Expr("string", (self.instance.full_name,), line)
-        if short == "homotopy":
-            return self._told(lambda: fold.kept(short, tuple(map(self, given)), line), line)
-        if short in ("smooth", "noEvent"):
-            value = self(given[1 if short == "smooth" else 0])
-            return fold.kept("noEvent", (value,), line)
-        if short in KEPT:
-            return self._kept(short, given, line)
-        if short == "size":
-            items = self._sized(given[0])
-            dimension = self.number(given[1]) if len(given) > 1 else None
-            return self._told(lambda: functions.size(items, dimension, line), line)
-        values = tuple(self(argument) for argument in given)
-        if short in functions.OF_ARRAYS:
-            return self._told(lambda: functions.of_arrays(short, values, line), line)
-        if short in ELEMENTARY:
-            return self._told(lambda: fold.function(short, values, line), line)
-        others = {key: self(argument) for key, argument in named}
-        try:
-            return self._told(lambda: functions.called(self, expression, values, others), line)
-        except algorithms.OpenLoop as error:
-            if self.instance is None:
-                raise
-            if self.numeric:
-                raise ModelicaTextError(error.what, where=error.where) from None
-            return self.known()(expression)  # parameters are numbers then, and cannot change afterwards
-
-    def _kept(self, short: str, given: tuple[Expr, ...], line: int) -> Expr:
-        """Resolve a call that only a run has a value of."""
-        values = tuple(self(argument) for argument in given)
-        interval = values[-1] if (short, len(values)) in (("sample", 2), ("Clock", 1)) else fold.number(1)
-        if interval.kind == "number" and not interval.args[0] > 0:
-            what = f"{short}(…) needs an interval above 0, not {interval.args[0]:g}."
-            raise ModelicaTextError(what, where=self.text.place(line))
-        return self._told(lambda: fold.each(short, values, line, lambda items: fold.call(short, items, line)), line)
-
-    def _sized(self, expression: Expr) -> Expr:
-        """Resolve an array for its size; one of components counts, too."""
-        simple = expression.kind == "name" and len(expression.args) == 1 and not expression.args[0][1]
-        member = self.instance.members.get(expression.path) if simple and self.instance is not None else None
-        if self.instance is None or member is None or basic_type(self.instance, member) is not None:
-            return self(expression)
-        return members.named_array(expression.path, members.sizes(self.instance, member), "")

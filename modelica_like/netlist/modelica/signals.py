@@ -9,6 +9,7 @@ from modelica_like.errors import Source
 from modelica_like.language.fields import Output
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.calls import OF_BEFORE
 from modelica_like.netlist.modelica.causal import declared_in
 from modelica_like.netlist.modelica.instance import Instance, Member
 from modelica_like.netlist.modelica.library import Known
@@ -21,7 +22,6 @@ from modelica_like.netlist.modelica.wiring import Wire
 from modelica_like.netlist.modelica.written import MEMORY
 
 INSTANTS = ("sample", "edge", "change", "initial", "terminal")
-_OF_BEFORE = ("pre", "edge", "change")
 Equation = tuple[Expr, Expr, Source]
 
 
@@ -131,7 +131,8 @@ class Memories:
                 continue
             self.of[path] = basic, any(call.args[0] in INSTANTS for call in calls_in(right))
             self.equations += [self._out(path, basic, source), (kept(path), right, source)]
-        for path in sorted(self.assigned):
+        lent = {name.removesuffix(MEMORY) for name in self.instance.lent if name.endswith(MEMORY)}
+        for path in sorted(self.assigned | lent):
             basic = self._signal(path)
             if basic is not None and path not in self.of:
                 self.of[path] = basic, False
@@ -170,7 +171,7 @@ def whole_numbers(instance: Instance, value: Expr) -> Expr:
     """Return the value of a discrete variable with whole numbers of signals, which change at events, too."""
 
     def taking(node: Expr) -> Expr:
-        if node.kind == "call" and node.args[0] in _OF_BEFORE:
+        if node.kind == "call" and node.args[0] in OF_BEFORE:
             return node
         if node.kind != "name":
             return with_operands(node, taking)
@@ -187,6 +188,6 @@ def whole_numbers(instance: Instance, value: Expr) -> Expr:
 def _asked(value: Expr) -> Iterator[str]:
     """Yield the names whose values before events an expression needs."""
     for call in calls_in(value):
-        argument = call.args[1][0] if call.args[0] in _OF_BEFORE and call.args[1] else None
+        argument = call.args[1][0] if call.args[0] in OF_BEFORE and call.args[1] else None
         if argument is not None and argument.kind in ("name", "condition"):
             yield argument.args[0][0]

@@ -199,7 +199,7 @@ class Statements(Whens):
         member = self.instance.members.get(name)
         basic = basic_type(self.instance, member) if member is not None else None
         continuous = basic is not None and basic.kind == "Real" and "discrete" not in basic.prefixes
-        if continuous and name not in self.assigned:
+        if name == "time" or (continuous and name not in self.assigned):
             raise ModelicaTextError(
                 f"{call.args[0]}({name}): only what changes at events has a value before them.", where=source
             )

@@ -65,7 +65,7 @@ def subscript_of(resolver: Resolver, expression: Expr, size: int, *, known: bool
         return chosen
     chosen = fold.numbered(chosen)
     if chosen.kind != "number":
-        if known or fold.is_condition(chosen) or not _is_whole(resolver, chosen):
+        if known or fold.is_condition(chosen) or not is_whole(resolver, chosen):
             raise ModelicaTextError(
                 "A subscript must be a number that constants and parameters determine.", where=place
             )
@@ -77,12 +77,12 @@ def subscript_of(resolver: Resolver, expression: Expr, size: int, *, known: bool
     return int(position)
 
 
-def _is_whole(resolver: Resolver, node: Expr) -> bool:
+def is_whole(resolver: Resolver, node: Expr) -> bool:
     """Tell whether an expression is of whole numbers; what a function has from outside is as it is declared there."""
     from modelica_like.netlist.modelica.causal import declared_in
 
     def all_whole(operands: tuple[Expr, ...]) -> bool:
-        return all(_is_whole(resolver, operand) for operand in operands)
+        return all(is_whole(resolver, operand) for operand in operands)
 
     if node.kind == "number":
         return node.args[0] == int(node.args[0])
@@ -90,6 +90,8 @@ def _is_whole(resolver: Resolver, node: Expr) -> bool:
         return node.args[0].whole
     if node.kind == OUTSIDE:
         return all_whole(node.args[:1])
+    if node.kind == "literal":
+        return True
     if node.kind == "if":
         return all_whole((*node.args[1::2], node.args[-1]))
     if node.kind == "call":

@@ -50,7 +50,11 @@ class Expr:
         if depth > _DEEPEST:
             raise ModelicaTextError(f"A formula has more than {_DEEPEST} levels.")
         if size > _LARGEST:
-            raise ModelicaTextError(f"A formula has more than {_LARGEST} numbers, names and operations.")
+            advice = (
+                "The loops of a function are written out, and so is what it gives on: take shorter loops and arrays."
+            )
+            what = f"A formula has more than {_LARGEST} numbers, names and operations."
+            raise ModelicaTextError(what, advice=advice)
         object.__setattr__(self, "depth", depth)
         object.__setattr__(self, "size", size)
 

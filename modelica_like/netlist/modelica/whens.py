@@ -8,6 +8,7 @@ from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.causal import declared_at
 from modelica_like.netlist.modelica.instance import Instance, refused
+from modelica_like.netlist.modelica.operators import arguments, demand_of, words_of
 from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
@@ -97,15 +98,15 @@ class Whens:
                     raise refused("a 'when' with an equation that is not solved for a variable", text, statement.line)
                 fitting = self.fitting(target, value, text, statement.line)
                 values[target.args[0][0]] = as_condition(value) if target.kind == "condition" else fitting
-            elif call is not None and call.args[0] == "reinit" and len(call.args[1]) == 2:
-                targets, given = (fold.elements(resolver(side)) for side in call.args[1])
+            elif call is not None and call.args[0] == "reinit":
+                targets, given = (fold.elements(resolver(side)) for side in arguments(resolver, call))
                 if len(targets) != len(given) or any(target.kind != "name" for target in targets):
                     what = "reinit(…) needs states, and as many values."
                     raise ModelicaTextError(what, where=text.place(statement.line))
                 values |= {target.args[0][0]: value for target, value in zip(targets, given, strict=True)}
                 self.reset |= {target.args[0][0] for target in targets}
             elif call is not None and call.args[0] == "terminate":
-                values[TERMINATE] = Expr("string", (_words(call.args[1][0]),), statement.line)
+                values[TERMINATE] = Expr("string", (words_of(arguments(resolver, call)[0]),), statement.line)
             elif call is not None and is_demand(call):
                 demand = self.demanded(call, resolver, text)
                 values |= {} if demand is None else {f"{ASSERT}{len(values)}": Expr("demand", demand, statement.line)}
@@ -154,14 +155,10 @@ class Whens:
         Raises:
             ModelicaTextError: it is certain, and broken.
         """
-        name, given, named = call.args
-        if name != "assert":  # an error
-            given = (Expr("boolean", (False,), call.line), *given)
-        level = given[2] if len(given) > 2 else dict(named).get("level")
-        if level is not None and not (level.kind == "name" and level.args[-1][0] == "error"):
+        demand = demand_of(resolver, call)
+        if demand is None:
             return None
-        condition = resolver.condition(given[0], "assert", call.line)
-        words = _words(given[1]) if len(given) > 1 else "an assertion is broken"
+        condition, words = demand
         if condition.kind != "boolean" or ((self.in_branch or not certain) and not condition.args[0]):
             return condition, Expr("string", (words,), call.line)
         if not condition.args[0]:
@@ -214,10 +211,3 @@ def as_condition(node: Expr) -> Expr:
     taken = fold.operation("and", (condition, as_condition(value)), node.line)
     left = fold.operation("and", (fold.operation("not", (condition,), node.line), other), node.line)
     return fold.operation("or", (taken, left), node.line)
-
-
-def _words(node: Expr) -> str:
-    """Return the text of a message; numbers in it are left out."""
-    if node.kind == "string":
-        return node.args[0].replace("{", "(").replace("}", ")")
-    return "".join(_words(argument) for argument in node.args if isinstance(argument, Expr)) or "…"

@@ -264,8 +264,12 @@ class Written(Assembly):
 
     def _called(self, name: str, values: list[Any], events: bool | None) -> Any:
         if name == "pre" and not (isinstance(values[0], Symbol) and is_a(values[0], Discrete)):
-            varies = isinstance(values[0], Symbol) and is_a(values[0], Variable)
-            return before(values[0]) if varies and events is None else values[0]
+            if not isinstance(values[0], Symbol) or not (values[0] is TIME or is_a(values[0], Variable)):
+                return values[0]
+            if events is None and values[0] is not TIME:
+                return before(values[0])
+            what = f"pre({values[0]}): only what changes at events has a value before them."
+            raise LanguageError(what, advice="In a 'when', name a variable.")
         return _STEPPED[name](*values, events) if name in JUMPING else FUNCTIONS[name](*values)
 
     def _symbol(self, path: str) -> Any:
