@@ -61,6 +61,7 @@ class Parameters:
             unit = coherent(unit_of_field(component, name))
             read = read_quantity(value.given) if field.unit_text == "*" and isinstance(value.given, str) else None
             tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
+            tunable = tunable and name not in inside(component).frozen
             number, bounds, written = cast(float, value.number), field.bounds, read[1] if read else None
             self.flat.append(FlatParameter(path, unit, field.description, number, *bounds, tunable, above, written))
             self._symbols.append(expression)

@@ -18,7 +18,7 @@ from modelica_like.language.icon import Icon
 from modelica_like.language.inside import Declarations, Inside, InsideComponent, declarations, inside, of_kind
 from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
-from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
+from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, keep_as_read, rows
 from modelica_like.language.transition import Events
 
 
@@ -165,6 +165,8 @@ class Component(Declared):
             raise
         if field.name in self._inside.measured:
             raise both_given(self._inside.measured[field.name], field.name)
+        if field.name in self._inside.frozen:
+            keep_as_read(self.label, field.name, self.value(field.name), understood)
         store = self._inside.values if isinstance(field, Parameter | Input) else self._inside.starts
         store[field.name] = understood
 
@@ -344,7 +346,7 @@ class Component(Declared):
         if reserved or name in {*self.fields, *record.connectors, *self._declared.structural, *self._declared.modes}:
             hint = ": every component has something of this name" * reserved
             raise DuplicateName(f"{self.label}: '{name}' is already in use{hint}.", where=caller())
-        require_identifier(name, type(self).__name__)
+        require_identifier(name, type(self).__name__, element=True)
         if isinstance(value, list):
             adopted: Any = [self._owned(f"{name}[{k}]", part) for k, part in enumerate(value, 1)]
         else:
@@ -380,10 +382,8 @@ class Component(Declared):
         return twin
 
     def __repr__(self) -> str:
-        values = [
-            f"{name}={value.given!r}" for name, value in (*self._inside.values.items(), *self._inside.starts.items())
-        ]
-        return f"{type(self).__name__}({', '.join(values)})"
+        given = {**self._inside.values, **self._inside.starts}.items()
+        return f"{type(self).__name__}({', '.join(f'{name}={value.given!r}' for name, value in given)})"
 
 
 _MOST = 100_000

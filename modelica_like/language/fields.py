@@ -388,11 +388,12 @@ def integer(description: str = "", *, start: Any = 0) -> Any:
     return declared
 
 
-def require_identifier(name: str, where: str) -> None:
-    """Refuse names that are not public identifiers.
+def require_identifier(name: str, where: str, *, element: bool = False) -> None:
+    """Refuse names that are not public identifiers; those of elements of matrices may be, `wheel[1,2]`.
 
     Raises:
         LanguageError: the name is private, or not an identifier.
     """
-    if name.startswith("_") or not name.isidentifier():
+    bare = re.sub(r"\[\d+(,\d+)+\]$", "", name) if element else name
+    if name.startswith("_") or not bare.isidentifier():
         raise LanguageError(f"{where} declares '{name}'.", advice="A name is a letter, then letters, digits and _.")

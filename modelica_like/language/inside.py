@@ -6,7 +6,7 @@ records: `declarations` of a class, and what is `inside` of each of its instance
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
@@ -118,6 +118,7 @@ class InsideComponent(Inside):
         measured: scale parameters that must have no value, by name: the table with quantities that forbids it.
         elements: parts, with those of lists one by one; made on first use.
         elsewhere: own discrete variables that an owner's equations determine.
+        frozen: parameters of whose values others were made when a text was read.
         lent: equations of own variables that stand in an owner, less those of parts that stand here.
     """
 
@@ -130,6 +131,7 @@ class InsideComponent(Inside):
     measured: dict[str, str] = field(default_factory=_empty)
     elements: Mapping[str, Component] | None = None
     elsewhere: frozenset[str] = frozenset()
+    frozen: Set[str] = frozenset()
     lent: int = 0
 
     def detached(self) -> Self:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, cast
 
-from modelica_like.errors import ModelicaLikeError, NetlistError, ValueOutOfRange
+from modelica_like.errors import LanguageError, ModelicaLikeError, NetlistError, ValueOutOfRange
 from modelica_like.language.expr import Expr
-from modelica_like.language.fields import Field
+from modelica_like.language.fields import Field, Value
 from modelica_like.language.inside import inside
 from modelica_like.language.places import caller
 from modelica_like.language.units import ANY, Unit, parse_unit, to_si
@@ -162,6 +162,16 @@ def frozen_rows(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return tuple(frozen_rows(item) for item in cast("list[Any]", value))
     return value
+
+
+def keep_as_read(label: str, name: str, before: Value | None, new: Value) -> None:
+    """Refuse another value for a parameter of whose value others were made when a text was read."""
+    if before is not None and (before.number, before.formula) != (new.number, new.formula):
+        raise LanguageError(
+            f"{label}.{name} was read as a number, of which others were made, and cannot change afterwards.",
+            where=caller(),
+            advice="Change it in the text, or extend the class with this value under a name of its own.",
+        )
 
 
 def both_given(label: str, scale: str) -> ModelicaLikeError:

@@ -455,6 +455,12 @@ MESSAGES: dict[str, tuple[str, str]] = {
         model("Real x;", "x = pre(time);"),
         "pre(time): only what changes at events has a value before them.\n  in a.mo:5 `x = pre(time);`",
     ),
+    "values for some elements of a matrix of parts": (
+        model(f"{R}.Inertia r[2,3](J = {{1, 2}});"),
+        "An array of 2 by 3 elements is given 2 values.\n"
+        "  in a.mo:3 `Modelica.Mechanics.Rotational.Components.Inertia r[2,3](J = {1, 2});`\n"
+        "Write 'each' where all elements take the same.",
+    ),
     "a sample without an interval": (
         model("Real x;", "when sample(0, 0) then x = time; end when;"),
         "sample(…) needs an interval above 0, not 0.\n  in a.mo:5 `when sample(0, 0) then x = time; end when;`",
@@ -730,8 +736,8 @@ def test_what_ends_a_run(case: str, tmp_path: Path, check_message) -> None:
     check_message(LimitPassed, lambda: simulate(drive, 1.0), f"At {time} s A {what}.")
 
 
-def test_a_parameter_of_which_arrays_are_made(tmp_path: Path, check_message) -> None:
-    (tmp_path / "a.mo").write_text(model("parameter Real a = 1; parameter Real v[2] = {a, 2*a}; Real x = v[2];"))
+def test_a_parameter_of_which_whole_numbers_are_made(tmp_path: Path, check_message) -> None:
+    (tmp_path / "a.mo").write_text(model("parameter Real a = 1; parameter Integer n = integer(2*a); Real x = n;"))
     (tmp_path / "drive.toml").write_text('[parts]\nb = { is = "./a.mo:A", a = 3 }\n')
     told = (
         "A.a was read as a number, of which others were made, and cannot change afterwards.\n"

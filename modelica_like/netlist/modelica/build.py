@@ -29,17 +29,12 @@ from modelica_like.netlist.modelica.carried import Carried
 from modelica_like.netlist.modelica.causal import is_causal, variables
 from modelica_like.netlist.modelica.connectors import bundle, connector_of, lend
 from modelica_like.netlist.modelica.declare import Fields
+from modelica_like.netlist.modelica.elements import elements_of
 from modelica_like.netlist.modelica.icons import icon_of
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
 from modelica_like.netlist.modelica.known import library_part
 from modelica_like.netlist.modelica.library import Known, connector_type
-from modelica_like.netlist.modelica.members import (
-    element,
-    elements_of,
-    exists,
-    part_of,
-    sizes,
-)
+from modelica_like.netlist.modelica.members import element, exists, part_of, sizes
 from modelica_like.netlist.modelica.types import Basic, basic_type
 from modelica_like.netlist.modelica.values import Notes, unit_of
 from modelica_like.netlist.modelica.wiring import Wire, bundled, paths, rank
@@ -109,6 +104,7 @@ class _Builder(Fields):
         self._connect()
         if self.errors:
             raise raise_together_or_one(self.errors)
+        record.frozen = self.instance.frozen_in()
         return component
 
     def _drive(self) -> None:
@@ -159,21 +155,15 @@ class _Builder(Fields):
             self._basic(name, member, basic)
             return
         shape = sizes(self.instance, member)
-        if len(shape) > 1:
-            raise refused(f"{name}, an array with several dimensions,", member.text, member.declaration.line)
-        if not shape:
-            part = part_of(self.instance, member)
-            setattr(self.component, name, self._part(name, member, part, member.given))
+        parts = {
+            path: self._part(path, member, part_of(self.instance, member, place), element(member.given, place, shape))
+            for path, place in elements_of(name, shape)
+        }
+        if len(shape) == 1 and not any(isinstance(part, Connector) for part in parts.values()):
+            setattr(self.component, name, [*parts.values()])
             return
-        parts = [
-            self._part(f"{name}[{k}]", member, part_of(self.instance, member, k), element(member.given, k, shape[0]))
-            for k in range(1, shape[0] + 1)
-        ]
-        if parts and isinstance(parts[0], Connector):
-            for k, element_part in enumerate(parts, 1):
-                setattr(self.component, f"{name}[{k}]", element_part)
-        else:
-            setattr(self.component, name, parts)
+        for path, part in parts.items():
+            setattr(self.component, path, part)
 
     def _part(self, name: str, member: Member, part: Instance | Known | str, given: Given) -> Component | Connector:
         self.instance.classes.spend(50, member.text, member.declaration.line)
@@ -214,9 +204,8 @@ class _Builder(Fields):
                 self.parameter(name, member, basic)
             return
         shape = sizes(self.instance, member)
-        for path, index in elements_of(name, shape):
-            given = element(basic.given, index, shape[0]) if index else basic.given
-            self.variable(path, name, member, replace(basic, given=given))
+        for path, place in elements_of(name, shape):
+            self.variable(path, name, member, replace(basic, given=element(basic.given, place, shape)))
 
     # -- equations and connections -----------------------------------------------------------------------------------
 
@@ -248,7 +237,8 @@ class _Builder(Fields):
         """Remember the parts of a connection that are components: one of them lacks an end."""
         for head in {end.partition(".")[0].partition("[")[0] for end in ends if "." in end}:
             member = self.instance.members.get(head)
-            part = part_of(self.instance, member, 1 if sizes(self.instance, member) else 0) if member else None
+            first = tuple(1 for _ in sizes(self.instance, member)) if member else ()
+            part = part_of(self.instance, member, first) if member else None
             if isinstance(part, Known):
                 self.instance.classes.lack(f"{self.instance.path}.{head}", part.path)
 

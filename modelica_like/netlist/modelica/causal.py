@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.elements import elements_of, named_array
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.lifting import above
-from modelica_like.netlist.modelica.members import elements_of, named_array, part_at, parts_in, sizes
+from modelica_like.netlist.modelica.members import part_at, parts_in, sizes
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
 from modelica_like.netlist.modelica.types import Basic, basic_type

@@ -9,9 +9,10 @@ from modelica_like.language import Connector, flow, var
 from modelica_like.language.fields import Discrete, Input, Variable
 from modelica_like.language.inside import inside
 from modelica_like.netlist.modelica.attributes import check_attributes
+from modelica_like.netlist.modelica.elements import elements_of, place_of
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, connector_type
-from modelica_like.netlist.modelica.members import elements_of, part_of, sizes
+from modelica_like.netlist.modelica.members import part_of, sizes
 from modelica_like.netlist.modelica.tree import Expr
 from modelica_like.netlist.modelica.types import basic_type
 from modelica_like.netlist.modelica.values import Notes, nominal_of, unit_of
@@ -50,8 +51,8 @@ def bundle(path: str, instance: Instance, owner: Instance, wires: list[Wire]) ->
     place = instance.text.place(instance.text.line)
     joined = {end for wire in wires for end in wire.ends}
     for leaf in bundled(instance):
-        name, _, index = leaf.partition("[")
-        part = part_of(instance, instance.members[name], int(index.rstrip("]")) if index else 0)
+        name = leaf.partition("[")[0]
+        part = part_of(instance, instance.members[name], place_of(leaf))
         outer, inner = (_side(leaf, part, instance.members[name]) for _ in (0, 1))
         setattr(component, leaf, outer)
         if f"{path}.{INSIDE}{leaf}" not in joined:

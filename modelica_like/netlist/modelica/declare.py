@@ -6,7 +6,7 @@ from typing import Any
 
 from modelica_like.language import boolean, discrete, guess, integer, param, signal_in, signal_out, var
 from modelica_like.language.assembly import declare
-from modelica_like.language.fields import Discrete, Field, Input, Parameter
+from modelica_like.language.fields import Discrete, Field, Input
 from modelica_like.netlist.modelica.before import uses_time
 from modelica_like.netlist.modelica.fold import numbered
 from modelica_like.netlist.modelica.instance import Given, Instance, Member, refused
@@ -68,7 +68,6 @@ class Fields:
             min=low,
             max=high,
             fixed=fixed and not follows,
-            tunable=name not in self.instance.frozen,
         )
         if follows and formula is not None:
             place = member.text.place(member.declaration.line)
@@ -76,8 +75,6 @@ class Fields:
         elif given.value is not None and not outside:
             parameter.default = self._value(given, self.instance, "")
         parameter.nominal = nominal_of(basic)
-        if isinstance(parameter, Parameter):
-            self.instance.parameters[name] = parameter
         declare(self.component, name, parameter)
         if given.value is not None and outside:
             demand_determined(f"{self.instance.path}.{name}".lstrip("."), given)

@@ -19,6 +19,7 @@ from modelica_like.language.declared import Connector
 from modelica_like.language.expr import symbol_of
 from modelica_like.language.fields import Discrete, Field, Input, Parameter, Variable
 from modelica_like.language.inside import inside
+from modelica_like.netlist.modelica.elements import Place, elements_of, extent, in_braces, named_at, place_of
 from modelica_like.netlist.modelica.own_classes import (
     NO_EQUATIONS,
     beyond_equations,
@@ -149,7 +150,7 @@ class _Flat:
             if len({*elements.values()}) > 1:
                 what = f"{prefix}{base} is an array of different parts, which Modelica does not have."
                 raise ModelicaTextError(what, advice="Give each part a name of its own.")
-            size = f"[{len(elements)}]" if base not in elements else ""
+            size = named_at("", extent(map(place_of, elements)))
             text = f"  {next(iter(elements.values()))} {identifier(base)}{size}{_modified(values.get(base))}"
             lines.append(f'{text} "{_quoted(about[base])}";' if about.get(base) else f"{text};")
         return lines
@@ -198,24 +199,24 @@ class _Flat:
 
 def _merged(tree: _Tree) -> _Tree:
     """Return modifications in which those of `x[1]` and `x[2]` are those of the array `x`."""
-    result, arrays = _Tree(), dict[str, dict[int, Any]]()
+    result, arrays = _Tree(), dict[str, dict[Place, Any]]()
     for name, value in tree.items():
         each = _merged(value) if isinstance(value, dict) else value
-        base, _, index = name.partition("[")
-        if index:
-            arrays.setdefault(base, {})[int(index.rstrip("]"))] = each
+        if place := place_of(name):
+            arrays.setdefault(name.partition("[")[0], {})[place] = each
         else:
             result[name] = each
     for base, elements in arrays.items():
-        result[base] = _joined(base, [elements.get(k, {}) for k in range(1, max(elements) + 1)])
+        shape = extent(elements)
+        result[base] = _joined(base, [elements.get(place, {}) for _, place in elements_of(base, shape)], shape)
     return result
 
 
-def _joined(name: str, elements: list[Any]) -> Any:
+def _joined(name: str, elements: list[Any], shape: tuple[int, ...]) -> Any:
     keys = dict.fromkeys(key for each in elements if isinstance(each, dict) for key in each)
     if keys:
-        return {key: _joined(key, [each.get(key, {}) for each in elements]) for key in keys}
-    return f"{{{', '.join(each or _ABSENT[name] for each in elements)}}}"
+        return {key: _joined(key, [each.get(key, {}) for each in elements], shape) for key in keys}
+    return in_braces([each or _ABSENT[name] for each in elements], shape)
 
 
 def _modified(given: Any) -> str:

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from modelica_like.errors import ModelicaTextError, Source, UnknownName, did_you_mean
-from modelica_like.language.fields import Parameter
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica.classes import Classes, Found
 from modelica_like.netlist.modelica.library import Known, table
@@ -130,13 +129,14 @@ class Member:
     Attributes:
         text: class whose names the declaration uses.
         given: its modifications, all levels merged.
+        parts: its instances, by their places in an array; made on first use.
         constraint: modification of a constraining class is among them.
     """
 
     declaration: Declaration
     text: ClassText
     given: Given
-    part: Instance | list[Instance] | None = None
+    parts: dict[tuple[int, ...], Instance] | None = None
     constraint: bool = False
 
 
@@ -155,8 +155,7 @@ class Instance:
         adopted: equations of parts that use what is in this instance.
         own_pairs: ends that its equations connect, once they are known.
         pairs: likewise, without those of `outer` parts, with those of parts with its `inner` ones.
-        frozen: parameters whose values are in what was read.
-        parameters: of its component.
+        frozen: parameters whose values are in what was read, of components of the table in it, too, by their names.
         lent: own discrete variables whose equations stand in an instance above.
         driving: protected signals that drive parts.
         late: values of discrete variables before the start that only a run knows.
@@ -178,8 +177,7 @@ class Instance:
         self.folded: set[str] = set()
         self.free: dict[str, str] = {}
         self.values: dict[str, Expr] = {}
-        self.frozen: set[str] = set()
-        self.parameters: dict[str, Parameter] = {}
+        self.frozen: dict[str, set[str]] = {}
         self.adopted: list[tuple[Expr, Expr, Source]] = []
         self.own_pairs: list[tuple[str, str, Source]] | None = None
         self.pairs: list[tuple[str, str, Source]] | None = None
@@ -199,12 +197,14 @@ class Instance:
         before = self.owner.path if self.owner else ""
         return f"{before}.{self.name}" if before else self.name
 
-    def freeze(self, name: str) -> None:
+    def frozen_in(self, part: str = "") -> set[str]:
+        """Return the parameters whose values are in what was read: its own, or those of a component in it."""
+        return self.frozen.setdefault(part, set())
+
+    def freeze(self, name: str, part: str = "") -> None:
         """Note that what was read has the value of a parameter: it cannot change afterwards."""
         if not self.classes.only_said:
-            self.frozen.add(name)
-            if name in self.parameters:
-                self.parameters[name].tunable = False
+            self.frozen_in(part).add(name)
 
     @property
     def full_name(self) -> str:

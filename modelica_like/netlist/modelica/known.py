@@ -58,6 +58,7 @@ def library_part(
         owner.classes.lack(f"{owner.path}.{name}", entry.path)
         raise
     initial += part.initial
+    inside(component).frozen = owner.frozen_in(name)
     return component
 
 

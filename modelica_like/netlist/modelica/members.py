@@ -10,27 +10,14 @@ from dataclasses import replace
 from modelica_like.errors import ModelicaTextError, UnknownName
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import at_start, fold, resolve
+from modelica_like.netlist.modelica.elements import Place, elements_of, named_at, place_of
 from modelica_like.netlist.modelica.instance import DEEPEST, Given, Instance, Member, given, refused, unknown_class
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.tree import ClassText, Expr, names_in
 from modelica_like.netlist.modelica.types import basic_type, misfit
 
-
-def named_array(path: str, shape: tuple[int, ...], kind: str) -> Expr:
-    """Return the array of the names `path[1]`, `path[2]` and so on."""
-    if not shape:
-        return Expr("name" if kind != "Boolean" else "condition", ((path, ()),))
-    inner = [f"{path[:-1]},{k}]" if path.endswith("]") else f"{path}[{k}]" for k in range(1, shape[0] + 1)]
-    return Expr("array", tuple(named_array(index, shape[1:], kind) for index in inner))
-
-
-def elements_of(name: str, shape: tuple[int, ...]) -> list[tuple[str, int]]:
-    """Return the names of an array's elements with their index, or the name itself with zero."""
-    if not shape:
-        return [(name, 0)]
-    if len(shape) == 1:
-        return [(f"{name}[{k}]", k) for k in range(1, shape[0] + 1)]
-    return [(f"{name}[{k},{m}]", 0) for k in range(1, shape[0] + 1) for m in range(1, shape[1] + 1)]
+_LARGE = 1000
+"""Numbers, names and operations of an array of formulas; a larger one is made of numbers."""
 
 
 def unknown_name(what: str, text: ClassText, line: int) -> UnknownName:
@@ -46,7 +33,7 @@ def sizes(owner: Instance, member: Member) -> tuple[int, ...]:
         if dimension.kind != "all":
             shape.append(resolver.count(dimension))
             continue
-        value = value_of(owner, member.declaration.name, member.text, dimension.line)
+        value = formulas_of(owner, member) or value_of(owner, member.declaration.name, member.text, dimension.line)
         for _ in range(k):
             value = value.args[0] if value.args and isinstance(value.args[0], Expr) else value
         if value.kind != "array":
@@ -116,6 +103,24 @@ def value_of(owner: Instance, name: str, text: ClassText, line: int) -> Expr:
     if owner.classes.only_said:  # one that is read later keeps what it depends on
         del owner.values[name]
     return value
+
+
+def formulas_of(owner: Instance, member: Member) -> Expr | None:
+    """Return an array of parameters by names of the place that gives it; None where numbers of it are needed.
+
+    Numbers are needed where it is given as a function of many numbers, and where its elements cannot be told apart.
+    """
+    given, name = member.given, member.declaration.name
+    if given.value is None or given.scope is None or name in owner.folded:
+        return None
+    owner.folded.add(name)
+    try:
+        value = resolve.Resolver(*given.scope)(given.value)
+    except ModelicaTextError:
+        return None  # told, if it is no array of numbers either
+    finally:
+        owner.folded.remove(name)
+    return value if value.kind == "array" and value.size <= _LARGE else None
 
 
 def check_value(owner: Instance, member: Member, value: Expr) -> None:
@@ -210,13 +215,13 @@ def demand_determined(what: str, given: Given) -> None:
         )
 
 
-def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known | str:
+def part_of(owner: Instance, member: Member, place: Place = ()) -> Instance | Known | str:
     """Return what a member is: an instance, a component of the standard library, or the name of a connector.
 
     Args:
         owner: instance that declares it.
         member: the declaration.
-        index: of an array's element, from one; 0 for a single part.
+        place: of an array's element.
 
     Raises:
         ModelicaTextError: its class does not exist.
@@ -247,29 +252,30 @@ def part_of(owner: Instance, member: Member, index: int = 0) -> Instance | Known
         inner = owner.classes.text_of(inner.path) or inner
     if not isinstance(inner, ClassText):
         return inner
-    if member.part is None:
-        member.part = _instances(owner, member, inner)
-    if isinstance(member.part, list):
-        if not 1 <= index <= len(member.part):
-            raise refused(f"{declared.name}, an array of components, without an index", member.text, declared.line)
-        return member.part[index - 1]
-    return member.part
+    if member.parts is None:
+        shape = sizes(owner, member)
+        member.parts = {
+            at: _instance(owner, member, inner, name, element(member.given, at, shape))
+            for name, at in elements_of(declared.name, shape)
+        }
+    if place not in member.parts:
+        raise refused(f"{declared.name}, an array of components, without an index", member.text, declared.line)
+    return member.parts[place]
 
 
 def part_at(instance: Instance, path: str) -> Instance | Known | str | None:
     """Return what the part at a path is, None if there is none, or if it is a variable."""
     part: Instance | Known | str | None = instance
     for head in path.split("."):
-        name, _, index = head.partition("[")
+        name, place = head.partition("[")[0], place_of(head)
         member = part.members.get(name) if isinstance(part, Instance) else None
         if member is None or not isinstance(part, Instance) or not exists(part, member):
             return None
         if basic_type(part, member) is not None:
             return None
-        shape = sizes(part, member)
-        if bool(index) is not bool(shape):
+        if len(place) != len(sizes(part, member)):
             return None
-        part = part_of(part, member, int(index.partition("]")[0]) if index else 0)
+        part = part_of(part, member, place)
     return part
 
 
@@ -277,21 +283,8 @@ def parts_in(owner: Instance) -> Iterator[tuple[str, Instance | Known | str]]:
     """Yield the parts of an instance, elements of arrays one by one, by their paths."""
     for name, member in owner.members.items():
         if not member.declaration.is_outer and exists(owner, member) and basic_type(owner, member) is None:
-            for path, index in elements_of(name, sizes(owner, member)):
-                yield path, part_of(owner, member, index)
-
-
-def _instances(owner: Instance, member: Member, text: ClassText) -> Instance | list[Instance]:
-    """Create the instance of a part, or those of an array of parts."""
-    declared, count = member.declaration, sizes(owner, member)
-    if len(count) > 1:
-        raise refused(f"{declared.name}, an array of components with several dimensions", member.text, declared.line)
-    if not count:
-        return _instance(owner, member, text, declared.name, member.given)
-    return [
-        _instance(owner, member, text, f"{declared.name}[{k}]", element(member.given, k, count[0]))
-        for k in range(1, count[0] + 1)
-    ]
+            for path, place in elements_of(name, sizes(owner, member)):
+                yield path, part_of(owner, member, place)
 
 
 def _instance(owner: Instance, member: Member, text: ClassText, name: str, given: Given) -> Instance:
@@ -345,38 +338,46 @@ def record_of(scope: Instance, name: Expr) -> Instance | None:
     return record if record.text.kind == "record" else None
 
 
-def element(given: Given, index: int, size: int = 0) -> Given:
+def element(given: Given, place: Place, shape: tuple[int, ...] = ()) -> Given:
     """Return the modification of one element of an array: arrays without `each` are taken apart.
 
     Args:
         given: of the array.
-        index: of the element, from one.
-        size: of the array; 0 if it has been compared with the values before.
+        place: of the element.
+        shape: of the array; empty if it has been compared with the values before.
 
     Raises:
         ModelicaTextError: the values are fewer or more than the elements.
     """
-    if given.each:
+    if given.each or not place:
         return replace(given, each=False)  # for this array; another one in its elements takes it apart
-    entry = replace(given, inner={name: element(modifier, index, size) for name, modifier in given.inner.items()})
-    if given.value is not None and given.scope is not None:
-        value = resolve.Resolver(*given.scope, numeric=False)(given.value)
-        if value.kind == "array" and size not in (0, len(value.args)):
-            what = f"An array of {size} elements is given {len(value.args)} value{'s' if len(value.args) != 1 else ''}."
-            raise ModelicaTextError(
-                what, where=given.scope[1].place(given.line), advice="Write 'each' where all elements take the same."
-            )
-        if value.kind == "array" and index <= len(value.args):
-            item = value.args[index - 1]
-            # A record is given as it is written, with names of the place it is given at.
-            written = item.kind == "record" and given.value.kind == "array"
-            entry.value = given.value.args[index - 1] if written else item
+    entry = replace(given, inner={name: element(modifier, place, shape) for name, modifier in given.inner.items()})
+    if given.value is None or given.scope is None:
+        return entry
+    value = resolve.Resolver(*given.scope, numeric=False)(given.value)
+    written, sizes_given = given.value, fold.shape(value)
+    if sizes_given and shape and sizes_given[: len(shape)] != shape:
+        count, elements = (math.prod(each) for each in (sizes_given[: len(shape)], shape))
+        several = f"{' by '.join(map(str, shape))} elements" if len(shape) > 1 else f"{elements} elements"
+        what = f"An array of {several} is given {count} value{'s' if count != 1 else ''}."
+        advice = "Write 'each' where all elements take the same."
+        raise ModelicaTextError(what, where=given.scope[1].place(given.line), advice=advice)
+    for index in place:
+        if value.kind != "array" or index > len(value.args):
+            return entry
+        value = value.args[index - 1]
+        written = written.args[index - 1] if written.kind == "array" else value
+    # A record is given as it is written, with names of the place it is given at.
+    entry.value = written if value.kind == "record" else value
     return entry
 
 
-def value_of_known(owner: Instance, member: Member, part: Known, name: str, text: ClassText, line: int) -> Expr:
-    """Return the value of a parameter of a component of the standard library."""
-    given = member.given.inner.get(part.names.get(name, name))
+def value_of_known(
+    owner: Instance, member: Member, part: Known, place: Place, name: str, text: ClassText, line: int
+) -> Expr:
+    """Return the value of a parameter of a component of the standard library; of an array that of an element."""
+    owner.freeze(name, named_at(member.declaration.name, place))
+    given = element(member.given, place).inner.get(part.names.get(name, name))
     if given is not None and given.value is not None and given.scope is not None:
         return resolve.Resolver(*given.scope, numeric=True)(given.value)
     field = declarations(part.type).fields.get(name)

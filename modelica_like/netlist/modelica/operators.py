@@ -7,8 +7,9 @@ from modelica_like.netlist.modelica import fold, functions
 from modelica_like.netlist.modelica.algorithms import OpenLoop
 from modelica_like.netlist.modelica.calls import ARGUMENTS, ELEMENTARY, KEPT, OF_BEFORE, REFUSED, STATEMENTS, positional
 from modelica_like.netlist.modelica.causal import cardinality
+from modelica_like.netlist.modelica.elements import named_array
 from modelica_like.netlist.modelica.instance import refused
-from modelica_like.netlist.modelica.members import named_array, sizes
+from modelica_like.netlist.modelica.members import sizes
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.subscripts import is_whole
 from modelica_like.netlist.modelica.tree import Expr

@@ -9,9 +9,10 @@ from modelica_like.errors import ModelicaTextError, did_you_mean
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica import constants, fold, members
 from modelica_like.netlist.modelica.classes import Classes
+from modelica_like.netlist.modelica.elements import named_array, named_at
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known, table
-from modelica_like.netlist.modelica.lifting import way
+from modelica_like.netlist.modelica.lifting import levels_between, renamed, way
 from modelica_like.netlist.modelica.parse import parse_expression
 from modelica_like.netlist.modelica.subscripts import elements_at, subscript_of
 from modelica_like.netlist.modelica.tree import ClassText, Expr
@@ -228,13 +229,17 @@ class Resolver:
         if len(subscripts) > len(shape):
             raise ModelicaTextError(f"{name} is no array and has no subscript.", where=self.text.place(line))
         whole = Expr("range", (fold.number(1), Expr("name", (("end", ()),), line)), line)
-        every = bool(shape) and (not subscripts or subscripts[0].kind == "all")
-        chosen = self.index(whole if every else subscripts[0], shape[0], known=True) if shape else 0
-        if isinstance(chosen, Expr):
-            items = (((name, (argument,)), *rest) for argument in chosen.args)
-            return Expr("array", tuple(self._member(owner, before, item, line) for item in items), line)
-        part = members.part_of(owner, member, chosen)
-        path = f"{before}{name}[{chosen}]" if chosen else f"{before}{name}"
+        place: tuple[int, ...] = ()
+        for dimension, size in enumerate(shape):
+            after = subscripts[dimension:]
+            chosen = self.index(after[0] if after and after[0].kind != "all" else whole, size, known=True)
+            if isinstance(chosen, Expr):
+                before_it = tuple(map(fold.number, place))
+                items = (((name, (*before_it, one, *after[1:])), *rest) for one in chosen.args)
+                return Expr("array", tuple(self._member(owner, before, item, line) for item in items), line)
+            place = (*place, chosen)
+        part = members.part_of(owner, member, place)
+        path = before + named_at(name, place)
         if not rest and isinstance(part, Instance) and part.text.kind == "record":
             values = (self._member(part, f"{path}.", ((key, ()),), line) for key in part.members)
             return Expr("record", (tuple(part.members), *values), line)
@@ -245,7 +250,7 @@ class Resolver:
         below = ".".join(head + "".join(f"[{int(self.number(index))}]" for index in subs) for head, subs in rest)
         if isinstance(part, Known):
             if self.numeric:
-                return members.value_of_known(owner, member, part, part.here(below), self.text, line)
+                return members.value_of_known(owner, member, part, place, part.here(below), self.text, line)
             return self._of_component(owner, name, part, path, part.here(below), line)
         return Expr("name", ((f"{path}.{below}", ()),), line)
 
@@ -269,12 +274,26 @@ class Resolver:
         if fixed and (self.numeric or basic.kind != "Real" or declared.dimensions or "constant" in fixed):
             if self.numeric:
                 owner.freeze(declared.name)
+            elif (formulas := self._formulas(owner, member, basic)) is not None:
+                return self.indexed(formulas, subscripts, line)
             return self.indexed(members.value_of(owner, declared.name, self.text, line), subscripts, line)
         if not declared.dimensions:
             if subscripts:
                 raise ModelicaTextError(f"{path} is no array and has no subscript.", where=self.text.place(line))
             return Expr("name" if basic.kind != "Boolean" else "condition", ((path, ()),), line)
-        return self.indexed(members.named_array(path, members.sizes(owner, member), basic.kind), subscripts, line)
+        return self.indexed(named_array(path, members.sizes(owner, member), basic.kind), subscripts, line)
+
+    def _formulas(self, owner: Instance, member: Member, basic: Basic) -> Expr | None:
+        """Return an array of parameters that follow from others, by their names from here; None of one of numbers."""
+        scope = member.given.scope
+        if basic.kind != "Real" or "constant" in member.declaration.prefixes or scope is None or self.instance is None:
+            return None
+        value = members.formulas_of(owner, member) if levels_between(scope[0], self.instance) is not None else None
+        if value is None or all(item.kind == "number" for item in fold.elements(value)):
+            return None
+        members.check_value(owner, member, value)
+        here = way(self.instance, scope[0]) if scope[0] is not self.instance else ""
+        return renamed(value, lambda path: path if path == "time" else f"{here}{path}")
 
     def _constant(self, expression: Expr) -> Expr:
         """Resolve a constant of a class, or a literal of an enumeration."""

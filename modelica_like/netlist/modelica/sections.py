@@ -9,8 +9,9 @@ from modelica_like.errors import Source
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.algorithms import Algorithm, targets_in, targets_of
 from modelica_like.netlist.modelica.demands import guarded
+from modelica_like.netlist.modelica.elements import named_array
 from modelica_like.netlist.modelica.instance import refused
-from modelica_like.netlist.modelica.members import named_array, sizes, value_of
+from modelica_like.netlist.modelica.members import sizes, value_of
 from modelica_like.netlist.modelica.resolve import Resolver
 from modelica_like.netlist.modelica.tree import ClassText, Expr, Statement
 from modelica_like.netlist.modelica.types import Basic, basic_type

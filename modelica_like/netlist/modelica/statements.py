@@ -10,6 +10,7 @@ from modelica_like.netlist.modelica.before import Before, begin_late, begun
 from modelica_like.netlist.modelica.buses import bus_equations
 from modelica_like.netlist.modelica.causal import Joints, connections, declared_at, rounds, variable_at
 from modelica_like.netlist.modelica.demands import demanded_elements
+from modelica_like.netlist.modelica.elements import elements_of
 from modelica_like.netlist.modelica.instance import Instance, Member, refused
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.lifting import above, height, levels_between, outside, owner_above, renamed
@@ -232,18 +233,18 @@ class Statements(Whens):
     def _part_bindings(self, name: str, member: Member) -> None:
         """Collect `Flange_a flange(tau = …)` and `Own part(input = …)`: such values are equations."""
         shape = sizes(self.instance, member) if member.given.inner and exists(self.instance, member) else (0,)
-        for k in range(1, shape[0] + 1) if shape else (0,):
-            part = part_of(self.instance, member, k)
+        for head, place in elements_of(name, shape):
+            part = part_of(self.instance, member, place)
             if isinstance(part, Instance) and part.text.kind != "connector":
-                self._input_bindings(f"{name}[{k}]" if k else name, part)
+                self._input_bindings(head, part)
             if isinstance(part, Known) or (isinstance(part, Instance) and part.text.kind != "connector"):
                 continue
-            for last, entry in (element(member.given, k) if k else member.given).inner.items():
+            for last, entry in element(member.given, place).inner.items():
                 below = part.members.get(last) if isinstance(part, Instance) else None
                 fixed = below is not None and bool({"parameter", "constant"} & below.declaration.prefixes)
                 if entry.value is None or entry.scope is None or fixed:
                     continue
-                path = Expr("name", ((f"{name}[{k}].{last}" if k else f"{name}.{last}", ()),), entry.line)
+                path = Expr("name", ((f"{head}.{last}", ()),), entry.line)
                 self.equate(path, self._seen(entry.value, *entry.scope), entry.scope[1], entry.line)
 
     def _seen(self, value: Expr, scope: Instance, text: ClassText) -> Expr:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from modelica_like.errors import ModelicaTextError, Source, UnitError
 from modelica_like.language.inside import declarations
 from modelica_like.language.units import parse_unit, same_dimension
+from modelica_like.netlist.modelica.elements import Place, place_of
 from modelica_like.netlist.modelica.instance import Instance, Member
 from modelica_like.netlist.modelica.library import Known, connector_type
 from modelica_like.netlist.modelica.members import element, exists, part_at
@@ -58,19 +59,19 @@ def _differ(one: str, other: str) -> bool:
 def _units(instance: Instance, path: str) -> Iterator[tuple[str, tuple[str, Source]]]:
     """Yield the variables at an end of a connection with their units."""
     head, _, rest = path.partition(".")
-    name, _, index = head.removeprefix(INSIDE).partition("[")
+    name = head.removeprefix(INSIDE).partition("[")[0]
     member = instance.members.get(name)
     if member is None:
         return
     part, source = part_at(instance, head.removeprefix(INSIDE)), member.text.place(member.declaration.line)
     if part is None and exists(instance, member):
-        yield from _unit(instance, member, int(index.partition("]")[0]) if index else 0, "")
+        yield from _unit(instance, member, place_of(head), "")
     if isinstance(part, Instance) and rest:
         yield from _units(part, rest)
     elif isinstance(part, Instance):
         for key, inner in part.members.items():
             if basic_type(part, inner) is not None and not {"parameter", "constant"} & inner.declaration.prefixes:
-                yield from _unit(part, inner, 0, key)
+                yield from _unit(part, inner, (), key)
     elif isinstance(part, Known):
         declared = declarations(part.type)
         if rest in declared.fields and "[" not in part.there(rest):  # elements of one input have no units there
@@ -81,8 +82,8 @@ def _units(instance: Instance, path: str) -> Iterator[tuple[str, tuple[str, Sour
         yield from ((key, (field.unit_text, source)) for key, field in declarations(kind).fields.items())
 
 
-def _unit(instance: Instance, member: Member, index: int, name: str) -> Iterator[tuple[str, tuple[str, Source]]]:
+def _unit(instance: Instance, member: Member, place: Place, name: str) -> Iterator[tuple[str, tuple[str, Source]]]:
     basic = basic_type(instance, member)
     if basic is not None and basic.kind == "Real" and "unit" in basic.given.inner:
-        unit = known(element(basic.given, index).inner["unit"] if index else basic.given.inner["unit"])
+        unit = known(element(basic.given, place).inner["unit"])
         yield name, (str(unit or ""), member.text.place(member.declaration.line))

@@ -10,6 +10,7 @@ import casadi as ca
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.elements import named_at, place_of
 from modelica_like.netlist.modelica.instance import Instance, refused
 from modelica_like.netlist.modelica.library import Known
 from modelica_like.netlist.modelica.members import exists, part_of, sizes, unknown_name
@@ -77,9 +78,14 @@ def pairs_of(left: Expr, right: Expr, instance: Instance, source: Source) -> lis
     count = max(map(len, ends))
     for k, end in enumerate((left, right)):
         if len(ends[k]) == 1 and count > 1:  # an array of signals that a component has as single ones
-            name, subscripts = end.args[-1]
-            elements = (Expr("number", (float(position),)) for position in range(1, count + 1))
-            each = (Expr("name", (*end.args[:-1], (name, (*subscripts, element))), end.line) for element in elements)
+            (name, subscripts), other = end.args[-1], (right, left)[k]
+            places = [place_of(path.rpartition(".")[2]) for path in ends[1 - k]]
+            if other.args[-1][1] or not all(places):
+                places = [(position,) for position in range(1, count + 1)]
+            each = (
+                Expr("name", (*end.args[:-1], (name, (*subscripts, *map(fold.number, place)))), end.line)
+                for place in places
+            )
             ends[k] = [path for e in each for path in _ends(e, instance)]
     if len(ends[0]) != len(ends[1]):
         raise ModelicaTextError("The sizes of both ends differ.", where=source)
@@ -102,21 +108,18 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
         return heads
     if not exists(instance, member):
         return [""] * len(heads)
-    inner = _inside(rest, instance, end.line)
-    part = part_of(instance, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0)
-    if isinstance(part, Known):
-        return [f"{head}.{part.here(end)}" for head in heads for end in inner]
+    part = part_of(instance, member, place_of(indices[0])) if indices else None
     if not isinstance(part, Instance):
-        return [f"{head}.{name}" for head in heads for name in inner]
+        here = part.here if isinstance(part, Known) else str
+        return [f"{head}.{here(path)}" for head in heads for path in _inside(rest, instance, end.line)]
     if len(rest) > 1:
         raise refused("a connection with the inside of a component", instance.text, end.line)
     last, subscripts = end.args[-1]
     outer = part.members.get(last)
     if outer is not None and not exists(part, outer):
         return [""] * len(heads)
-    if outer is not None and (subscripts or len(heads) == 1):
-        inner = [f"{last}{index}" for index in _indices(subscripts, sizes(part, outer), instance, end.line)]
-    return [f"{head}.{name}" for head in heads for name in inner]
+    shape = sizes(part, outer) if outer is not None else ()
+    return [f"{head}.{last}{index}" for head in heads for index in _indices(subscripts, shape, instance, end.line)]
 
 
 def _of_bus(end: Expr, instance: Instance) -> list[str] | None:
@@ -129,13 +132,13 @@ def _of_bus(end: Expr, instance: Instance) -> list[str] | None:
             shape, rest = sizes(owner, member) if member is not None else (), end.args[depth + 1 :]
             below = [f"{name}{index}" for index in _indices(subscripts, shape, instance, end.line)]
             last = [f".{path}" for path in _inside(rest, instance, end.line)] if rest else [""]
-            return [f"{head}.{first}{path}".replace("][", ",") for head, first, path in product(heads, below, last)]
+            return [f"{head}.{first}{path}" for head, first, path in product(heads, below, last)]
         if not is_part or member is None:
             return None
         shape = sizes(owner, member)
         indices = _indices(subscripts, shape, instance, end.line)
         heads = [f"{head}.{name}{index}".lstrip(".") for head in heads for index in indices]
-        part = part_of(owner, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0) if indices else None
+        part = part_of(owner, member, place_of(indices[0])) if indices else None
         if not isinstance(part, Instance):
             return None
         owner = part
@@ -150,7 +153,7 @@ def _of_bundle(end: Expr, instance: Instance) -> list[str] | None:
         if member is None or depth > 1 or not exists(owner, member) or basic_type(owner, member) is not None:
             return None
         indices = _indices(subscripts, sizes(owner, member), instance, end.line)
-        part = part_of(owner, member, int(indices[0][1:].partition("]")[0]) if indices[0] else 0) if indices else None
+        part = part_of(owner, member, place_of(indices[0])) if indices else None
         if not isinstance(part, Instance):
             return None
         heads = [f"{head}{name}{index}." for head in heads for index in indices]
@@ -184,7 +187,7 @@ def _inside(parts: tuple[tuple[str, tuple[Expr, ...]], ...], instance: Instance,
 
 
 def _indices(subscripts: tuple[Expr, ...], shape: tuple[int, ...], instance: Instance, line: int) -> list[str]:
-    """Return the elements that subscripts choose, such as `[2][1]`; without any those of the first dimension.
+    """Return the elements that subscripts choose, such as `[2,1]`; those of further dimensions are all chosen.
 
     Args:
         subscripts: resolved.
@@ -192,8 +195,7 @@ def _indices(subscripts: tuple[Expr, ...], shape: tuple[int, ...], instance: Ins
         instance: for the place of an error.
         line: likewise.
     """
-    if not subscripts:
-        return [f"[{k}]" for k in range(1, shape[0] + 1)] if shape else [""]
+    subscripts = (*subscripts, *(Expr("all", (), line) for _ in shape[len(subscripts) :]))
     chosen: list[list[int]] = []
     for dimension, subscript in enumerate(subscripts):
         size = shape[dimension] if dimension < len(shape) else None
@@ -207,7 +209,7 @@ def _indices(subscripts: tuple[Expr, ...], shape: tuple[int, ...], instance: Ins
                 what = f"A subscript of this end is not one of {allowed}."
                 raise ModelicaTextError(what, where=instance.text.place(line))
         chosen.append([int(place) for place in places])
-    return ["".join(f"[{k}]" for k in places) for places in product(*chosen)]
+    return [named_at("", place) for place in product(*chosen)]
 
 
 def paths(node: Expr) -> Iterator[str]:

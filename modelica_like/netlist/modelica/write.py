@@ -17,6 +17,7 @@ from modelica_like.language.places import located
 from modelica_like.language.units import coherent, parse_unit, read_quantity, to_si
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.elements import extent, in_braces, named_at, place_of
 from modelica_like.netlist.modelica.library import Known, by_component, table
 from modelica_like.netlist.modelica.lift import is_given, lifted
 from modelica_like.netlist.modelica.own_classes import class_of_equations, connector_class
@@ -76,8 +77,10 @@ class _Writer:
         for key, field in assembly.fields.items():
             if isinstance(field, Input | Output):
                 lines.append(f"  {_BLOCKS}{type(field).__name__} {identifier(key)};")
-        for key, part in inside(assembly).parts.items():
-            lines.append(f"  {self._declaration(assembly, key, part, joined)};")
+        arrays: dict[str, dict[str, Component]] = {}
+        for key, part in assembly.parts.items():
+            arrays.setdefault(key.partition("[")[0], {})[key] = part
+        lines += [f"  {self._declaration(assembly, key, parts, joined)};" for key, parts in arrays.items()]
         lines.append("equation")
         lines += [f"  connect({left}, {right});" for left, right in self._pairs(assembly)]
         until = inside(assembly).simulate.get("until")
@@ -102,11 +105,12 @@ class _Writer:
         text = "" if value.formula is None and value.number is None else f" = {self.value(value, assembly)}"
         return f"  parameter Real {identifier(key)}{attribute}{text};"
 
-    def _declaration(self, owner: Assembly, name: str, part: Component | list[Component], joined: set[str]) -> str:
-        if not isinstance(part, list):
-            kind, values = self._part(owner, name, part, joined)
-            return f"{kind} {identifier(name)}{_arguments(values)}"
-        arguments = [self._part(owner, f"{name}[{k}]", element, joined) for k, element in enumerate(part, 1)]
+    def _declaration(self, owner: Assembly, name: str, parts: dict[str, Component], joined: set[str]) -> str:
+        """Return the declaration of a part, or of the elements of an array."""
+        arguments = [self._part(owner, path, part, joined) for path, part in parts.items()]
+        if name in parts:
+            return f"{arguments[0][0]} {identifier(name)}{_arguments(arguments[0][1])}"
+        shape = extent(map(place_of, parts))
         kinds = {kind for kind, _ in arguments}
         keys = {tuple(values) for _, values in arguments}
         if len(kinds) != 1 or len(keys) != 1:
@@ -117,10 +121,10 @@ class _Writer:
         values = {
             key: (f"each {key}", arguments[0][1][key])
             if all(a[key] == arguments[0][1][key] for _, a in arguments)
-            else (key, "{" + ", ".join(a[key] for _, a in arguments) + "}")
+            else (key, in_braces([a[key] for _, a in arguments], shape))
             for key in keys.pop()
         }
-        return f"{kinds.pop()} {identifier(name)}[{len(part)}]{_arguments(dict(values.values()))}"
+        return f"{kinds.pop()} {identifier(name)}{named_at('', shape)}{_arguments(dict(values.values()))}"
 
     def _part(self, owner: Assembly, path: str, part: Component, joined: set[str]) -> tuple[str, dict[str, str]]:
         """Return the class of a part and the arguments of its modification."""

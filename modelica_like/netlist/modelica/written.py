@@ -40,7 +40,7 @@ from modelica_like.language import (
 from modelica_like.language.discrete import Ending, before, is_a, silent
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import Symbol, symbol_of
-from modelica_like.language.fields import Discrete, Field, Parameter, Variable
+from modelica_like.language.fields import Discrete, Field, Variable
 from modelica_like.language.formula import Formula
 from modelica_like.language.functions import above_zero, power
 from modelica_like.language.inside import InsideAssembly, inside
@@ -131,24 +131,6 @@ class Written(Assembly):
     def fields(self) -> dict[str, Field]:
         """Declared fields; a copy, because the text of a class decides its equations, and not the class here."""
         return dict(self._inside.own_fields)
-
-    def set_value(self, field: Field, value: Any) -> None:
-        """Store a value; refuse another one for a parameter whose value is in what was read."""
-        kept = isinstance(field, Parameter) and not field.tunable and bool(self._inside.origin)
-        before = self.value(field.name) if kept else None
-        own, values = self._inside.values.get(field.name), self._inside.values
-        super().set_value(field, value)
-        if before is not None and (before.number, before.formula) != (
-            values[field.name].number,
-            values[field.name].formula,
-        ):
-            del values[field.name]
-            values.update({} if own is None else {field.name: own})
-            raise LanguageError(
-                f"{self.label}.{field.name} was read as a number, "
-                "of which others were made, and cannot change afterwards.",
-                advice="Change it in the text, or extend the class with this value under a name of its own.",
-            )
 
     @property
     def icon(self) -> Icon | None:  # pyright: ignore[reportIncompatibleVariableOverride]
