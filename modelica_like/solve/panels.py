@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -131,7 +132,7 @@ class Panels:
         self._modes, self._segment = b"", _Segment(begin, self._length)
         self._graded = self._cut = self._begins = self._foreseen = False
         self._behind, self._zero = _BEHIND, np.inf
-        self._begin, self._ends = begin, np.zeros(0)
+        self._begin, self._ends = begin, list[float]()
         self._failures, self._failed_before, self._gave_up_at = 0, begin, -np.inf
 
     @property
@@ -158,9 +159,9 @@ class Panels:
         while True:
             span, grid = self._plan(limit - now.t, _SHORTEST * time_resolution(now.t), soon, begins=begins)
             if pieces := self._integrate(now, span, grid):
-                self._begin, self._ends = now.t, self.looks.ends[:pieces]
+                self._begin, self._ends = now.t, self.looks.ends[:pieces].tolist()
                 if span == limit - now.t and not self._cut:
-                    self._ends[-1] = limit
+                    self._ends[-1] = self.looks.ends[pieces - 1] = limit
                 return
             begins = True
 
@@ -212,20 +213,22 @@ class Panels:
         modes, ends, segment = now.d[self._switched].tobytes(), self._ends, self._segment
         if now.t >= self._failed_before:
             self._failures = 0
-        if len(ends) and now.t == self._begin and modes == self._modes:
+        if ends and now.t == self._begin and modes == self._modes:
             return self._begins  # the run-time asks again, for a shorter one
-        if len(ends):
-            wishes = self.looks.wishes[: min(int(np.searchsorted(ends, now.t)) + 1, len(ends))]
-            recent = np.sort(wishes[len(wishes) // 2 :])
-            self._length = float(recent[int(_MOST * (len(recent) - 1))])
-            segment.widest = max(segment.widest, float(wishes.max()))
+        if ends:
+            # Lists: of as few numbers, arrays cost more time.
+            wishes = self.looks.wishes[: min(bisect_left(ends, now.t) + 1, len(ends))].tolist()
+            recent = sorted(wishes[len(wishes) // 2 :])
+            self._length = recent[int(_MOST * (len(recent) - 1))]
+            segment.widest = max(segment.widest, *wishes)
             if self._begin == segment.begin:
-                telling = wishes[self.looks.errors[: len(wishes)] > _TELLING]
-                segment.finest = float(telling.min(initial=ends[len(wishes[:-1])] - self._begin))
-            passed = float(ends[-1] - self._begin)
+                errors = self.looks.errors[: len(wishes)].tolist()
+                telling = (wish for wish, error in zip(wishes, errors, strict=True) if error > _TELLING)
+                segment.finest = min([ends[len(wishes) - 1] - self._begin, *telling])
+            passed = ends[-1] - self._begin
             self._span = passed if self._cut else _LONGER * max(self._span, passed)
             self._behind *= _DOUBTED if self._foreseen and not self._cut and ends[-1] > self._zero else 1.0
-        self._begins = not len(ends) or now.t < ends[-1] - time_resolution(now.t) or modes != self._modes
+        self._begins = not ends or now.t < ends[-1] - time_resolution(now.t) or modes != self._modes
         if self._begins:
             if now.t > segment.begin:
                 segment.lasted = now.t - segment.begin
