@@ -52,7 +52,7 @@ def at_once(expression: Any) -> Any:
     pairs: list[tuple[Any, Any]] = []
     for symbol in symbols_in(expression) if is_expression(expression) else ():
         inner = symbols_in(symbol.of) if isinstance(symbol, Marker) and symbol.kind == "relation" else ()
-        changing = [s for s in inner if s.owner is not None and is_a(s, Discrete)]
+        changing = [s for s in inner if is_a(s, Discrete)]
         if changing and all(s is TIME or (s.owner is not None and (is_a(s, Discrete) or is_fixed(s))) for s in inner):
             changed = functools.reduce(ca.logic_or, (ca.SX(change(s)) for s in changing))
             pairs.append((symbol, ca.if_else(changed, cast(Any, symbol).of, symbol)))

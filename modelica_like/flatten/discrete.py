@@ -339,10 +339,7 @@ def _in_a_round(transition: Transition) -> Transition:
 
 def is_discrete(equation: Equation) -> bool:
     """Return whether an equation determines a discrete variable: it stands alone on the left."""
-    if not cast(Any, equation.left).is_symbolic():
-        return False
-    symbol = symbols_in(equation.left)[0]
-    return symbol.owner is not None and is_a(symbol, Discrete)
+    return cast(Any, equation.left).is_symbolic() and is_a(symbols_in(equation.left)[0], Discrete)
 
 
 def _target(key: Any) -> Symbol | None:

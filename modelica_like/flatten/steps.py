@@ -152,7 +152,7 @@ class _Written:
 
     def _hide(self, step: Any) -> None:
         for symbol in symbols_in(step):
-            if symbol.owner is not None and is_a(symbol, Variable):
+            if is_a(symbol, Variable):
                 self._hidden[id(symbol)] = symbol
 
 
@@ -161,7 +161,7 @@ class _Points:
 
     def __init__(self, whole: Any) -> None:
         symbols = symbols_in(whole)
-        moving = [s for s in symbols if s is TIME or (s.owner is not None and is_a(s, Variable))]
+        moving = [s for s in symbols if s is TIME or is_a(s, Variable)]
         others = [symbol for symbol in symbols if not any(symbol is other for other in moving)]
         fixed = [symbol for symbol in others if symbol.owner is not None and is_fixed(symbol)]
         whole_numbers = [symbol for symbol in others if not any(symbol is other for other in fixed)]

@@ -95,8 +95,8 @@ def is_a(symbol: Symbol, kind: type | tuple[type, ...]) -> bool:
     return owner is not None and isinstance(owner.fields.get(symbol.name), kind)
 
 
-_JOINS = {ca.OP_AND: ca.logic_and, ca.OP_OR: ca.logic_or}
-_CONDITIONS = (*_JOINS, ca.OP_NOT, ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE)
+_JOINS, _EQUALITIES = (ca.OP_AND, ca.OP_OR), (ca.OP_EQ, ca.OP_NE)
+_CONDITIONS = (*_JOINS, *_EQUALITIES, ca.OP_NOT, ca.OP_LT, ca.OP_LE)
 SILENT, CONTINUOUS = 2.0, 3.0
 """Marks of conditions without events: asked for, or with branches that meet wherever the condition changes."""
 
@@ -131,16 +131,15 @@ def eventful(condition: Expr | bool) -> Expr:
     operation = expression.op()
     if silence(expression) or not moves(expression):
         return expression
-    if operation in _JOINS:
-        return _JOINS[operation](*(cast(Any, eventful(expression.dep(k))) for k in (0, 1)))
     if operation == ca.OP_NOT:
         return ca.logic_not(cast(Any, eventful(expression.dep(0))))
     if operation in (ca.OP_LT, ca.OP_LE):
         return marker("relation", expression)
-    if operation in (ca.OP_EQ, ca.OP_NE):
-        sides = [expression.dep(k) for k in (0, 1)]
-        if all(side.op() in _CONDITIONS or not moves(side) for side in sides):
-            return ca.SX.binary(operation, *map(eventful, sides))
+    sides = [expression.dep(k) for k in range(expression.n_dep())]
+    equals = operation in _EQUALITIES and all(side.op() in _CONDITIONS or not moves(side) for side in sides)
+    if operation in _JOINS or equals:
+        return ca.SX.binary(operation, *map(eventful, sides))
+    if operation in _EQUALITIES:
         what = f"{expression} compares values that change continuously: they are equal at single instants only."
         raise LanguageError(what, where=caller(), advice="Write a relation with < or >.")
     what = f"{expression} is not a condition: it changes continuously."
@@ -194,9 +193,8 @@ def edge(condition: Expr) -> Expr:
     Raises:
         LanguageError: it is no condition.
     """
-    single = isinstance(condition, Symbol) and not isinstance(condition, Pre)
-    plain = single and cast(Symbol, condition).owner is not None and not moves(condition)
-    before = condition if plain else marker("was", eventful(condition))
+    single = isinstance(condition, Symbol) and not isinstance(condition, Pre) and condition.owner is not None
+    before = condition if single and not moves(condition) else marker("was", eventful(condition))
     return ca.logic_and(cast(Any, before), ca.logic_not(cast(Any, pre(before))))
 
 
@@ -324,9 +322,9 @@ class When:
         """
         other = when(condition, values)
         before = functools.reduce(ca.logic_or, [cast(Any, active) for active, _ in self.branches])
-        active = ca.logic_and(cast(Any, other.branches[0][0]), ca.logic_not(before))
-        branches = (*self.branches, (cast(Expr, active), dict(values)))
-        return replace(self, branches=branches, conditions=self.conditions + other.conditions)
+        ((active, new),) = other.branches
+        last = cast(Expr, ca.logic_and(cast(Any, active), ca.logic_not(before))), new
+        return replace(self, branches=(*self.branches, last), conditions=self.conditions + other.conditions)
 
 
 def when(condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> When:
@@ -342,15 +340,13 @@ def when(condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> W
         LanguageError: it is no condition, or has no edge because it is constant during a run.
     """
     conditions = condition if isinstance(condition, tuple) else (condition,)
-    edges: list[Any] = []
-    clocked = False
+    edges, clocked = list[Any](), False
     for part in conditions:
         symbols = symbols_in(part)
         if not any(symbol is TIME or symbol.owner is None or not is_fixed(symbol) for symbol in symbols):
             what = f"when({part}, …) has no edge: its condition is the same during the whole run."
             raise LanguageError(what, where=caller(), advice="Compare what changes, such as a variable or time.")
-        ticks = any(isinstance(symbol, Marker) and symbol.kind == "clock" for symbol in symbols)
-        clocked |= ticks
+        clocked |= (ticks := any(isinstance(symbol, Marker) and symbol.kind == "clock" for symbol in symbols))
         edges.append(part if part is INITIAL or (ticks and cast(Any, part).op() == ca.OP_NE) else edge(part))
     active = cast(Expr, functools.reduce(ca.logic_or, edges))
     new = {key: _at_tick(value) for key, value in values.items()} if clocked else dict(values)

@@ -602,7 +602,8 @@ class Rates(Component):
     def events(self) -> Events:
         yield when(clock(3 * self.T), {self.slow: pre(self.slow) + 1, self.seen: self.fast})
         yield when(clock(self.T), {self.fast: pre(self.fast) + 1})
-        yield when(clock(self.T, 0.7 * self.T), {self.late: self.time})
+        never = when(self.time > 1000 * self.T, {self.late: -self.T})
+        yield never.elsewhen(clock(self.T, 0.7 * self.T), {self.late: sample(self.t)})
 
 
 def test_clocks_of_several_rates(solver):
