@@ -18,6 +18,9 @@ Platforms = Annotated[
     list[str] | None,
     Option("--platform", metavar="NAME", help="E.g. x86_64-windows, all, or none; by default native: this one."),
 ]
+Tables = Annotated[
+    list[str] | None, Option("--table", metavar="PATTERN", help="Tables with tunable numbers, e.g. '*.mu_pos'.")
+]
 FixedStep = Annotated[
     str | None, Option(metavar="TIME", help="Co-Simulation with fixed steps and bounded work, e.g. 1ms.")
 ]
@@ -47,9 +50,7 @@ def export(
     ] = False,
     modes: Annotated[Modes, Option(help="Modes as outputs, local variables, or integer outputs.")] = "output",
     fixed_step: FixedStep = None,
-    tables: Annotated[
-        list[str] | None, Option("--table", metavar="PATTERN", help="Tables with tunable numbers, e.g. '*.mu_pos'.")
-    ] = None,
+    tables: Tables = None,
     check: Annotated[bool, Option(help="Compare the FMU with IDAS.")] = True,
     strict: Annotated[bool, Option("--strict", help="Do not write an FMU that differs from IDAS.")] = False,
     debug: Debug = False,

@@ -120,16 +120,14 @@ def export_fmu(
     """
     begin, tell, target = time.perf_counter(), report or silent, target_file(path, ".fmu", "An FMU")
     chosen, kinds, names = known_version(version, Version, "FMI"), _kinds(kind), chosen_platforms(platforms)
-    fixed, as_what = _fixed_step(fixed_step, kinds), _modes(modes)
+    fixed, form = _fixed_step(fixed_step, kinds), _modes(modes)
     tell("compiling the model")
     model, description, equations = compiled_open(drive := loaded(drive), ends, takes, tables)
     _check_letters(model)
-    variables = interface(model, outputs, as_what)
     tell("writing the model")
-    embed = embed or compiled
     about = _about(model, chosen, kinds, description, fixed, compiled=compiled)
-    files = _contents(model, variables, about, equations, embed, _pictures(drive), compiled=compiled)
-    files |= _binaries(files, identifier(model.name), chosen, names, embed, tell)
+    files = _contents(model, interface(model, outputs, form), about, equations, embed, _pictures(drive))
+    files |= _binaries(files, identifier(model.name), chosen, names, embed or compiled, tell)
     tell("checking")
     checked = _written(files, target, model, about, check and native_platform() in names, strict)
     return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin, checked)
@@ -245,10 +243,10 @@ def tool() -> str:
 
 
 def _contents(
-    model: CompiledDae, variables: Interface, about: About, equations: Listing, embed: bool,
-    icon: tuple[bytes, bytes], *, compiled: bool,
+    model: CompiledDae, variables: Interface, about: About, equations: Listing, embed: bool, icon: tuple[bytes, bytes]
 ) -> dict[str, bytes]:  # fmt: skip
     """Return all files except the binaries, with a token from their content."""
+    compiled = _CODE in about.sources
     texts = {"modelDescription.xml": model_description(model, variables, about)}
     texts |= {f"sources/{name}": text for name, text in runtime_sources((about.version,)).items()}
     texts["documentation/index.html"] = index_page(variables, about.description, about.tool, equations)
@@ -279,7 +277,7 @@ def _contents(
     texts["sources/model_data.c"] = as_c(data, compiled=compiled)
     files: dict[str, bytes] = {name: text.encode() for name, text in texts.items()}
     files |= pictures
-    return files if embed else files | {MODEL: data}
+    return files if embed or compiled else files | {MODEL: data}
 
 
 def _binaries(
