@@ -18,7 +18,7 @@ __all__ = ["dumps", "find_type", "library_types", "load", "loads", "save", "sche
 
 def dumps(component: Component, *, folder: str | Path = ".") -> str:
     """Write a component as the text of a netlist; see `write.dumps`."""
-    from modelica_like.netlist import write  # tomlkit loads slowly, and most runs only read
+    from modelica_like.netlist import write
 
     return write.dumps(component, folder=folder)
 

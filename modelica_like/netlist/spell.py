@@ -57,3 +57,12 @@ def value(entry: Any, like: str = "") -> str:
         return f"[{', '.join(map(value, items))}]"
     # Numbers of NumPy are subclasses that are written otherwise.
     return int.__repr__(entry) if isinstance(entry, int) else float.__repr__(entry)
+
+
+def document(sections: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return sections that have entries as TOML; what stands at the top has the name ""."""
+    texts: list[str] = []
+    for name, entries in sections.items():
+        lines = "".join(f"{key(inner)} = {value(entry)}\n" for inner, entry in entries.items())
+        texts += [f"[{key(name)}]\n{lines}" if name else lines] if entries else []
+    return "\n".join(texts)

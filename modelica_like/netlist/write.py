@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -41,13 +40,7 @@ def dumps(component: Component, *, folder: str | Path = ".") -> str:
     Raises:
         NetlistError: the component has something a netlist cannot contain, such as equations of its own.
     """
-    data = sections(component, folder)
-    top = _lines(data.pop(""))
-    return "\n".join([top, *(f"[{name}]\n{_lines(some)}" for name, some in data.items() if some)])
-
-
-def _lines(entries: Mapping[str, Any]) -> str:
-    return "".join(f"{spell.key(name)} = {spell.value(entry)}\n" for name, entry in entries.items())
+    return spell.document(sections(component, folder))
 
 
 def sections(component: Component, folder: str | Path) -> dict[str, dict[str, Any]]:

@@ -121,7 +121,6 @@ def _start() -> None:
     import fmpy  # noqa: F401
     import lxml.etree  # noqa: F401
     import scipy.integrate  # noqa: F401
-    import tomlkit  # noqa: F401
 
     _judge.__enter__()
     Finalize(None, _judge.__exit__, exitpriority=1)

@@ -20,10 +20,10 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-import tomlkit
 
 from modelica_like import build, load, simulate
 from modelica_like.compile.compiled import CompiledDae
+from modelica_like.netlist import spell
 from modelica_like.show.report.start import start_values
 
 ROOT = Path(__file__).parents[2]
@@ -87,22 +87,12 @@ def _shaken(name: str, seed: int) -> dict[str, int]:
 
 def renew() -> None:
     """Write the table."""
-    table = tomlkit.document()
-    table.add(tomlkit.comment("What every example costs; renewed by `python tests/work/work.py`."))
+    table: dict[str, Any] = {}
     for name in netlists():
-        one = tomlkit.table()
-        for key, value in steady(name).items():
-            one.add(key, inline(value) if isinstance(value, dict) else value)
-        table.add(name, one)
+        table[name] = steady(name)
         sys.stdout.write(f"{name}\n")
-    TABLE.write_text(tomlkit.dumps(table), encoding="utf-8")
-
-
-def inline(value: dict[str, int]) -> Any:
-    """Return a table in one line."""
-    found = tomlkit.inline_table()
-    found.update(value)
-    return found
+    head = "# What every example costs; renewed by `python tests/work/work.py`.\n\n"
+    TABLE.write_text(head + spell.document(table), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -10,8 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
-import tomlkit
-
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, raise_together_or_one
 from modelica_like.fmi.cosimulation import system as kinds
 from modelica_like.fmi.cosimulation.described import check_units
@@ -19,11 +17,12 @@ from modelica_like.fmi.cosimulation.system import Bond, Link, Port, Settings, Sy
 from modelica_like.language.units import ONE, parse_unit, to_si
 from modelica_like.netlist import document as toml
 from modelica_like.netlist import sections as form
+from modelica_like.netlist import spell
 from modelica_like.netlist.locate import Lines, locate
 from modelica_like.netlist.read import FMU_PART
 from modelica_like.writing import write_text
 
-_OWN_NAMES = "results keep the names that variables have in their FMUs"
+_OWN_NAMES = "# With own_names, results keep the names that variables have in their FMUs.\n"
 
 
 def load_system(path: Path, work: Path) -> System:
@@ -150,22 +149,17 @@ _READERS: Mapping[str, form.Reader] = {
 def write_system(system: System, path: Path) -> None:
     """Write a system as TOML; the FMUs are named relative to it."""
     simulate = {key: value for key, value in vars(system.settings).items() if value is not None}
-    data: dict[str, Any] = {
-        "name": system.name,
-        "own_names": system.own_names and tomlkit.item(True).comment(_OWN_NAMES),
+    head: dict[str, Any] = {"name": system.name, "own_names": system.own_names}
+    text = spell.document({
+        "": {key: value for key, value in head.items() if value},
         "fmus": {unit.name: _unit_table(unit, path.parent) for unit in system.units},
         "connect": {link.name: [str(port) for port in (link.source, *link.targets)] for link in system.links},
         "bonds": {bond.name: [bond.flow, bond.rate] for bond in system.bonds},
         "simulate": {key: f"{value!r} s" if key in ("until", "step") else value for key, value in simulate.items()},
-    }
-    write_text(path, tomlkit.dumps({key: value for key, value in data.items() if value}))
+    })  # fmt: skip
+    write_text(path, f"{_OWN_NAMES}{text}" if system.own_names else text)
 
 
-def _unit_table(unit: Unit, folder: Path) -> Any:
-    entries: dict[str, Any] = {"file": Path(os.path.relpath(unit.file, folder)).as_posix()}
-    if unit.parameters:
-        entries["parameters"] = tomlkit.inline_table()
-        entries["parameters"].update(dict(unit.parameters))
-    table = tomlkit.inline_table()
-    table.update(entries)
-    return table
+def _unit_table(unit: Unit, folder: Path) -> dict[str, Any]:
+    table: dict[str, Any] = {"file": Path(os.path.relpath(unit.file, folder)).as_posix()}
+    return table | ({"parameters": dict(unit.parameters)} if unit.parameters else {})

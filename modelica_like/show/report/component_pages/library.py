@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -11,6 +9,7 @@ from typing import Any, cast
 from modelica_like.errors import NetlistError
 from modelica_like.language import Component
 from modelica_like.language.inside import declarations
+from modelica_like.netlist import spell
 from modelica_like.netlist.document import parse, read_text
 from modelica_like.netlist.registry import find_type, library_types
 from modelica_like.show.draw.symbol import symbol
@@ -70,7 +69,7 @@ def examples_by_type(folder: Path) -> dict[str, list[Example]]:
         if "[parts" in contents[file]:
             netlist = parse(contents[file], str(file))
             for name, part in _parts("", netlist.parts):
-                example = Example(file, netlist.description or netlist.name, f"{name} = {_inline(part)}")
+                example = Example(file, netlist.description or netlist.name, f"{name} = {spell.value(part)}")
                 by_type.setdefault(part["is"], []).append(example)
     return {name: _once(examples) for name, examples in by_type.items()}
 
@@ -94,20 +93,6 @@ def _parts(name: str, table: Any) -> Iterator[tuple[str, Mapping[str, Any]]]:
     elif isinstance(table, list):
         for value in cast("list[Any]", table):
             yield from _parts(name, value)
-
-
-def _inline(value: Any) -> str:
-    """Return a value as TOML in one line."""
-    if isinstance(value, dict):
-        entries = cast("dict[str, Any]", value).items()
-        return "{ " + ", ".join(f"{_key(key)} = {_inline(entry)}" for key, entry in entries) + " }"
-    if isinstance(value, list):
-        return f"[{', '.join(map(_inline, cast('list[Any]', value)))}]"
-    return json.dumps(value, ensure_ascii=False)
-
-
-def _key(key: str) -> str:
-    return key if re.fullmatch(r"[\w-]+", key, re.ASCII) else json.dumps(key)
 
 
 _SIGNALS = "signals"
