@@ -22,16 +22,20 @@ void add_bars(Instance *c, double *vector) {
     vector[c->n_smooth] += c->dots[0] + dot(m->n_u, c->dots + m->slot_u, c->u_rate);
 }
 
-/* Derivatives of an output of a tape at the present point, where factor_implicit has been called. */
-void slope_of_output(Instance *c, const Tape *tape, int output, double *bars, double *slope) {
+/* Derivatives of an output of a tape at the present point, where factor_implicit has been called. Returns its value. */
+double slope_of_output(Instance *c, const Tape *tape, int output, double *bars, double *slope) {
     memset(slope, 0, (c->n_smooth + 1) * sizeof(double));
     memset(c->dots, 0, (size_t)c->model->slot_results * sizeof(double));
-    evaluate_now(c, tape, bars);
+    int special = tape == &c->model->tapes.guards && guard_active(c, output);
+    const Tape *ran = special ? evaluate_on_tape(c, tape, c->state.t, c->x, bars) : tape;
+    if (!special) evaluate_now(c, tape, bars);
+    double value = bars[output];
     memset(bars, 0, (size_t)tape->n_outputs * sizeof(double));
-    bars[output] = 1;
-    tape_adjoint(tape, c->slots, c->dots, bars);
+    bars[output_place(tape, ran, output)] = 1;
+    adjoint_of_ran(c, tape, ran, bars);
     adjoint_of_implicit(c, 1);
     add_bars(c, slope);
+    return value;
 }
 
 /* Adds the product of a transposed Jacobian, by nonzeros of the step matrix. */
@@ -244,7 +248,7 @@ void piece_back(Instance *c, const Record *along) {
     Gradient *g = c->gradient;
     double begins[MOST_EDGES + 1], ends[MOST_EDGES + 1], behind = along->begin;
     int parts = 0;
-    if (g->loaded != along->frame) state_copy_in(c, along->frame);
+    if (g->loaded != along->frame) state_copy_in(c, along->frame), g->looked_at = NAN;
     g->loaded = along->frame;
     memcpy(c->piece, along->own, piece_size(c->model));
     do {

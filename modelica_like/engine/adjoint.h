@@ -78,6 +78,7 @@ struct Gradient {
     int n_of, n_vectors, n_kept, n_doubts, n_listed, n_marked, singular, early; /* early: events at the start */
     double present, cause_speed; /* time from which it goes; of the guard of an event */
     double singular_at, speed;   /* how fast the guard of an event comes to zero, where it matters; or 0 */
+    double looked_at;            /* begin of the piece behind, where guards have been looked at; or nan */
     Doubt doubts[MOST_DOUBTFUL];
     Touch *touches;                 /* of a piece, or an instant */
     int n_touches, measured, lands; /* lands: steps that end at edges, instead of a piece that went over them */
@@ -133,7 +134,7 @@ void add_seed(Instance *c, const Seed *seed);
 double seed_behind(Instance *c, double t, int add);
 /* adjoint.c */
 void add_bars(Instance *c, double *vector);
-void slope_of_output(Instance *c, const Tape *tape, int output, double *bars, double *slope);
+double slope_of_output(Instance *c, const Tape *tape, int output, double *bars, double *slope);
 void piece_back(Instance *c, const Record *along);
 /* kinks.c */
 void find_kinked(Instance *c);

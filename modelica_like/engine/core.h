@@ -40,6 +40,7 @@ void slopes(int operation, double a, double b, double f, double *by_left, double
 const Tape *run_on_tape(Instance *c, const Tape *tape, double *outputs);
 void run_special(Instance *c, const Tape *tape, double *outputs);
 int output_place(const Tape *tape, const Tape *ran, int output);
+void adjoint_of_ran(Instance *c, const Tape *tape, const Tape *ran, const double *bars);
 void make_part(Instance *c, const Tape *tape, const unsigned char *wanted, int period);
 void evaluate_part(Instance *c, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);

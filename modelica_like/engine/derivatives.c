@@ -216,8 +216,7 @@ void adjoint_of_implicit(Instance *c, int regular) {
         least_squares(m->n_z, m->n_z, c->dense_matrix, c->residual, c->vector);
     }
     memset(c->dots + m->slot_z, 0, m->n_z * sizeof(double));
-    tape_adjoint(run_now(c, &m->tapes.alg, c->residual), c->slots, c->dots, c->vector);
-    memset(c->dots + m->n_slots, 0, (size_t)c->known_used * sizeof(double)); /* does not move */
+    adjoint_of_ran(c, &m->tapes.alg, run_now(c, &m->tapes.alg, c->residual), c->vector);
 }
 
 /* Leaves the bars of what is known at the present point, where factor_implicit has been called, in `dots`. */

@@ -76,9 +76,7 @@ static double make_zero(Instance *c, int guard) {
     const double *slope = c->gradient->slope + (c->x - c->numbers);
     double value, sum = 0;
     if (!factor_implicit(c)) return NAN;
-    evaluate_now(c, &m->tapes.guards, c->edge_guards);
-    value = c->edge_guards[guard];
-    slope_of_output(c, &m->tapes.guards, guard, c->edge_guards, c->gradient->slope);
+    value = slope_of_output(c, &m->tapes.guards, guard, c->edge_guards, c->gradient->slope);
     for (int k = 0; k < m->n_x; k++) sum += slope[k] * slope[k] * m->nominals[k] * m->nominals[k];
     for (int k = 0; k < m->n_x && sum > 0; k++) c->x[k] -= value * slope[k] * m->nominals[k] * m->nominals[k] / sum;
     c->variables_valid = c->state.z_valid = 0;
@@ -128,9 +126,7 @@ static double felt_touch(Instance *c, const void *frame, const double *own, cons
     double back = BACK * (piece->end - piece->begin), effects[2], before[2], *guards = c->edge_guards;
     if (!c->gradient->measured) measure_guards(c);
     if (!stand_at(c, frame, own, touch->t) || !factor_implicit(c)) return 0;
-    evaluate_now(c, &c->model->tapes.guards, guards);
-    double value = guards[touch->guard];
-    slope_of_output(c, &c->model->tapes.guards, touch->guard, guards, c->gradient->slope);
+    double value = slope_of_output(c, &c->model->tapes.guards, touch->guard, guards, c->gradient->slope);
     double wrong = uncertainty(c, touch->guard, c->gradient->slope);
     if (!(fabs(value) <= wrong)) return 0;
     for (int k = 0; k < 2; k++)
@@ -182,19 +178,26 @@ static void note_touches(Instance *c, double begin, const double *before, double
     }
 }
 
-/* Looks for touches in the parts of the present piece. */
+/* Looks for touches in the parts of the present piece. Where it ends, the one behind it begins, which was looked at. */
 void find_touches(Instance *c, int parts, const double *begins, const double *ends) {
-    size_t n = 3 * (size_t)c->model->n_guards;
+    Gradient *g = c->gradient;
+    size_t n = 3 * (size_t)c->model->n_guards, size = n * sizeof(double);
     double *before = c->looks + 2 * n, *after = before + n, last = -INFINITY; /* the first two are those of the run */
-    c->gradient->n_touches = 0;
+    double *behind = c->looks + 4 * n, *first = behind + n;
+    g->n_touches = 0;
     for (int k = 0; k < 3 * parts && n > 0; k++) {
-        double t = begins[k / 3] + 0.5 * (k % 3) * (ends[k / 3] - begins[k / 3]), *kept = before;
-        look(c, t, after);
-        if (k > 0) note_touches(c, last, before, t, after);
+        double t = k % 3 == 2 ? ends[k / 3] : begins[k / 3] + 0.5 * (k % 3) * (ends[k / 3] - begins[k / 3]);
+        double *kept = before;
+        if (k == 3 * parts - 1 && t == g->looked_at) memcpy(after, behind, size);
+        else look(c, t, after);
+        if (k == 0) memcpy(first, after, size);
+        else note_touches(c, last, before, t, after);
         last = t;
         before = after;
         after = kept;
     }
+    memcpy(behind, first, size);
+    g->looked_at = begins[0];
 }
 
 /* The latest touch that is left, or minus infinity. */

@@ -140,8 +140,8 @@ static uint64_t lay_out(Instance *c, double *memory) {
         left += tape->n_operations; /* among the slots, behind all others */
         room += 4 * (uint64_t)tape->n_operations + 2 * (uint64_t)tape->n_outputs;
     }
-    c->most_known = (int)(left * MORE_SETS < MORE_OPERATIONS ? left * MORE_SETS : MORE_OPERATIONS);
-    c->most_room = (size_t)(room * MORE_SETS < 4 * MORE_OPERATIONS ? room * MORE_SETS : 4 * MORE_OPERATIONS);
+    c->most_known = (int)(left * MORE_KNOWN < MORE_OPERATIONS ? left * MORE_KNOWN : MORE_OPERATIONS);
+    c->most_room = (size_t)(room * MORE_SETS < 16 * MORE_OPERATIONS ? room * MORE_SETS : 16 * MORE_OPERATIONS);
     left += (uint64_t)c->most_known;
     c->n_bars = (size_t)m->n_slots + (size_t)left;
     TAKE(c->room, room + c->most_room);

@@ -104,11 +104,11 @@ static void feel(Instance *c, const Record *at, int begin, int end, int modes_on
         return;
     }
     g->marks[place] = 1;
-    for (int v = 0; v < g->n_kept; v++) {
-        double *slope = &vector_of(c, v)[place];
-        *slope = 0;
-        for (size_t n = 0; n < c->n_smooth; n++)
-            *slope += product(kept_vector(c, v)[n], (sides[1][n] - sides[0][n]) / step);
+    for (int v = 0; v < g->n_kept; v++) vector_of(c, v)[place] = 0;
+    for (size_t n = 0; n < c->n_smooth; n++) {
+        if (sides[1][n] == sides[0][n]) continue;
+        double change = (sides[1][n] - sides[0][n]) / step;
+        for (int v = 0; v < g->n_kept; v++) vector_of(c, v)[place] += product(kept_vector(c, v)[n], change);
     }
 }
 

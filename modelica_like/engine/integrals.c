@@ -29,8 +29,7 @@ static double seed_integrand(Instance *c, double t, const double *point, int var
     memset(c->dots, 0, (size_t)m->slot_results * sizeof(double));
     memset(c->outputs, 0, (size_t)ran->n_outputs * sizeof(double));
     c->outputs[output_place(&m->tapes.variables, ran, variable)] = 1;
-    tape_adjoint(ran, c->slots, c->dots, c->outputs);
-    memset(c->dots + m->n_slots, 0, (size_t)c->known_used * sizeof(double)); /* does not move */
+    adjoint_of_ran(c, &m->tapes.variables, ran, c->outputs);
     return c->variables[variable];
 }
 

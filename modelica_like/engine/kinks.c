@@ -15,7 +15,6 @@
 static void slopes_along(Instance *c, const double *direction, double *slopes) {
     const Model *m = c->model;
     double *dots = c->dots;
-    c->variables_valid = c->state.z_valid = 0;
     memset(slopes, 0, (size_t)m->n_x * sizeof(double));
     if (!factor_implicit(c)) return;
     memset(dots, 0, (size_t)m->slot_results * sizeof(double));
@@ -40,7 +39,8 @@ static double felt(const Instance *c, const double *direction, double part, cons
     return most;
 }
 
-/* By how much slopes along a direction differ a little to its two sides, or in a mode (-1: none) and another one. */
+/* By how much slopes along a direction differ a little to its two sides, or in a mode (-1: none) and another one; at
+ * the present point, which has been settled. */
 static double felt_beside(Instance *c, const double *direction, double way, double part, int mode, int target) {
     Gradient *g = c->gradient;
     size_t size = c->n_smooth * sizeof(double);
@@ -49,10 +49,15 @@ static double felt_beside(Instance *c, const double *direction, double way, doub
     for (int side = 0; side < 2; side++) {
         for (size_t k = 0; k < c->n_smooth && mode < 0; k++) c->numbers[k] += (side ? way : -way) * direction[k];
         if (mode >= 0 && side) c->d[mode] = target;
+        c->variables_valid = 0;
+        c->state.z_valid = mode >= 0 && !side;
+        c->trying += mode >= 0 && side;
         slopes_along(c, direction, slopes + side * c->model->n_unknowns);
+        c->trying -= mode >= 0 && side;
         memcpy(c->numbers, kept, size);
     }
-    c->variables_valid = c->state.z_valid = 0;
+    c->variables_valid = 0;
+    c->state.z_valid = 1;
     return felt(c, direction, part, slopes, slopes + c->model->n_unknowns);
 }
 
@@ -194,9 +199,7 @@ static void check_guards(Instance *c, double *rests) {
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *to = &m->transitions[m->guard_transition[k]];
         if (!rests_long(c, &rests[k]) || !factor_implicit(c)) continue;
-        evaluate_special(c, &m->tapes.guards, c->state.t, c->x, c->edge_guards);
-        double size = fabs(c->edge_guards[k]), terms = 0;
-        slope_of_output(c, &m->tapes.guards, k, c->edge_guards, slope);
+        double size = fabs(slope_of_output(c, &m->tapes.guards, k, c->edge_guards, slope)), terms = 0;
         for (size_t n = 0; n < c->n_smooth; n++) terms += fabs(slope[n] * c->numbers[n]);
         if (size <= max_of(AT_EDGE, AT_LIMIT * terms) && direction_off(c, slope, direction) &&
             felt_beside(c, direction, NEARBY_KINK, FELT_KINK, to->mode, to->target) > 0)

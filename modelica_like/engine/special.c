@@ -16,20 +16,26 @@ void forget_sets(Instance *c) {
     c->n_sets = c->room_used = c->chosen_by = 0;
 }
 
+/* What of the d that was loaded last decides about tapes; of a gradient, what does not move, see work_out. */
+static void take_key(const Instance *c, double *key) {
+    const Model *m = c->model;
+    const double *d = memcpy(key, c->slots + m->slot_d, (size_t)m->n_d * sizeof(double));
+    for (int k = m->n_modes; k < m->n_d && c->passing; k++) key[k] = d[k] != 0;
+    key[m->n_d] = c->passing;
+}
+
 /* Chooses the set of tapes for the modes that were loaded last, a new one where there is none. There is room for whole
  * tapes of the chosen set, and nobody uses those that are forgotten for it. */
 static void choose_set(Instance *c) {
-    size_t n_d = (size_t)c->model->n_d, size = n_d * sizeof(double);
-    double *key = c->set_keys;
+    size_t n = (size_t)c->model->n_d + 1;
+    double *key = c->set_keys, *present = key + N_SETS * n;
     uint64_t set = 0;
     if (c->room_used > c->most_room || c->known_used > c->most_known) forget_sets(c);
-    while (
-        set < c->n_sets && set < N_SETS && (key[n_d] != c->passing || memcmp(key, c->slots + c->model->slot_d, size)))
-        set++, key += n_d + 1;
+    take_key(c, present);
+    while (set < c->n_sets && set < N_SETS && memcmp(key, present, n * sizeof(double)) != 0) set++, key += n;
     if (set == c->n_sets || set == N_SETS) {
         set = c->n_sets++ % N_SETS;
-        key = memcpy(c->set_keys + set * (n_d + 1), c->slots + c->model->slot_d, size);
-        key[n_d] = c->passing;
+        memcpy(c->set_keys + set * n, present, n * sizeof(double));
         for (int k = 0; k < N_SPECIALS; k++) c->special[set * N_SPECIALS + k].uses = 0;
     }
     c->set = (int)set;
@@ -140,6 +146,8 @@ static void write_special(Instance *c, Special *s, const Tape *tape) {
             s->runs[s->tape.n_runs - 1].count++;
             place[slot] = tape->first_result + written++;
         }
+    s->first_known = first + c->known_used;
+    s->n_known = values - s->first_known;
     c->known_used = values - first;
     s->tape.n_operations = written;
     s->tape.operands = s->operands;
@@ -159,8 +167,8 @@ static void write_special(Instance *c, Special *s, const Tape *tape) {
 /* Runs a tape with the slots as they are loaded. Of outputs that are not wanted, any value may come. Returns the tape
  * that has run, whose results stand in the slots. */
 const Tape *run_on_tape(Instance *c, const Tape *tape, double *outputs) {
-    /* Where the work is bounded: working out costs more than a step. */
-    Special *s = c->bounded ? NULL : special_of(c, tape);
+    /* Where the work is bounded, working out costs more than a step; modes that a gradient tries come once. */
+    Special *s = c->bounded || (c->passing && c->trying) ? NULL : special_of(c, tape);
     if (s != NULL && s->uses > WORTH_IT) return run_wanted(s, c->slots, outputs), &s->tape;
     tape_run(tape, c->slots, outputs);
     if (s == NULL || ++s->uses <= WORTH_IT) return tape;
@@ -175,6 +183,13 @@ int output_place(const Tape *tape, const Tape *ran, int output) {
     int k = 0;
     while (ran != tape && ((const Special *)(const void *)ran)->wanted[k] != output) k++;
     return ran == tape ? output : k;
+}
+
+/* tape_adjoint in `dots`, by a tape that has run. What it knows does not move. */
+void adjoint_of_ran(Instance *c, const Tape *tape, const Tape *ran, const double *bars) {
+    const Special *s = (const Special *)(const void *)ran;
+    tape_adjoint(ran, c->slots, c->dots, bars);
+    if (ran != tape) memset(c->dots + s->first_known, 0, (size_t)s->n_known * sizeof(double));
 }
 
 /* The same for outputs alone, by compiled code where there is some. */

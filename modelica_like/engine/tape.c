@@ -70,28 +70,37 @@ void tape_tangent(const Tape *tape, const double *slots, double *dots, double *o
     for (int n = 0; n < tape->n_outputs; n++) output_dots[n] = dots[tape->outputs[n]];
 }
 
+static inline void add_products(int count, double slope, const double *bars, double *sums) {
+    for (int v = 0; v < count && slope != 0; v++) sums[v] += product(slope, bars[v]);
+}
+
 /* Adds to the bars of the arguments, of several vectors at once, which lie side by side: slopes are worked out once. */
 void tape_adjoint_of(int count, const Tape *tape, const double *slots, double *bars, const double *const *output_bars) {
+#define OPERATION(name, value, by_a, by_b)                                                    \
+    case OPERATION_##name:                                                                    \
+        while (k > first) {                                                                   \
+            int left = tape->operands[--k].left, right = tape->operands[k].right, v = 0;      \
+            const double *bar = results + (size_t)k * (size_t)count;                          \
+            while (v < count && bar[v] == 0) v++;                                             \
+            if (v == count) continue;                                                         \
+            double a = slots[left], b = slots[right], f = slots[tape->first_result + k];      \
+            (void)a, (void)b, (void)f;                                                        \
+            add_products(count - v, by_a, bar + v, bars + (size_t)left * (size_t)count + v);  \
+            add_products(count - v, by_b, bar + v, bars + (size_t)right * (size_t)count + v); \
+        }                                                                                     \
+        break;
     int k = tape->n_operations;
     double *results = bars + (size_t)tape->first_result * (size_t)count;
     memset(results, 0, (size_t)tape->n_operations * (size_t)count * sizeof(double));
     for (int n = 0; n < tape->n_outputs; n++)
         for (int v = 0; v < count; v++) bars[tape->outputs[n] * count + v] += output_bars[v][n];
-    for (int r = tape->n_runs - 1; r >= 0; r--)
-        for (int first = k - tape->runs[r].count; k > first;) {
-            const Operands *one = &tape->operands[--k];
-            double *bar = results + (size_t)k * (size_t)count, by_a, by_b;
-            int v = 0;
-            while (v < count && bar[v] == 0) v++;
-            if (v == count) continue;
-            slopes(tape->runs[r].operation, slots[one->left], slots[one->right], slots[tape->first_result + k], &by_a,
-                &by_b);
-            double *left = bars + (size_t)one->left * (size_t)count, *right = bars + (size_t)one->right * (size_t)count;
-            for (; v < count; v++) {
-                left[v] += product(by_a, bar[v]);
-                right[v] += product(by_b, bar[v]);
-            }
+    for (int r = tape->n_runs - 1; r >= 0; r--) {
+        int first = k - tape->runs[r].count;
+        switch (tape->runs[r].operation) {
+#include "operations.h"
         }
+    }
+#undef OPERATION
 }
 
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars) {

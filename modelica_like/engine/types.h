@@ -65,13 +65,14 @@ typedef struct { /* a tape for a set of modes, see special.c */
     Run *runs;
     Operands *operands;
     int *outputs;
-    int *wanted; /* the outputs of the whole */
+    int *wanted;              /* the outputs of the whole */
+    int first_known, n_known; /* slots of what it knows */
     int uses;
 } Special;
 /* Of the first tapes of a model, from its rates to its edges, for so many sets of modes: runs come back to most
  * of theirs. There is room for whole tapes of one,
  * and of so many more, up to so many operations of large models. */
-enum { N_SPECIALS = 7, N_SETS = 256, MORE_SETS = 9, MORE_OPERATIONS = 1 << 16 };
+enum { N_SPECIALS = 7, N_SETS = 256, MORE_SETS = 36, MORE_KNOWN = 4, MORE_OPERATIONS = 1 << 16 };
 
 /* Arrays with their sizes, for which lay_out has short names. */
 #define FIELD(name, size) *name
@@ -110,7 +111,7 @@ typedef struct {
         A(kept_z, n_z), A(damped_z, n_z), A(damped_step, n_z), A(reactions, members), A(sizes, members),              \
         A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n), A(changes, n),         \
         A(step_error, n), A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d)), A(known_values, m->n_known),          \
-        A(set_keys, N_SETS *(n_d + 1))
+        A(set_keys, (N_SETS + 1) * (n_d + 1))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; jolted: what new
  * values of states let go; idle:
