@@ -164,50 +164,44 @@ Result instance_begin(Instance *c) {
 /* Finds the start from the model's start values and from those that were set. */
 EXPORTED int native_begin(Native *n) { return code(!start_solve(n->c) ? RESULT_ERROR : instance_begin(n->c)); }
 
-static void go_to(Instance *c, const double *x, const double *z, const double *d) {
+static Instance *go_to(const Native *n, const double *x, const double *z, const double *d) {
+    Instance *c = n->c;
     memcpy(c->x, x, (size_t)c->model->n_x * sizeof(double));
     memcpy(c->z, z, (size_t)c->model->n_z * sizeof(double));
     memcpy(c->d, d, (size_t)c->model->n_d * sizeof(double));
     c->state.solved = 1;
     c->state.z_valid = c->variables_valid = 0;
+    return c;
 }
 
 /* Finds the start alone, or a steady state of given modes near a point; `native_failure` tells where that is. */
 EXPORTED int native_start(Native *n) { return code(start_solve(n->c)); }
 
 EXPORTED int native_steady_near(Native *n, const double *x, const double *z, const double *d) {
-    go_to(n->c, x, z, d);
-    return code(steady_near(n->c));
+    return code(steady_near(go_to(n, x, z, d)));
 }
 
 /* Lets every clock tick once at a steady state, or tells whether it stays one when they do. */
 EXPORTED int native_tick(Native *n, const double *x, const double *z, const double *d) {
     double step;
-    go_to(n->c, x, z, d);
-    return code(tick(n->c, &step));
+    return code(tick(go_to(n, x, z, d), &step));
 }
 
 EXPORTED int native_check_ticks(Native *n, const double *x, const double *z, const double *d) {
-    go_to(n->c, x, z, d);
-    return code(check_ticks(n->c));
+    return code(check_ticks(go_to(n, x, z, d)));
 }
 
 /* What is shared at a point in its modes, and what stops that has begun to be held, as strike_here says. */
-EXPORTED void native_share(Native *n, const double *x, const double *z, const double *d) {
-    go_to(n->c, x, z, d);
-    share(n->c);
-}
+EXPORTED void native_share(Native *n, const double *x, const double *z, const double *d) { share(go_to(n, x, z, d)); }
 
 EXPORTED int native_strike(Native *n, const double *x, const double *z, const double *d, const unsigned char *entering,
     unsigned char *knocked, int *hard) {
-    go_to(n->c, x, z, d);
-    return code(strike_here(n->c, entering, knocked, hard));
+    return code(strike_here(go_to(n, x, z, d), entering, knocked, hard));
 }
 
 /* Begins at states, implicit unknowns and d that are given; events there have not happened yet. */
 EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const double *d) {
-    go_to(n->c, x, z, d);
-    return code(instance_begin(n->c));
+    return code(instance_begin(go_to(n, x, z, d)));
 }
 
 /* The states after the events that come first; with other ones, if these are `given`. Those may move what modes hold:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -69,33 +70,34 @@ def sensitivities(
         ModelicaLikeError: the simulation is not possible.
     """
     of, to = listed(of, "output to differentiate"), listed(to, "parameter") if to else []
+    _check(method, precision)
+    if isinstance(drive, Solution):
+        freed, solution = Freed(drive.model, {}), drive
+    else:
+        freed = free_formulas(drive, to, parameters)
+        settings = {"parameters": freed.values, "start": start, "options": options}
+        solution = quick_run(freed.model, until, **settings, readings=[name for name in of if not is_series(name)])
+    start = start or solution.start
+    outputs = [read_output(solution.model, name) for name in of]
+    chosen = chosen_parameters(solution.model, to)
+    result = None
+    if method == "auto" and not any(output.kind == "series" for output in outputs):
+        result = _along_the_run(solution, outputs, chosen, freed, start, precision)
+    certain = [] if result is None else np.flatnonzero(np.isfinite(result.derivatives).all(axis=0)).tolist()
+    others = [pair for k, pair in enumerate(chosen) if k not in certain]
+    tell = partial(replayed, solution, outputs, start=start, precision=precision, named=bool(to))
+    if result is None or not certain:
+        return tell(chosen, method, freed)
+    return _joined(result, certain, tell(others, method, alone=False)) if others else result
+
+
+def _check(method: str, precision: float) -> None:
     if method not in get_args(Method):
         raise UnknownName(
             f"There is no method '{method}'{did_you_mean(method, get_args(Method)) or '.'}",
             advice="The methods are forward, adjoint and auto (the cheaper of both).",
         )
-    if isinstance(drive, Solution):
-        freed, solution = Freed(drive.model, {}), drive
-        start = start or drive.start
-    else:
-        freed = free_formulas(drive, to, parameters)
-        settings = {"parameters": freed.values, "start": start, "options": options}
-        solution = quick_run(freed.model, until, **settings, readings=[name for name in of if not is_series(name)])
     Tolerances(precision)  # refuses what is out of range
-    model = solution.model
-    outputs = [read_output(model, name) for name in of]
-    chosen = chosen_parameters(model, to)
-    result = None
-    if method == "auto" and not any(output.kind == "series" for output in outputs):
-        result = _along_the_run(solution, outputs, chosen, freed, start, precision)
-    certain = [k for k in range(len(chosen)) if result is not None and np.all(np.isfinite(result.derivatives[:, k]))]
-    if result is not None and len(certain) == len(chosen):
-        return result
-    if result is None or not certain:
-        return replayed(solution, outputs, chosen, method, freed, start=start, precision=precision, named=bool(to))
-    others = [pair for k, pair in enumerate(chosen) if k not in certain]
-    told = replayed(solution, outputs, others, method, start=start, precision=precision, named=bool(to), alone=False)
-    return _joined(result, certain, told)
 
 
 def replayed(
