@@ -355,3 +355,31 @@ end A;
     assert [result.final[f"n[{i}]"] for i in (1, 2, 3)] == [5, 10, 15]
     assert [result.final[f"m[{i}]"] for i in (1, 2, 3)] == [4, 8, 12]
     assert (result.final["changes"], result.final["count"], result.final["picked"]) == (5, 4, 9)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "third", "told"), [(2, 0, 2, ""), (0, 0, 2, "one"), (2, 9, 2, "two"), (2, 0, 1, "three")]
+)
+def test_a_loop_and_assertions_in_a_when(first: float, second: float, third: float, told: str, tmp_path: Path) -> None:
+    """All assertions count, wherever in the `when` they stand."""
+    text = f"""
+model A
+  parameter Boolean all = true; Real v[3](each start = 0, each fixed = true);
+equation
+  when time > 0.5 then
+    assert(time < {first}, "one");
+    if all then
+      assert(time > {second}, "two");
+    end if;
+    for i in 1:3 loop
+      v[i] = i*time;
+      assert(i*time < {third}, "three");
+    end for;
+  end when;
+end A;
+"""
+    if told:
+        with pytest.raises(LimitPassed, match=told):
+            run(tmp_path, text)
+    else:
+        assert run(tmp_path, text).final["v[3]"] == pytest.approx(1.5)

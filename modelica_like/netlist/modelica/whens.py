@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.netlist.modelica import fold
-from modelica_like.netlist.modelica.causal import declared_at
+from modelica_like.netlist.modelica.causal import declared_at, rounds
 from modelica_like.netlist.modelica.instance import Instance, refused
 from modelica_like.netlist.modelica.operators import arguments, demand_of, words_of
 from modelica_like.netlist.modelica.parse import parse_expression
@@ -111,7 +111,10 @@ class Whens:
                 demand = self.demanded(call, resolver, text)
                 values |= {} if demand is None else {f"{ASSERT}{len(values)}": Expr("demand", demand, statement.line)}
             elif statement.kind == "if":
-                values |= self._chosen(statement, text, local)
+                _add(values, self._chosen(statement, text, local))
+            elif statement.kind == "for":
+                for known in rounds(resolver, statement.parts[0], statement.line):
+                    _add(values, self.changes(statement.parts[1], text, known))
             else:
                 raise refused(f"'{statement.kind}' in a 'when'", text, statement.line)
         return values
@@ -127,8 +130,10 @@ class Whens:
                 branches.append((holds, self.changes(body, text, local)))
             if holds.kind == "boolean" and holds.args[0]:
                 break
+        if len(branches) == 1 and branches[0][0].kind == "boolean":  # parameters decide
+            return branches[0][1]
         names = dict.fromkeys(name for _, values in branches for name in values)
-        if any(is_ending(name) or name in self.reset for name in names) and len(branches) > 1:
+        if any(is_ending(name) or (name in self.reset and len(branches) > 1) for name in names):
             raise refused("reinit, terminate or assert in an 'if' of a 'when'", text, statement.line)
         return {name: self._by_branch(name, branches, statement.line) for name in names}
 
@@ -190,6 +195,12 @@ def if_taken(holds: Expr, before: list[Expr], assertion: Happening) -> Happening
         taken = fold.operation("and", (fold.operation("not", (other,), other.line), taken), other.line)
     demand = fold.operation("or", (fold.operation("not", (taken,), holds.line), conditions[0]), holds.line)
     return Happening((((demand,), new),), assertion.source, assertion.text)
+
+
+def _add(values: dict[str, Expr], more: dict[str, Expr]) -> None:
+    """Add new values to others; assertions get numbers that are not in use."""
+    for name, value in more.items():
+        values[f"{ASSERT}{len(values)}" if name.startswith(ASSERT) else name] = value
 
 
 def is_demand(call: Expr) -> bool:
