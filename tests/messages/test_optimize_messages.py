@@ -70,6 +70,24 @@ Give a parameter and its bounds: free = { "clutch.capacity" = ["20 N.m", "120 N.
         """An optimisation needs an objective.
 Say what is to be small: minimize = "peak(shaft.tau)".""",
     ),
+    "a mode as objective": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, minimize="clutch.mode"),
+        """'clutch.mode': clutch.mode is a mode, which is no quantity: its numbers stand for names.
+Ask how long it has one of them, duration(clutch.mode: free), or when it changes, time(clutch.mode: free -> stuck).""",
+    ),
+    "a limit of a mode": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, subject_to="max(2*clutch.mode) <= 1", **M),
+        """'max(2*clutch.mode)': clutch.mode is a mode, which is no quantity: its numbers stand for names.
+Ask how long it has one of them, duration(clutch.mode: free), or when it changes, time(clutch.mode: free -> stuck).""",
+    ),
+    "an objective that nothing changes": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, minimize="load_torque"),
+        """Nothing changes the objective 'load_torque': it is a parameter that is not free.
+Ask for an output of the run, or free it.""",
+    ),
     "one bound": (
         ValueOutOfRange,
         lambda: optimize(D, free={"clutch.capacity": "40 N.m"}, **M),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -34,9 +35,10 @@ from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, di
 from modelica_like.language import Component
 from modelica_like.language.inside import declarations
 from modelica_like.language.units import Unit, parse_unit, to_si
-from modelica_like.runs.readings import CONDITIONS, read_number, read_output
+from modelica_like.runs.readings import CONDITIONS, Output, leaves, read_number, read_output
 from modelica_like.simulation import Model, build, loaded, plan, quick_run
 
+_NAME = re.compile(r"[A-Za-z_][\w.]*(?:\[[^\]]*\][\w.]*)*")
 _BEFORE_END = 1e-5
 """Of the time of a run: how much before its end an event may be; ten times what counts as no excess of a limit."""
 _PROFILE = {"points", "rows", "from", "to", "rising", "falling"}
@@ -137,6 +139,8 @@ def make_problem(drive: Model, question: Question) -> Problem:
         sized = Sized(drive, model, lambda: quick_run(model, question.until, start=question.start))
         unit_of = _units(model, sized)
         aims = read_aims(unit_of, question.minimize, question.maximize)
+        if free and not question.chosen:
+            _check_changes(model, aims, free)
     with question.at(drive, "subject_to"):
         limits = read_limits(unit_of, question.subject_to)
     with question.at(drive, "for"):
@@ -198,9 +202,38 @@ def _units(model: CompiledDae, sized: Sized) -> Callable[[str], Unit]:
     def unit_of(name: str) -> Unit:
         if is_modal(name):
             return modal_unit(model, name)
-        return sized.unit(name) if sized.has(name) else read_number(model, name).unit
+        return sized.unit(name) if sized.has(name) else _smooth(model, name).unit
 
     return unit_of
+
+
+def _smooth(model: CompiledDae, name: str) -> Output:
+    """Read the name of a number of a run that a design changes little by little.
+
+    Raises:
+        UnknownName: the model has no such output.
+        ValueOutOfRange: it is a trajectory, or has the number of a mode.
+    """
+    output = read_number(model, name)
+    read = {word for leaf in leaves([output]) if not leaf.changes for word in _NAME.findall(leaf.path)}
+    for mode in (mode for mode in model.flat_discretes if mode.names and mode.path in read):
+        raise ValueOutOfRange(
+            f"'{name}': {mode.path} is a mode, which is no quantity: its numbers stand for names.",
+            advice=f"Ask how long it has one of them, duration({mode.path}: {mode.names[0]}), or when it changes, "
+            f"time({mode.path}: {mode.names[0]} -> {mode.names[1]}).",
+        )
+    return output
+
+
+def _check_changes(model: CompiledDae, aims: Sequence[Aim], free: Sequence[Free]) -> None:
+    """Refuse objectives that are parameters which are not free."""
+    fixed = model.fixed_position.keys() - {parameter.name for parameter in free}
+    for aim in aims:
+        if all(row.output in fixed for row in aim.rows):
+            raise ValueOutOfRange(
+                f"Nothing changes the objective '{aim.text}': it is a parameter that is not free.",
+                advice="Ask for an output of the run, or free it.",
+            )
 
 
 def _check_chances(model: CompiledDae, question: Question, limits: Sequence[Limit]) -> None:
