@@ -18,7 +18,7 @@ from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.options import SMALLEST_ATOL, Options
-from modelica_like.runs.quadrature import Places, rules, trapezia
+from modelica_like.runs.quadrature import Places, composite, rules
 from modelica_like.solve.dense import Dense
 from modelica_like.solve.idas import Grid, Integrator
 from modelica_like.solve.initialize import Point
@@ -77,6 +77,7 @@ class Results:
         first: the first result of the smooth piece each one belongs to, shape (n,).
         last: its last result, shape (n,).
         terms: energy terms in the order of `CompiledDae.energy`, shape (6, components, n).
+        shaken: changes of the terms by the last digits of all unknowns, in size, at a few results.
     """
 
     times: Vector
@@ -86,6 +87,7 @@ class Results:
     first: Places
     last: Places
     terms: Vector
+    shaken: Vector
 
     def point(self, k: int) -> Point:
         """Return one result."""
@@ -117,20 +119,22 @@ def results(model: CompiledDae, segments: Sequence[Segment], *, stored: bool = F
 def _together(model: CompiledDae, segments: list[Segment], *, stored: bool) -> Results:
     sizes = np.array([len(segment.times) for segment in segments])
     ends = sizes.cumsum()
+    count, nx = int(ends[-1]), len(segments[0].x)
     owner = np.repeat(np.arange(len(sizes)), sizes)
-    times, x, z = (
-        np.concatenate([getattr(segment, name) for segment in segments], axis=-1) for name in ("times", "x", "z")
-    )
-    d = np.array([segment.d for segment in segments]).T[:, owner]
-    return Results(
-        times, x, z, d, (ends - sizes)[owner], (ends - 1)[owner], _terms(model, times, x, z, d, stored=stored)
-    )
-
-
-def _terms(model: CompiledDae, times: Vector, x: Vector, z: Vector, d: Vector, *, stored: bool = False) -> Vector:
-    """Return energy terms at n results, shape (6, components, n); of stored energies and their rates (2, …)."""
+    # One array, so that the results whose last digits are changed stand at its end.
+    some, whole = [0, count // 2, count - 1], np.empty((1 + nx + len(segments[0].z), count + 3))
+    for name, rows in (("times", 0), ("x", slice(1, 1 + nx)), ("z", slice(1 + nx, None))):
+        np.concatenate([getattr(segment, name) for segment in segments], axis=-1, out=whole[rows, :count])
+    whole[:, count:] = whole[:, some]
+    whole[1::2, count:] *= 1.0 + _DIGITS * _SIGNS
+    whole[2::2, count:] *= 1.0 - _DIGITS * _SIGNS
+    d = np.array([segment.d for segment in segments]).T[:, np.append(owner, owner[some])]
     function = model.along((Cached.TERMS, stored), lambda: energy_terms(model, stored=stored))
-    return function(times, x, z, model.p, model.u, d)[0].reshape(-1, len(model.components), len(times))
+    columns = function(whole[0], whole[1 : 1 + nx], whole[1 + nx :], model.p, model.u, d)[0]
+    columns, whole = columns.reshape(-1, len(model.components), count + 3), whole[:, :count]
+    terms, first, last = columns[..., :count], (ends - sizes)[owner], (ends - 1)[owner]
+    shaken = np.abs(columns[..., count:] - terms[..., some])
+    return Results(whole[0], whole[1 : 1 + nx], whole[1 + nx :], d[:, :count], first, last, terms, shaken)
 
 
 def energy_terms(model: CompiledDae, *, stored: bool) -> ca.Function:
@@ -152,7 +156,9 @@ def drifts_of_results(model: CompiledDae, segments: Sequence[Segment]) -> tuple[
     for some in results(model, segments, stored=True):
         steps, (stored, rates) = some.times[1:] - some.times[:-1], some.terms
         kept, weights = _apart(some, steps), np.zeros(len(some.times))
-        weights[kept] = trapezia(some.times[kept], *(kept.searchsorted(ends[kept]) for ends in (some.first, some.last)))
+        weights[kept] = composite(
+            some.times[kept], *(kept.searchsorted(ends[kept]) for ends in (some.first, some.last))
+        )
         moved = max(moved, *_moving(stored, rates, steps))
         numbers = np.arange(len(some.times))
         total += stored[:, numbers == some.last].sum(axis=1) - stored[:, numbers == some.first].sum(axis=1)
@@ -282,13 +288,7 @@ class Powers:
 
     def _hear(self, every: Results) -> None:
         """Estimate the rounding of stored energies in J and of powers in W."""
-        some = [0, len(every.times) // 2, len(every.times) - 1]
-        x, z = (part[:, some] for part in (every.x, every.z))
-        for row, unknown in enumerate((*x, *z)):
-            unknown *= 1.0 + _DIGITS * (-1) ** row * _SIGNS
-        terms = _terms(self.model, every.times[some], x, z, every.d[:, some])
-        shaken = np.abs(terms - every.terms[..., some])
-        changes = shaken[0].sum(axis=0).max(), shaken[1:].sum(axis=(0, 1)).max()
+        changes = every.shaken[0].sum(axis=0).max(), every.shaken[1:].sum(axis=(0, 1)).max()
         self._noise = np.maximum(self._noise, _ROUNDING * np.array(changes))
 
     def _bends(self, every: Results, ends: Places) -> Vector:

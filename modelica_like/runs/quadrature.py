@@ -13,6 +13,8 @@ Places = np.ndarray[Any, np.dtype[Any]]
 """Positions of results or intervals, or a mask."""
 _WIDTH = 8
 """Results of the widest rule; its order."""
+_MIDDLE = (_WIDTH - 1) // 2
+"""Results before an interval in the middle of its rule."""
 _ORDERS = np.array([0, 2, 4])
 """Reductions of the orders of the rules."""
 _UNIFORM, _ROUNDING = 1e-9, 1e-15
@@ -34,11 +36,47 @@ def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, V
         The m intervals by the result before; the results for each, shape (m, 8); their weights, in s, shape (m, 3,
         8).
     """
-    steps = np.append(np.diff(times), 0.0)
+    steps = _steps(times)
     k = ((np.arange(len(times)) < last) & (steps > 0)).nonzero()[0]
-    # How many steps before each result differ from the step before them; times have rounding errors.
-    differs = np.abs(steps[1:] - steps[:-1]) > _UNIFORM * steps[:-1] + _ROUNDING * np.abs(times[:-1])
-    uneven = np.concatenate([[0], differs.cumsum()])
+    return k, *_rules_of(k, times, steps, first, last, _uneven(times, steps))
+
+
+def composite(times: Vector, first: Places, last: Places) -> Vector:
+    """Return the weights of all results in the integral over all pieces by the rule of the highest order, in s.
+
+    Args:
+        times: of results, in smooth pieces, shape (n,).
+        first: the first result of the piece each one belongs to, shape (n,).
+        last: its last result, shape (n,).
+    """
+    count, steps = len(times), _steps(times)
+    uneven, places, reach = _uneven(times, steps), np.arange(count), _WIDTH - 1 - _MIDDLE
+    # In the middle of equal steps all intervals have one rule.
+    inner = (places - _MIDDLE >= first) & (places + reach <= last)
+    inner[_MIDDLE : count - reach] &= uneven[_WIDTH - 2 : -1] == uneven[: 1 - _WIDTH]
+    weights = np.convolve(np.where(inner, steps, 0.0), _equidistant()[_WIDTH, _MIDDLE, 0])
+    weights = weights[_MIDDLE : _MIDDLE + count]
+    k = ((places < last) & (steps > 0) & ~inner).nonzero()[0]
+    those, rest = _rules_of(k, times, steps, first, last, uneven)
+    weights += np.bincount(those.ravel(), rest[:, 0].ravel(), count)
+    return weights
+
+
+def _steps(times: Vector) -> Vector:
+    return np.append(times[1:] - times[:-1], 0.0)
+
+
+def _uneven(times: Vector, steps: Vector) -> Places:
+    """Return how many steps before each result differ from the step before them."""
+    # Times have rounding errors.
+    uneven = np.abs(steps[1:] - steps[:-1]) > _UNIFORM * steps[:-1] + _ROUNDING * np.abs(times[:-1])
+    return np.concatenate([[0], uneven.cumsum()])
+
+
+def _rules_of(
+    k: Places, times: Vector, steps: Vector, first: Places, last: Places, uneven: Places
+) -> tuple[Places, Vector]:
+    """Return results and weights of the rules of some intervals, as `rules` does."""
     first, last = first[k], last[k]
     sizes = np.minimum(last - first + 1, _WIDTH)
     starts = np.clip(k - (sizes - 1) // 2, first, last + 1 - sizes)
@@ -48,29 +86,7 @@ def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, V
     odd = (uneven[np.maximum(starts + sizes - 2, starts)] != uneven[starts]).nonzero()[0]
     now = (times[places[odd]] - times[k[odd]][:, None]) / steps[k[odd]][:, None]
     weights[odd] = _rules(now, sizes[odd], offsets[odd])
-    return k, places, weights * steps[k][:, None, None]
-
-
-def trapezia(times: Vector, first: Places, last: Places) -> Vector:
-    """Return the weights of all results in the integral over all pieces by trapezia and slopes at results, in s.
-
-    Slopes are those of parabolas through three results: the order is 4. Between equal steps they cancel.
-
-    Args:
-        times: of results, in smooth pieces that follow each other, shape (n,).
-        first: the first result of the piece each one belongs to, shape (n,).
-        last: its last result, shape (n,).
-    """
-    count, steps = len(times), np.diff(times, prepend=times[0], append=times[-1])
-    before, after = steps[:-1], steps[1:]
-    weights, bends = (before + after) / 2.0, (after**2 - before**2) / 12.0
-    bent = ((np.abs(bends) > _UNIFORM * weights**2) & (last - first > 1)).nonzero()[0]
-    middle = np.clip(bent, first[bent] + 1, last[bent] - 1)
-    a, b, place = before[middle], after[middle], times[bent] - times[middle]
-    left, right = (bends[bent] * part for part in ((2.0 * place - b) / a / (a + b), (2.0 * place + a) / b / (a + b)))
-    for results, part in ((middle - 1, left), (middle, -left - right), (middle + 1, right)):
-        weights += np.bincount(results, part, count)
-    return weights
+    return places, weights * steps[k][:, None, None]
 
 
 @cache
