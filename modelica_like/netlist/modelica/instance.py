@@ -177,6 +177,7 @@ class Instance:
         self.folded: set[str] = set()
         self.free: dict[str, str] = {}
         self.values: dict[str, Expr] = {}
+        self.formulas: dict[str, Expr | None] = {}
         self.frozen: dict[str, set[str]] = {}
         self.adopted: list[tuple[Expr, Expr, Source]] = []
         self.own_pairs: list[tuple[str, str, Source]] | None = None

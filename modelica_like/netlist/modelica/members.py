@@ -111,16 +111,19 @@ def formulas_of(owner: Instance, member: Member) -> Expr | None:
     Numbers are needed where it is given as a function of many numbers, and where its elements cannot be told apart.
     """
     given, name = member.given, member.declaration.name
+    if name in owner.formulas:
+        return owner.formulas[name]
     if given.value is None or given.scope is None or name in owner.folded:
         return None
     owner.folded.add(name)
-    try:
+    value = None
+    with suppress(ModelicaTextError):  # told, if it is no array of numbers either
         value = resolve.Resolver(*given.scope)(given.value)
-    except ModelicaTextError:
-        return None  # told, if it is no array of numbers either
-    finally:
-        owner.folded.remove(name)
-    return value if value.kind == "array" and value.size <= _LARGE else None
+    owner.folded.remove(name)
+    value = value if value is not None and value.kind == "array" and value.size <= _LARGE else None
+    if not owner.classes.only_said:  # one that is read later keeps what it depends on
+        owner.formulas[name] = value
+    return value
 
 
 def check_value(owner: Instance, member: Member, value: Expr) -> None:
