@@ -117,9 +117,11 @@ def formulas_of(owner: Instance, member: Member) -> Expr | None:
         return None
     owner.folded.add(name)
     value = None
-    with suppress(ModelicaTextError):  # told, if it is no array of numbers either
-        value = resolve.Resolver(*given.scope)(given.value)
-    owner.folded.remove(name)
+    try:
+        with suppress(ModelicaTextError):  # told, if it is no array of numbers either
+            value = resolve.Resolver(*given.scope)(given.value)
+    finally:
+        owner.folded.remove(name)
     value = value if value is not None and value.kind == "array" and value.size <= _LARGE else None
     if not owner.classes.only_said:  # one that is read later keeps what it depends on
         owner.formulas[name] = value
