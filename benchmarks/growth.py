@@ -46,6 +46,7 @@ from modelica_like import (
 from modelica_like.edit import apply
 from modelica_like.netlist import dumps, loads, save
 from modelica_like.netlist.modelica.write import modelica_text
+from modelica_like.page import Session
 from modelica_like.show.report.plausible import notes
 from modelica_like.show.report.run import run_report
 from modelica_like.show.report.start import start_report
@@ -158,6 +159,8 @@ def of_run(drive: Any, model: Any, run: Any, folder: Path) -> Iterator[Call]:
         {"op": "group", "names": ["m1", "s2"], "name": "new"},
     ):  # fmt: skip
         yield f"edit: {request['op']}", lambda request=request: apply(text, request, file=folder / "chain.toml")
+    session = Session(folder / "chain.toml")
+    yield "edit in the picture", lambda: session.apply({"request": {"op": "set", "path": "m1.J", "value": 2}})
     yield "as Modelica", lambda: modelica_text(drive)
     yield "schematic", lambda: schematic(drive)
     yield "plot", lambda: run.plot()
