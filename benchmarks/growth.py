@@ -3,9 +3,9 @@
 Run with `python benchmarks/growth.py [parts parts] [word …]`: only calls with one of these words, by default all, and
 with so many parts, by default 300 and 3,000. Two drives are measured at both sizes: a chain of inertias and springs,
 read from a netlist, and the random tree of `large.py` with clutches, backlash and gears; and a mass whose force follows
-a table of so many rows. Tenfold parts may take up to
-15 times as long: what is linear takes 10 times, sorting and memory that leaves the caches add to it, what is quadratic
-takes 100 times. Times are CPU times, the shortest of some repeats; only their growth decides.
+a table of so many rows, and Modelica text with arrays of so many elements. Tenfold parts may take up to 15 times as
+long: what is linear takes 10 times, sorting and memory that leaves the caches add to it, what is quadratic takes 100
+times. Times are CPU times, the shortest of some repeats; only their growth decides.
 
 Two calls may grow somewhat more (`STEEPER`). All eigenvalues of a matrix take a time that grows with its cube by their
 nature: they are asked of a tenth of the parts, shown, and do not decide.
@@ -77,6 +77,17 @@ push = { is = "Force" }
 mass = { is = "Mass", m = 2, s = 0, v = 0 }
 [connect]
 end = ["push.flange", "mass.flange_a"]
+"""
+TEXT = """model Chain
+  parameter Real c = 2;
+  parameter Real k[{elements}] = {{i*c for i in 1:{elements}}};
+  Real x[{elements}](each start = 1, each fixed = true);
+equation
+  der(x[1]) = -k[1]*x[1];
+  for i in 2:{elements} loop
+    der(x[i]) = k[i]*(x[i - 1] - x[i]);
+  end for;
+end Chain;
 """
 MODES = "all modes, of a tenth of the parts"
 
@@ -194,10 +205,17 @@ def of_rows(rows: int, folder: Path) -> Iterator[Call]:
     yield "rows: run, native", lambda: simulate(drive, inputs=inputs, solver="native")
 
 
+def of_text(elements: int, folder: Path) -> Iterator[Call]:
+    """Yield the reading of Modelica text whose loop is about arrays of so many elements."""
+    file = folder / "Chain.mo"
+    file.write_text(TEXT.format(elements=elements), encoding="utf-8")
+    yield "text: read", lambda: load(file)
+
+
 def chosen(parts: int, words: list[str]) -> Iterator[Call]:
     """Yield the calls that are asked for."""
     with tempfile.TemporaryDirectory() as work:
-        for calls in (of_chain, of_tree, of_rows):
+        for calls in (of_chain, of_tree, of_rows, of_text):
             for name, call in calls(parts, Path(work)):
                 if not words or name in NEEDED or any(word in name for word in words):
                     yield name, call

@@ -117,7 +117,7 @@ class _Builder(Fields):
         rows = [([*paths(left), *paths(right)], source) for left, right, source in self.statements.equations]
         for names, source in list(rows):
             end = next((end for end in names if self._is_open(end) and end not in joined), "")
-            rest = [row for row in rows if row[0] is not names]
+            rest = [row for row in rows if row[0] is not names] if end else rows
             if end and rank(rest, own) == rank(rows, own):
                 rows = rest
                 joined.add(end)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from itertools import product
 
 from modelica_like.netlist.modelica.tree import Expr
@@ -11,12 +12,17 @@ Place = tuple[int, ...]
 """Of an element, from one in each dimension; empty where there is no array."""
 
 
+@lru_cache(maxsize=64)  # a loop over an array names all of it for each of its elements
 def named_array(path: str, shape: tuple[int, ...], kind: str) -> Expr:
     """Return the array of the names `path[1]`, `path[2]` and so on."""
+    return _named(path, shape, "name" if kind != "Boolean" else "condition")
+
+
+def _named(path: str, shape: tuple[int, ...], kind: str) -> Expr:
     if not shape:
-        return Expr("name" if kind != "Boolean" else "condition", ((path, ()),))
+        return Expr(kind, ((path, ()),))
     inner = [f"{path[:-1]},{k}]" if path.endswith("]") else f"{path}[{k}]" for k in range(1, shape[0] + 1)]
-    return Expr("array", tuple(named_array(index, shape[1:], kind) for index in inner))
+    return Expr("array", tuple(_named(index, shape[1:], kind) for index in inner))
 
 
 def elements_of(name: str, shape: tuple[int, ...]) -> list[tuple[str, Place]]:

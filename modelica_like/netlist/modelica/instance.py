@@ -178,6 +178,7 @@ class Instance:
         self.free: dict[str, str] = {}
         self.values: dict[str, Expr] = {}
         self.formulas: dict[str, Expr | None] = {}
+        self.seen_from: dict[tuple[str, str], Expr] = {}
         self.frozen: dict[str, set[str]] = {}
         self.adopted: list[tuple[Expr, Expr, Source]] = []
         self.own_pairs: list[tuple[str, str, Source]] | None = None

@@ -291,9 +291,12 @@ class Resolver:
         value = members.formulas_of(owner, member) if levels_between(scope[0], self.instance) is not None else None
         if value is None or all(item.kind == "number" for item in fold.elements(value)):
             return None
-        members.check_value(owner, member, value)
         here = way(self.instance, scope[0]) if scope[0] is not self.instance else ""
-        return renamed(value, lambda path: path if path == "time" else f"{here}{path}")
+        key = member.declaration.name, here
+        if key not in owner.seen_from or key[0] not in owner.formulas:
+            members.check_value(owner, member, value)
+            owner.seen_from[key] = renamed(value, lambda path: path if path == "time" else f"{here}{path}")
+        return owner.seen_from[key]
 
     def _constant(self, expression: Expr) -> Expr:
         """Resolve a constant of a class, or a literal of an enumeration."""
