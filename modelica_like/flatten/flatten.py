@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
@@ -60,6 +61,19 @@ def flatten(root: Component, *, open_inputs: bool = False, disturbed: str = "") 
         CyclicAssembly: parameters depend on each other cyclically.
     """
     return _Flattener(root, open_inputs, disturbed).run()
+
+
+def flatten_again(model: FlatModel, yielding: Collection[str]) -> FlatModel:
+    """Write out the equations of a model anew, with components whose locks yield, by their paths."""
+    root, open_inputs, disturbed = model.asked
+    parts = [inside(model.components[path]) for path in yielding]
+    try:
+        for part in parts:
+            part.creeps = True
+        return flatten(root, open_inputs=open_inputs, disturbed=disturbed)
+    finally:
+        for part in parts:
+            part.creeps = False
 
 
 _OF_ALL = {
@@ -130,7 +144,8 @@ class _Flattener:
             derived=self.parameters.derived, formulas=self.parameters.formulas(),
             discretes=self.discretes, d=d, time=ca.SX(TIME), instances=instances, linear=self.linear,
             general=general, starts=self.starts, inputs=self.inputs,
-            components={component.path: component for component, _ in templates}, flags=tuple(self.flags),
+            components={component.path: component for component, _ in templates},
+            asked=(self.root, self.open_inputs, self.disturbed), flags=tuple(self.flags),
             pres=self.pres, lefts=self.lefts,
         )  # fmt: skip
 

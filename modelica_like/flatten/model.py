@@ -167,6 +167,7 @@ class FlatModel:
         components: the tree of the model.
         pres: discrete value -> the one that it is the `pre` of; and `initial()` -> itself.
         lefts: discrete value -> the variable (node) whose value before an event it stands for in new values.
+        asked: what it was made of: the root, whether open inputs are inputs, and the disturbed signal.
         flags: symbols in q for "the motion is prescribed", with the variable; none once the structure is
             known.
     """
@@ -189,6 +190,7 @@ class FlatModel:
     starts: list[StartValue]
     inputs: list[int]
     components: dict[str, Component]
+    asked: tuple[Component, bool, str]
     flags: tuple[tuple[Any, int], ...] = ()
     pres: dict[int, int] = field(default_factory=dict[int, int])
     lefts: dict[int, int] = field(default_factory=dict[int, int])

@@ -128,6 +128,7 @@ class Template:
     holds: tuple[HoldForm, ...]
     hold_terms: ca.Function
     ideals: tuple[IdealForm, ...]
+    locks: tuple[tuple[int, str, bool], ...]
     energy_slots: tuple[Slot, ...]
     energy: ca.Function
     connections: tuple[Connection | FreeEnd, ...]
@@ -270,6 +271,7 @@ def _build(component: Component) -> Template:
         holds=holds,
         hold_terms=names.function("hold_terms", hold_terms),
         ideals=ideal_forms(component, residuals),
+        locks=tuple((row, e.lock, e.creeps) for row, e in enumerate(equations) if e.lock in names.discretes),
         energy_slots=tuple(energy.variables),
         energy=energy.function("energy", energy_terms),
         connections=wiring,

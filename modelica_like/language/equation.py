@@ -34,11 +34,20 @@ class FreeEnd:
 
 @dataclass(frozen=True, eq=False)
 class Equation:
-    """An equation `left == right`."""
+    """An equation `left == right`.
+
+    Attributes:
+        left, right: its sides.
+        source: its place.
+        lock: the discrete variable that makes it say that something stands, if others may say so, too.
+        creeps: whether tiny terms of it then determine what they all leave open.
+    """
 
     left: Expr
     right: Expr
     source: Source = NOWHERE
+    lock: str = ""
+    creeps: bool = False
 
 
 Statement = Equation | Connection | FreeEnd

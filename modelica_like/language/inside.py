@@ -120,6 +120,7 @@ class InsideComponent(Inside):
         elsewhere: own discrete variables that an owner's equations determine.
         frozen: parameters of whose values others were made when a text was read.
         lent: equations of own variables that stand in an owner, less those of parts that stand here.
+        creeps: whether its locked frictions yield to what holds them, because others hold the same shaft.
     """
 
     values: dict[str, Value] = field(default_factory=_empty)
@@ -133,6 +134,7 @@ class InsideComponent(Inside):
     elsewhere: frozenset[str] = frozenset()
     frozen: Set[str] = frozenset()
     lent: int = 0
+    creeps: bool = False
 
     def detached(self) -> Self:
         """Return a copy without what is valid in one process, and for one instance, only."""

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.errors import StructureError
+from modelica_like.flatten.flatten import flatten_again
 from modelica_like.flatten.model import FlatModel, Origin
 from modelica_like.language.elements import inserted
 from modelica_like.structure.alias import Aliases, find_aliases
@@ -36,6 +37,7 @@ from modelica_like.structure.holds import (
 )
 from modelica_like.structure.ideal import IdealNetwork, complete, find_ideals
 from modelica_like.structure.index import Pantelides, prefer_relative_states
+from modelica_like.structure.locks import find_locks, left_open
 from modelica_like.structure.motion import Motion
 from modelica_like.structure.prescribed import Flags
 from modelica_like.structure.states import select_states
@@ -163,8 +165,12 @@ def _reduce(flat: FlatModel, *, decided: bool) -> ReducedDae:
     derivatives = {system.derivative(state) for state in states}
     rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
     ideals = find_ideals(flat)
-    kept = [ideal.row for ideal in ideals]
-    solved = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept).run()
+    locks = find_locks(flat)
+    kept = [*(ideal.row for ideal in ideals), *(lock.row for lock in locks if lock.creeps)]
+    solver = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept)
+    solved = solver.run()
+    if sharing := left_open(locks, solver, flat.d):
+        return _reduce(flatten_again(flat, sharing), decided=decided)
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
     moving = moving_chains(system, counts) if holds else set[int]()

@@ -1,6 +1,6 @@
 """Whatever is done to a netlist: the text is TOML, what is wrong is told, and everything can be undone.
 
-`RANDOM_EDITS=5000 pytest tests/edit` does more sequences; the slow suite has a thousand.
+`RANDOM_EDITS=5000 pytest tests/edit` does more sequences; the slow suite has 400.
 """
 
 import os
@@ -18,7 +18,7 @@ from modelica_like.errors import ModelicaLikeError
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLISTS = sorted(path for path in EXAMPLES.rglob("*.toml") if "sizing" not in path.parts)
-SLOW = int(os.environ.get("RANDOM_EDITS", "1000"))
+SLOW = int(os.environ.get("RANDOM_EDITS", "400"))
 STEPS = 30
 
 
@@ -60,7 +60,8 @@ def edited(path: Path, seed: int) -> int:
 
 
 @pytest.mark.parametrize(
-    "seeds", [pytest.param(range(12), id="some"), pytest.param(range(12, SLOW), id="all", marks=pytest.mark.slow)]
+    "seeds",
+    [range(12), *(pytest.param(range(k, min(k + 50, SLOW)), marks=pytest.mark.slow) for k in range(12, SLOW, 50))],
 )
 def test_random_edits(seeds: range) -> None:
     order = random.Random(1).sample(NETLISTS, len(NETLISTS))
@@ -91,7 +92,8 @@ def outcome(text: str, request: dict[str, Any], path: Path) -> Any:
 
 
 @pytest.mark.parametrize(
-    "seeds", [pytest.param(range(100), id="some"), pytest.param(range(100, 4 * SLOW), id="all", marks=pytest.mark.slow)]
+    "seeds",
+    [pytest.param(range(100), id="some"), pytest.param(range(100, 10 * SLOW), id="all", marks=pytest.mark.slow)],
 )
 def test_layout_has_no_meaning(seeds: range) -> None:
     for seed in seeds:

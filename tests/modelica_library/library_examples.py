@@ -22,6 +22,9 @@ PACKAGES = (
     "Modelica.StateGraph", "ModelicaTest.Blocks", "ModelicaTest.Electrical.Analog", "ModelicaTest.Tables",
 )  # fmt: skip
 MISSING: dict[str, str] = tomllib.loads((HERE / "missing.toml").read_text(encoding="utf-8"))
+SOLVERS = {"ModelicaTest.Blocks.PadeDelay2": ("native", 1e-6)}
+"""Solver and relative tolerance of what is not run by IDAS with 1e-7: states of 1e11 and 1e-3 in one system, of which
+rounding leaves IDAS so little that it takes 300 s for 20 ms."""
 POINTS = 10_001
 """Of a run: a tenth of the window of the tube is between two."""
 
@@ -54,7 +57,8 @@ def run_example(name: str) -> Outcome:
     times, columns = read_reference(references()[name])
     try:
         model, _ = read_modelica(LIBRARY / name.partition(".")[0] / "package.mo", name, table=False)
-        run: Any = simulate(model, float(times[-1]), points=POINTS, rtol=1e-7)
+        solver, rtol = SOLVERS.get(name, ("idas", 1e-7))
+        run: Any = simulate(model, float(times[-1]), points=POINTS, rtol=rtol, solver=solver)
     except ModelicaLikeError as error:
         return Outcome("refused", str(error).splitlines()[0])
     comparison = compare(name, run, times, columns)

@@ -21,6 +21,15 @@ SETTLED = {
 """Times in s before which a reference is still at its start: a gear that is stuck until 50 ps, a contact that moves at
 1 mm/s for 0.2 µs and is then reset."""
 
+STANDING = {
+    (name, f"{part}.mode"): "Inertia2.w"
+    for name in ("Modelica.Mechanics.Rotational.Examples.LossyGearDemo2",)
+    for part in ("gear", "bearingFriction")
+}
+"""Speeds, where modes count only while it is more than `CREEPS`: of two frictions that stick on one shaft, equations
+leave open which one slides at ±5e-11 rad/s, as the reference has it, and at less here."""
+CREEPS = 1e-9
+
 
 def references() -> dict[str, Path]:
     """Return the files of trajectories by the name of the class."""
@@ -80,7 +89,8 @@ def compare(name: str, run: Any, times: np.ndarray, columns: dict[str, np.ndarra
             result.missing.append(column)
             continue
         begin = max(first, int(np.searchsorted(times, SETTLED.get((name, column), times[0]))))
-        at, wanted = times[begin : last + 1], values[begin : last + 1]
+        moves = np.abs(columns.get(STANDING.get((name, column), ""), np.inf + values)[begin : last + 1]) > CREEPS
+        at, wanted = times[begin : last + 1][moves], values[begin : last + 1][moves]
         span = max(float(np.ptp(values)), 1e-6 * float(np.abs(values).max()), 1e-9)
         low, high = _envelope(run.time, ours, at, window)
         distance = float(np.max(np.maximum(low - wanted, wanted - high), initial=0.0)) / span

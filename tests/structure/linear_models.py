@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from modelica_like.errors import Source
 from modelica_like.flatten.model import FlatModel, FlatVariable, LinearEquation, Origin
+from modelica_like.language import Assembly
 from modelica_like.language.units import ONE
 
 ORIGIN = Origin("", "test", Source(""))
@@ -29,7 +30,7 @@ def model(orders: list[int], rows: list[dict[int, float]], constants: list[float
     return FlatModel(
         name="test", variables=variables, nodes=nodes, derivative=derivative, parameters=[], p=none, q=none, derived=[],
         formulas=none, discretes=[], d=none, time=ca.SX.sym("t"), instances=[], linear=linear, general=[], starts=[],
-        inputs=[], components={},
+        inputs=[], components={}, asked=(Assembly(), False, ""),
     )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 }  # fmt: skip
 OUTSIDE = "outside"
 """A value that is taken where a demand does not hold: the value, the demand and its words."""
-ARGUMENT, SILENT = "argument", "silent"
+ARGUMENT, SILENT, CREEP = "argument", "silent", "#creep"
 """Calls round an argument of a function, whose relations make events, and round a relation or a jump of the function
 itself, which makes none."""
 _SAME_TYPE = ("pre", "noEvent", "previous", "hold", ARGUMENT, SILENT)

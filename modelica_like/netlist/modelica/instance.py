@@ -9,6 +9,7 @@ from modelica_like.errors import ModelicaTextError, Source, UnknownName, did_you
 from modelica_like.language.inside import declarations
 from modelica_like.netlist.modelica.classes import Classes, Found
 from modelica_like.netlist.modelica.library import Known, table
+from modelica_like.netlist.modelica.stiction import yielding
 from modelica_like.netlist.modelica.tree import (
     ClassText,
     Declaration,
@@ -280,7 +281,7 @@ class Instance:
             elif not isinstance(element, Import) and "redeclare" not in element.prefixes:
                 self._declare(element, text, outer)
         self.lineage.append(text)
-        self.equations += [(equation, text) for equation in text.equations]
+        self.equations += [(equation, text) for equation in yielding(text.equations)]
         self.initial_equations += [(equation, text) for equation in text.initial_equations]
         self.algorithm += [(statement, text) for statement in text.algorithm]
         return names | declared.keys()

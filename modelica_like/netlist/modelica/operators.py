@@ -35,6 +35,8 @@ def called(resolver: Resolver, call: Expr) -> Expr:
     if short in (fold.SILENT, fold.ARGUMENT):
         value = resolver(given[0])
         return value if value.kind in fold.KNOWN else fold.call(short, (value,), line)
+    if short == fold.CREEP:
+        return fold.call(short, tuple(map(resolver, given)), line)
     if short == "getInstanceName" and resolver.instance is not None:
         return Expr("string", (resolver.instance.full_name,), line)
     if short == "homotopy":

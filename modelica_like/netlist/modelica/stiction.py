@@ -1,0 +1,135 @@
+"""Sticking friction as the standard library writes it, shared where several parts stick on one shaft.
+
+Such a friction says `a = if locked then 0 else sa - limit`, and its torque is `sa` while it is locked: what holds it,
+to be found. Two of them on one shaft both say that it stands, and leave open how they share the load. Here a locked one
+yields by a tiny acceleration per load, `a = creep*sa`: they share it evenly, the one that reaches its limit slides as
+slowly with the others, and these take what is left, until they slide, too. So a shaft breaks away at the sum of limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import reduce
+
+from modelica_like.netlist.modelica import fold
+from modelica_like.netlist.modelica.fold import CREEP
+from modelica_like.netlist.modelica.tree import Expr, Statement, with_operands
+
+
+def yielding(equations: Iterable[Statement]) -> list[Statement]:
+    """Return equations in which locked frictions may yield."""
+    equations = list(equations)
+    limits: dict[str, dict[tuple[object, ...], list[Expr]]] = {">": {}, "<": {}}
+    for statement in equations:
+        for node in _nodes(statement.parts[1]) if statement.kind == "=" else ():
+            if node.kind in limits and node.args[0].kind == "name":
+                limits[node.kind].setdefault(node.args[0].args, []).append(node.args[1])
+    above, below = limits.values()
+    known = {
+        load: values[:2] if load not in below or _same(fold.operation("neg", (values[0],), 0), below[load][0]) else []
+        for load, values in above.items()
+    }
+    turned = [_yielding(statement, known) if statement.kind == "=" else statement for statement in equations]
+    loads = {
+        node.args[1][0].args
+        for statement in turned
+        for node in (_nodes(statement.parts[1]) if statement.kind == "=" else ())
+        if node.kind == "call" and node.args[0] == CREEP
+    }
+    starting = {
+        statement.parts[0].args
+        for statement in turned
+        for node in (_nodes(statement.parts[1]) if statement.kind == "=" else ())
+        if node.kind in limits and node.args[0].args in loads
+    }
+    return [_standing(s, starting) if loads and s.kind == "=" else s for s in turned]
+
+
+def locking(value: Expr) -> str:
+    """Return what locks a friction that may yield, if a side of an equation says so."""
+    places = (node for node in _nodes(value) if node.kind == "if" and node.args[1].kind == "call")
+    locks = (node.args[0] for node in places if node.args[1].args[0] == CREEP)
+    return next((lock.args[0][0] for lock in locks if lock.kind in ("name", "condition")), "")
+
+
+def _yielding(statement: Statement, limits: dict[tuple[object, ...], list[Expr]]) -> Statement:
+    def turned(node: Expr) -> Expr:
+        if node.kind == "if" and node.args[0].kind == "name" and _is_zero(node.args[1]):
+            load = next((name for value in _values(node) if (name := _leading(value)).args in limits), None)
+            if load is not None:
+                creep = fold.call(CREEP, (load, *limits[load.args]), node.line)
+                return Expr("if", (node.args[0], creep, *node.args[2:]), node.line)
+        return with_operands(node, turned)
+
+    left, right = statement.parts
+    return Statement("=", (left, turned(right)), statement.line)
+
+
+def _standing(statement: Statement, starting: set[tuple[object, ...]]) -> Statement:
+    """Let a speed as small as that of what yields be none, where it is asked whether what stood moves.
+
+    What moved stops where all others on its shaft do, at zero.
+    """
+
+    def turned(node: Expr) -> Expr:
+        if node.kind == "and" and node.args[1].kind in (">", "<") and _is_zero(node.args[1].args[1]):
+            left, right = node.args
+            moves = Expr(right.kind, (right.args[0], _speed(right)), right.line)
+            if left.args[:1] == ("initial",):
+                return Expr("and", (left, moves), node.line)
+            starts = [leaf for leaf in _leaves(left) if leaf.args in starting]
+            if starts:
+                others = [leaf for leaf in _leaves(left) if leaf not in starts]
+                pairs = [(leaf, right) for leaf in others] + [(leaf, moves) for leaf in starts]
+                parts = [Expr("and", pair, node.line) for pair in pairs]
+                return reduce(lambda one, other: Expr("or", (one, other), node.line), parts)
+        return with_operands(node, turned)
+
+    left, right = statement.parts
+    return Statement("=", (left, turned(right)), statement.line)
+
+
+def _speed(relation: Expr) -> Expr:
+    speed = fold.call(CREEP, (), relation.line)
+    return speed if relation.kind == ">" else Expr("neg", (speed,), relation.line)
+
+
+def _leaves(condition: Expr) -> list[Expr]:
+    """Return what an `or` is made of."""
+    return [leaf for part in condition.args for leaf in _leaves(part)] if condition.kind == "or" else [condition]
+
+
+def _is_zero(node: Expr) -> bool:
+    return node.kind == "number" and node.args[0] == 0
+
+
+def _values(choice: Expr) -> Iterator[Expr]:
+    """Yield the values of an `if` behind its first one, and those of an `if` among them."""
+    for value in (*choice.args[3::2], choice.args[-1]):
+        if value.kind == "if":
+            yield value.args[1]
+            yield from _values(value)
+        else:
+            yield value
+
+
+def _leading(value: Expr) -> Expr:
+    """Return `sa` of `sa - limit`."""
+    return value.args[0] if value.kind in ("+", "-") else value
+
+
+def _same(one: Expr, other: Expr) -> bool:
+    """Tell whether two expressions are the same, but for the lines where they stand and where a sign does."""
+    if one.kind == "neg" and other.kind in ("*", "/"):  # -(a/b) is (-a)/b
+        one = Expr(one.args[0].kind, (fold.operation("neg", one.args[0].args[:1], 0), *one.args[0].args[1:]))
+    pairs = zip(one.args, other.args, strict=False)
+    return (one.kind, len(one.args)) == (other.kind, len(other.args)) and all(
+        _same(a, b) if isinstance(a, Expr) and isinstance(b, Expr) else a == b for a, b in pairs
+    )
+
+
+def _nodes(node: Expr) -> Iterator[Expr]:
+    yield node
+    for operand in node.args[1] if node.kind == "call" else node.args:
+        if isinstance(operand, Expr):
+            yield from _nodes(operand)
