@@ -233,7 +233,6 @@ def _build(component: Component) -> Template:
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
     residuals = [with_events(following(between_events(e.left - e.right), determined)) for e in equations]
-    sources = tuple(e.source for e in (*equations, *initial))
     residuals += [honest(start - (e.left - e.right)) for start, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
@@ -256,7 +255,7 @@ def _build(component: Component) -> Template:
         parameters=tuple(names.parameters),
         discretes=tuple(names.discretes),
         residual=residual,
-        sources=sources,
+        sources=tuple(e.source for e in (*equations, *initial)),
         initial=tuple((s.name, e.source.text.removeprefix("yield ")) for s, e in zip(starts, initial, strict=True)),
         incidence=_rows(residual.jac_sparsity(0, 0)),
         linear=linear,
@@ -286,8 +285,7 @@ def _statements(
     kind = type(component).__name__
     written = located(component.equations(), f"{kind}.equations()")
     statements = [as_statement(item, source, kind) for item, source in written]
-    every = [s for s in statements if isinstance(s, Equation)]
-    # Parameters that initial equations determine do not change.
+    every = [s for s in statements if isinstance(s, Equation)]  # parameters of initial equations do not change:
     kept = (name for name, field in component.fields.items() if isinstance(field, Variable) and field.constant)
     equations = [s for s in every if not is_discrete(s)] + [
         Equation(der(symbol_of(component, name)), ca.SX(0)) for name in kept

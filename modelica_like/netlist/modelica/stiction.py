@@ -8,12 +8,42 @@ slowly with the others, and these take what is left, until they slide, too. So a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import reduce
+from typing import Any
 
+import casadi as ca
+
+from modelica_like.language import where
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.fold import CREEP
 from modelica_like.netlist.modelica.tree import Expr, Statement, with_operands
+
+_CREEP = 1e-13
+"""Acceleration of a locked friction by what holds it, in units of the SI: a thousand times what rounding leaves of it.
+It makes no way that counts: 5e-6 in 100 s by a load of 10,000. Where the limit is known, it is by part of the limit."""
+STIFF = 1 / _CREEP
+"""Weight of an equation whose terms are as small."""
+_STEADY, _FALLING = 1e2, 1e4
+"""How much more one yields whose limit is known, and one whose limit falls once it slides: so what keeps its limit, or
+has none that is known beforehand, slides first, and a shaft has the whole of all limits until it moves."""
+_LEAST, _STANDS, _FALLS = 1e-6, 1e-9, 0.995
+"""A load that no limit is below, a speed that what yields does not reach, and the part of a limit that it falls to; the
+library makes it larger by 0.1 % for other reasons."""
+
+
+def creep(values: Sequence[Any]) -> Any:
+    """Return the acceleration of a locked friction by its load and its limits; without them a speed that is none.
+
+    The limits are that of what stands and, if there is one, that of what slides; none if they are not known beforehand.
+    """
+    if not values:
+        return ca.SX(_STANDS)
+    load, *limits = values
+    if not limits:
+        return _CREEP * load
+    more = where(limits[-1] < _FALLS * limits[0], _FALLING, _STEADY, events=False)
+    return _CREEP * more * load / (limits[0] + _LEAST)
 
 
 def yielding(equations: Iterable[Statement]) -> list[Statement]:

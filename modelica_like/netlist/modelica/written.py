@@ -47,7 +47,7 @@ from modelica_like.language.inside import InsideAssembly, inside
 from modelica_like.netlist.modelica.calls import JUMPING
 from modelica_like.netlist.modelica.fold import CREEP, OUTSIDE, SILENT
 from modelica_like.netlist.modelica.laws import SLOT
-from modelica_like.netlist.modelica.stiction import locking
+from modelica_like.netlist.modelica.stiction import STIFF, creep, locking
 from modelica_like.netlist.modelica.tree import Expr as Node
 
 MEMORY = "_condition"
@@ -79,13 +79,6 @@ def _told_at(source: Source) -> Iterator[None]:
         raise
 
 
-_CREEP = 1e-13
-"""Acceleration of a locked friction by what holds it, in units of the SI: a thousand times what rounding leaves of it.
-It makes no way that counts: 5e-6 in 100 s by a load of 10,000. By part of the limit it is a hundred times as much, if a
-limit is known, and the same where the limit falls once it slides: so that does last, and the shaft at the whole."""
-_LEAST, _STANDS, _FALLS = 1e-6, 1e-9, 0.995
-"""A load that no limit is below, a speed that what yields does not reach, and the part of a limit that it falls to; the
-library makes it larger by 0.1 % for other reasons."""
 TERMINATE, ASSERT = "terminate()", "assert()"
 """Among the new values of a `when`: it ends the run, with this text; and, followed by a number, where a condition is
 false then."""
@@ -160,7 +153,7 @@ class Written(Assembly):
                 sides = self.symbolic(left), self.symbolic(right)
             lock, creeps = locking(right), self._inside.creeps
             if lock and creeps:  # its terms are of the size of the others'
-                weight = where(self._symbol(lock), 1 / _CREEP, 1.0, events=False)
+                weight = where(self._symbol(lock), STIFF, 1.0, events=False)
                 sides = weight * sides[0], weight * sides[1]
             yield Equation(*sides, source, lock, creeps)
 
@@ -237,27 +230,11 @@ class Written(Assembly):
             if args[0] in ("pre", "edge", "change", "previous") and args[1][0].kind == "name":
                 return self._called(args[0], [self._remembered(args[1][0].args[0][0])], events)
             if args[0] == CREEP:
-                return self._yielding([self.symbolic(value, events) for value in args[1]])
+                return creep([self.symbolic(value, events) for value in args[1]]) if self._inside.creeps else ca.SX(0)
             if args[0] == SILENT:
                 return self._operation(args[1][0], events, quiet=True)
             events = False if args[0] == "noEvent" and events else events
         return self._operation(node, events, quiet=events is False)
-
-    def _yielding(self, values: list[Any]) -> Any:
-        """Return the acceleration of a locked friction by its load and its limits; without them a speed that is none.
-
-        The limits are that of what stands and, if there is one, that of what slides. One that is not known beforehand
-        is the same for both.
-        """
-        if not self._inside.creeps:
-            return ca.SX(0)
-        if not values:
-            return ca.SX(_STANDS)
-        load, *limits = values
-        if not limits:
-            return _CREEP * load
-        falls = limits[-1] < _FALLS * limits[0]
-        return _CREEP * where(falls, 1e4, 1e2, events=False) * load / (limits[0] + _LEAST)
 
     def _operation(self, node: Node, events: bool | None, *, quiet: bool) -> Any:
         """Return a call or an operation in symbols; `quiet` is its own, `events` what its operands have."""
