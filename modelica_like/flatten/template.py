@@ -215,15 +215,14 @@ def template_of(component: Component) -> Template:
     if component.parts or component.fields is not declared.fields:
         with symbols_in_tables(component):
             return _build(component)
-    cache: dict[Any, Template] = declared.templates
     structural = tuple(getattr(component, name) for name in declared.structural)
     used = tuple(name for name, connector in component.connectors.items() if connector.used)
     given = tuple(name for name, field in component.fields.items() if field.default is None and component.given(name))
     units = tuple(str(unit_of_field(component, name)) for name, f in component.fields.items() if f.unit == ANY)
     key = structural, used, given, units
-    if key not in cache:
-        cache[key] = _build(component)
-    return cache[key]
+    if key not in declared.templates:
+        declared.templates[key] = _build(component)
+    return declared.templates[key]
 
 
 def _build(component: Component) -> Template:
@@ -233,6 +232,7 @@ def _build(component: Component) -> Template:
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
     residuals = [with_events(following(between_events(e.left - e.right), determined)) for e in equations]
+    sources = tuple(e.source for e in (*equations, *initial))
     residuals += [honest(start - (e.left - e.right)) for start, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
@@ -255,7 +255,7 @@ def _build(component: Component) -> Template:
         parameters=tuple(names.parameters),
         discretes=tuple(names.discretes),
         residual=residual,
-        sources=tuple(e.source for e in (*equations, *initial)),
+        sources=sources,
         initial=tuple((s.name, e.source.text.removeprefix("yield ")) for s, e in zip(starts, initial, strict=True)),
         incidence=_rows(residual.jac_sparsity(0, 0)),
         linear=linear,
@@ -282,10 +282,10 @@ def _statements(
     component: Component,
 ) -> tuple[list[Equation], list[Equation], list[Equation], tuple[Connection | FreeEnd, ...]]:
     """Return equations, those of discrete variables, those at the start, and connections, with their number checked."""
-    kind = type(component).__name__
-    written = located(component.equations(), f"{kind}.equations()")
+    kind, written = type(component).__name__, located(component.equations(), f"{type(component).__name__}.equations()")
     statements = [as_statement(item, source, kind) for item, source in written]
-    every = [s for s in statements if isinstance(s, Equation)]  # parameters of initial equations do not change:
+    every = [s for s in statements if isinstance(s, Equation)]
+    # Parameters that initial equations determine do not change.
     kept = (name for name, field in component.fields.items() if isinstance(field, Variable) and field.constant)
     equations = [s for s in every if not is_discrete(s)] + [
         Equation(der(symbol_of(component, name)), ca.SX(0)) for name in kept
