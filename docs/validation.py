@@ -37,9 +37,11 @@ BY_HAND = {
     "RANDOM_LAWS": Run(5000, {"": 5012}),
     "NARROW_FORCES": Run(20, {"forces": 1024, "carriers": 512}),
     "LIBRARY_DRIVES": Run(500, {"": 500}),
+    "RANDOM_DRIVES": Run(2000, {"": 2000}),
 }
 """`RANDOM_LAWS=5000 pytest tests/properties/test_random_laws.py`, `NARROW_FORCES=20 pytest tests/solve/test_edges.py`,
-`LIBRARY_DRIVES=500 pytest tests/properties/test_library_drives.py -m slow`: after a run write its counts here."""
+`LIBRARY_DRIVES=500 pytest tests/properties/test_library_drives.py -m slow`, `RANDOM_DRIVES=2000 pytest tests/exact -m
+slow`: after a run write its counts here."""
 
 
 def by_hand(variable: str, kind: str = "") -> str:
@@ -74,7 +76,7 @@ ROWS = {
         Row("examples of the Modelica Standard Library 4.1.0", "its reference results (Dymola 2020x)", "{references} examples, {signals} signals", "{TUBE} of the range (its own criterion), {MEDIAN} in the median; sequences of modes equal", "system/test_msl_examples.py"),
         Row("the same", "closed forms", "every signal that has one", "1e-6 for most, by signal", "system/test_msl_closed_forms.py"),
         Row("start-up of a machine tool (document 003)", "its equations by hand, integrated by SciPy (DOP853); its numbers", "two of its variants", "event times 1e-6 s, slip energy 1e-6, samples 1e-5, peaks 1e-4", "system/test_machine_tool_startup.py"),
-        Row("random rotational drives with friction, freewheels, impacts", "a solver in fractions", "{DRIVES} drives", "speeds {SPEED}, losses {LOSS}, balance {CLOSURE}; the same events", "exact/test_random_drives_exactly.py", "exact/drive_runs.py"),
+        Row("random rotational drives with friction, freewheels, impacts", "a solver in fractions", f"{{DRIVES}} drives{by_hand('RANDOM_DRIVES')}", "speeds {SPEED}, losses {LOSS}, balance {CLOSURE}; the same events", "exact/test_random_drives_exactly.py", "exact/drive_runs.py"),
         Row("small drives that once were wrong", "the same solver", "{len(SMALL)} drives", "the same", "exact/test_small_drives.py"),
         Row("random laws over all functions of the language", "plain Python in small steps", "{MANY[-1][-1] + 1} laws{by_hand('RANDOM_LAWS')}", "{NEAR}, the reference's own error; by both solvers, through Modelica text and FMUs", "properties/test_random_laws.py"),
         Row("masses that meet narrow forces on their way or in time", "energy and momentum", "{24 + 50 * BLOCKS} forces{by_hand('NARROW_FORCES', 'forces')}: widths from 1 µm to 0.1 m, speeds over six decades", "1e-5 of the speed; by both solvers, two as FMU", "solve/test_edges.py"),

@@ -1,6 +1,7 @@
 """Random trees and loops of inertias, gears, clutches, brakes and freewheels: the product is right in every one.
 
-A drive that fails runs alone with `python tests/exact/drive_runs.py --drive NUMBER`, and `--shrink` makes it small.
+`RANDOM_DRIVES=2000 pytest -m slow tests/exact` does more; the slow suite has a thousand, and some that were hard. A
+drive that fails runs alone with `python tests/exact/drive_runs.py --drive NUMBER`, and `--shrink` makes it small.
 """
 
 import pytest
