@@ -88,6 +88,12 @@ Ask how long it has one of them, duration(clutch.mode: free), or when it changes
         """Nothing changes the objective 'load_torque': it is a parameter that is not free.
 Ask for an output of the run, or free it.""",
     ),
+    "a limit that nothing changes": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, subject_to="load_torque <= 20 N.m", **M),
+        """Nothing changes the limit 'load_torque <= 20 N.m': it is a parameter that is not free.
+Ask for an output of the run, or free it.""",
+    ),
     "one bound": (
         ValueOutOfRange,
         lambda: optimize(D, free={"clutch.capacity": "40 N.m"}, **M),

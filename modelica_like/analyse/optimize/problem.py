@@ -140,9 +140,12 @@ def make_problem(drive: Model, question: Question) -> Problem:
         unit_of = _units(model, sized)
         aims = read_aims(unit_of, question.minimize, question.maximize)
         if free and not question.chosen:
-            _check_changes(model, aims, free)
+            _check_changes(model, {f"objective '{aim.text}'": aim.rows for aim in aims}, free)
     with question.at(drive, "subject_to"):
         limits = read_limits(unit_of, question.subject_to)
+        if free and not question.chosen:
+            plain = {f"limit '{limit.text}'": limit.rows() for limit in limits if limit.probability == 1.0}
+            _check_changes(model, plain, free)
     with question.at(drive, "for"):
         cases = read_cases(model, question.cases, free)
     names = [parameter.name for parameter in free]
@@ -225,13 +228,13 @@ def _smooth(model: CompiledDae, name: str) -> Output:
     return output
 
 
-def _check_changes(model: CompiledDae, aims: Sequence[Aim], free: Sequence[Free]) -> None:
-    """Refuse objectives that are parameters which are not free."""
+def _check_changes(model: CompiledDae, numbers: Mapping[str, Sequence[Row]], free: Sequence[Free]) -> None:
+    """Refuse objectives and limits that are parameters which are not free, by what they are called."""
     fixed = model.fixed_position.keys() - {parameter.name for parameter in free}
-    for aim in aims:
-        if all(row.output in fixed for row in aim.rows):
+    for what, rows in numbers.items():
+        if all(row.output in fixed for row in rows):
             raise ValueOutOfRange(
-                f"Nothing changes the objective '{aim.text}': it is a parameter that is not free.",
+                f"Nothing changes the {what}: it is a parameter that is not free.",
                 advice="Ask for an output of the run, or free it.",
             )
 
