@@ -7,8 +7,8 @@ a table of so many rows, and Modelica text with arrays of so many elements. Tenf
 long: what is linear takes 10 times, sorting and memory that leaves the caches add to it, what is quadratic takes 100
 times. Times are CPU times, the shortest of some repeats; only their growth decides.
 
-Three calls may grow somewhat more (`STEEPER`). All eigenvalues of a matrix take a time that grows with its cube by their
-nature: they are asked of a tenth of the parts, shown, and do not decide.
+Three calls may grow somewhat more (`STEEPER`). All eigenvalues of a matrix take a time that grows with its cube by
+their nature: they are asked of a tenth of the parts, shown, and do not decide.
 """
 
 from __future__ import annotations
