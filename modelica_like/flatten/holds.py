@@ -11,6 +11,7 @@ import casadi as ca
 from modelica_like.errors import LanguageError
 from modelica_like.flatten.generic import spread
 from modelica_like.language.component import Component
+from modelica_like.language.equation import Equation
 from modelica_like.language.expr import Symbol, flagged_motion, symbol_of, symbols_in
 from modelica_like.language.fields import Variable
 from modelica_like.language.functions import all_of, any_of
@@ -51,6 +52,22 @@ class IdealForm:
     mode: str
     zeros: tuple[str, str]
     row: int
+
+
+@dataclass(frozen=True)
+class LockForm:
+    """What may be locked: its equation, the discrete variable that locks it, and whether it yields then."""
+
+    row: int
+    discrete: str
+    creeps: bool
+
+
+def lock_forms(equations: Iterable[Equation]) -> tuple[tuple[LockForm, ...], list[Any]]:
+    """Return what equations may lock, and for each whether its limit falls once it slides."""
+    locks = [(row, equation.lock) for row, equation in enumerate(equations) if equation.lock is not None]
+    forms = tuple(LockForm(row, lock.discrete, lock.creeps) for row, lock in locks)
+    return forms, [ca.SX(lock.falls) for _, lock in locks]
 
 
 def ideal_forms(component: Component, residuals: list[Any]) -> tuple[IdealForm, ...]:

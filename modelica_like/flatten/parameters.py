@@ -13,7 +13,7 @@ from modelica_like.errors import CyclicAssembly, MissingValue, UnitError, UnitMi
 from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.dimensions import expect_unit
 from modelica_like.flatten.model import FlatParameter
-from modelica_like.flatten.template import column
+from modelica_like.flatten.names import column
 from modelica_like.language.assembly import Assembly
 from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown

@@ -8,37 +8,36 @@ from typing import Any, Generic, TypeVar, cast
 
 import casadi as ca
 
-from modelica_like.errors import LanguageError, Source
+from modelica_like.errors import Source
 from modelica_like.flatten.at_once import between_events, following
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
 from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, is_discrete
-from modelica_like.flatten.holds import HoldForm, IdealForm, hold_forms, ideal_forms, starts_at_rest
+from modelica_like.flatten.holds import (
+    HoldForm,
+    IdealForm,
+    LockForm,
+    hold_forms,
+    ideal_forms,
+    lock_forms,
+    starts_at_rest,
+)
+from modelica_like.flatten.names import InitialResidual, Names, Slot, column, path_of
 from modelica_like.flatten.reasons import reason
 from modelica_like.flatten.steps import honest, with_events
 from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
-from modelica_like.language.declared import Declared
 from modelica_like.language.delay import parts
-from modelica_like.language.discrete import HOMOTOPY, INITIAL, TERMINAL, Marker, Pre
 from modelica_like.language.equation import Connection, Equation, FreeEnd, as_equation, as_statement
-from modelica_like.language.expr import TIME, Symbol, flagged_motion, symbol_of, symbols_in
-from modelica_like.language.fields import Parameter, Variable
+from modelica_like.language.expr import TIME, Symbol, symbol_of, symbols_in
+from modelica_like.language.fields import Variable
 from modelica_like.language.functions import der
-from modelica_like.language.inside import declarations, inside
+from modelica_like.language.inside import declarations
 from modelica_like.language.mode import StartMode, Transition
 from modelica_like.language.places import NOWHERE, located
 from modelica_like.language.transition import as_event
 from modelica_like.language.tunable import symbols_in_tables
 from modelica_like.language.units import ANY, Unit
-
-
-@dataclass(frozen=True)
-class Slot:
-    """A symbol of a template: path from the component, and order of differentiation."""
-
-    path: str
-    order: int
 
 
 @dataclass(frozen=True)
@@ -128,81 +127,12 @@ class Template:
     holds: tuple[HoldForm, ...]
     hold_terms: ca.Function
     ideals: tuple[IdealForm, ...]
-    locks: tuple[tuple[int, str, bool], ...]
+    locks: tuple[LockForm, ...]
+    lock_terms: ca.Function
     energy_slots: tuple[Slot, ...]
     energy: ca.Function
     connections: tuple[Connection | FreeEnd, ...]
     inferred: dict[str, Unit]
-
-
-class InitialResidual(Symbol):
-    """What is left of an initial equation: zero at the start."""
-
-
-class Names:
-    """Symbols of a component in a fixed order, by kind."""
-
-    def __init__(self, root: Component) -> None:
-        self.root = root
-        self.variables: dict[Slot, Symbol] = {}
-        self.parameters: dict[str, Symbol] = {}
-        self.discretes: dict[str, Symbol] = {}
-
-    def add(self, expressions: Iterable[Any]) -> None:
-        """Add the symbols of expressions."""
-        for expression in expressions:
-            for symbol in symbols_in(expression):
-                if symbol is not TIME:
-                    self._add(symbol)
-
-    def _add(self, symbol: Symbol) -> None:
-        path = path_of(symbol, self.root)
-        kind = None if symbol.owner is None else symbol.owner.fields.get(symbol.name)
-        if isinstance(kind, Variable) or isinstance(symbol, InitialResidual):
-            self.variables[Slot(path, symbol.order)] = symbol
-        elif isinstance(kind, Parameter) or flagged_motion(symbol.name):
-            self.parameters[path] = symbol
-        else:
-            self.discretes[path] = symbol
-
-    def function(self, name: str, outputs: list[Any]) -> ca.Function:
-        """Make a function of all names so far."""
-        inputs = [column(group.values()) for group in (self.variables, self.parameters, self.discretes)]
-        return ca.Function(name, [*inputs, TIME], [column(outputs)], ["v", "p", "d", "t"], [name])
-
-
-def column(entries: Iterable[Any]) -> Any:
-    """Return a column of expressions, which may have no rows."""
-    return ca.SX(ca.vertcat(*entries))
-
-
-def relative_path(owner: Declared, root: Component, name: str) -> str:
-    """Return the dotted path of a field, seen from a component above it.
-
-    Args:
-        owner: declares the field.
-        root: where the path begins.
-        name: of the field.
-
-    Raises:
-        LanguageError: the owner is not below the root.
-    """
-    names = [name]
-    node: Declared | None = owner
-    while node is not root:
-        if node is None:
-            raise LanguageError(f"{root.label} uses '{name}' of a component that is not part of it.")
-        names.append(inside(node).name)
-        node = inside(node).owner
-    return ".".join(reversed(names))
-
-
-def path_of(symbol: Symbol, root: Component) -> str:
-    """Return the path of a symbol, seen from a component: `n`, `clutch.n`, `pre(n)`, `relation[1]`, `time`."""
-    if isinstance(symbol, Pre):
-        return f"pre({path_of(symbol.of, root)})"
-    global_one = isinstance(symbol, Marker) or any(symbol is x for x in (TIME, INITIAL, TERMINAL, HOMOTOPY))
-    return symbol.name if global_one else relative_path(symbol.owner, root, symbol.name)
 
 
 def template_of(component: Component) -> Template:
@@ -235,6 +165,7 @@ def _build(component: Component) -> Template:
     sources = tuple(e.source for e in (*equations, *initial))
     residuals += [honest(start - (e.left - e.right)) for start, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
+    locks, lock_terms = lock_forms(equations)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
     others = [*zip(residuals, sources, strict=True), *((term, NOWHERE) for term in energy_terms)]
     discrete = DiscreteEquations(component, determined, events, others, [e for e in at_start if is_discrete(e)])
@@ -242,7 +173,7 @@ def _build(component: Component) -> Template:
     inferred = check_units(component, *checked) if component.units_checked else {}
     changes = _Changes(component, discrete)
     names = Names(component)
-    names.add([*residuals, *hold_terms, *changes.expressions()])
+    names.add([*residuals, *hold_terms, *lock_terms, *changes.expressions()])
     names.add(ca.SX(symbol_of(component, name)) for hold in holds for name in (hold.motion, hold.reaction) if name)
     discrete.check_determined(names.discretes)
     energy.parameters, energy.discretes = names.parameters, names.discretes
@@ -270,7 +201,8 @@ def _build(component: Component) -> Template:
         holds=holds,
         hold_terms=names.function("hold_terms", hold_terms),
         ideals=ideal_forms(component, residuals),
-        locks=tuple((row, e.lock, e.creeps) for row, e in enumerate(equations) if e.lock in names.discretes),
+        locks=locks,
+        lock_terms=names.function("lock_terms", lock_terms),
         energy_slots=tuple(energy.variables),
         energy=energy.function("energy", energy_terms),
         connections=wiring,

@@ -33,21 +33,28 @@ class FreeEnd:
 
 
 @dataclass(frozen=True, eq=False)
-class Equation:
-    """An equation `left == right`.
+class Lock:
+    """That an equation says in one mode that something stands, which others may say, too.
 
     Attributes:
-        left, right: its sides.
-        source: its place.
-        lock: the discrete variable that makes it say that something stands, if others may say so, too.
-        creeps: whether tiny terms of it then determine what they all leave open.
+        discrete: the discrete variable that makes it say so.
+        falls: whether the limit of what holds it is smaller once it slides.
+        creeps: whether tiny terms of the equation determine what all that say so would leave open.
     """
+
+    discrete: str
+    falls: Any
+    creeps: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """An equation `left == right`, at its place, and what it may lock."""
 
     left: Expr
     right: Expr
     source: Source = NOWHERE
-    lock: str = ""
-    creeps: bool = False
+    lock: Lock | None = None
 
 
 Statement = Equation | Connection | FreeEnd

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,7 +37,7 @@ from modelica_like.structure.holds import (
 )
 from modelica_like.structure.ideal import IdealNetwork, complete, find_ideals
 from modelica_like.structure.index import Pantelides, prefer_relative_states
-from modelica_like.structure.locks import find_locks, left_open
+from modelica_like.structure.locks import contradictions, find_locks, left_open
 from modelica_like.structure.motion import Motion
 from modelica_like.structure.prescribed import Flags
 from modelica_like.structure.states import select_states
@@ -140,6 +140,9 @@ class ReducedDae:
         )
 
 
+_NONE: dict[str, tuple[int, ...]] = {}
+
+
 def reduce(flat: FlatModel) -> ReducedDae:
     """Reduce flat equations to an index-1 system.
 
@@ -149,8 +152,11 @@ def reduce(flat: FlatModel) -> ReducedDae:
     return _reduce(flat, decided=False)
 
 
-def _reduce(flat: FlatModel, *, decided: bool) -> ReducedDae:
-    """Reduce flat equations, with the branches of present parameters where others would not determine the unknowns."""
+def _reduce(flat: FlatModel, *, decided: bool, speeds: Mapping[str, tuple[int, ...]] = _NONE) -> ReducedDae:
+    """Reduce flat equations, with the branches of present parameters where others would not determine the unknowns.
+
+    With `speeds`, of components that lock what others lock, too, these have been made to yield.
+    """
     chosen = _choose(flat, find_aliases(flat), (), decided=decided)
     if groups := singular_groups(chosen.system, chosen.counts, chosen.states):
         chosen = _choose(flat, find_aliases(flat), groups, decided=decided)
@@ -161,7 +167,7 @@ def _reduce(flat: FlatModel, *, decided: bool) -> ReducedDae:
     if flags.settle(residual, unknowns):
         residual, origins = _differentiate(system, counts)
     if not decided and needs_decision(system, residual, unknowns):
-        return _reduce(flat, decided=True)
+        return _reduce(flat, decided=True, speeds=speeds)
     derivatives = {system.derivative(state) for state in states}
     rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
     ideals = find_ideals(flat)
@@ -169,8 +175,8 @@ def _reduce(flat: FlatModel, *, decided: bool) -> ReducedDae:
     kept = [*(ideal.row for ideal in ideals), *(lock.row for lock in locks if lock.creeps)]
     solver = BlockSolver(residual, system.column(unknowns), system.volatile, rates, kept)
     solved = solver.run()
-    if sharing := left_open(locks, solver, flat.d):
-        return _reduce(flatten_again(flat, sharing), decided=decided)
+    if not speeds and (speeds := left_open(locks, solver, flat.d)):
+        return _reduce(flatten_again(flat, speeds), decided=decided, speeds=speeds)
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
     moving = moving_chains(system, counts) if holds else set[int]()
@@ -185,7 +191,8 @@ def _reduce(flat: FlatModel, *, decided: bool) -> ReducedDae:
     ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
     choices = tuple(write_choice(choice, system, states, reduced.level_values) for choice in chosen.following)
     kept_so = tuple(((), (system.origins[row],), check) for row, check in chosen.checks)
-    determinants = (*reduced.determinants, *kept_so)
+    open_still = contradictions(reduced.flat, locks, speeds, reduced.values)
+    determinants = (*reduced.determinants, *kept_so, *open_still)
     reduced = replace(
         reduced, ode=ode, holds=held, circuits=tuple(circuits), choices=choices, determinants=determinants
     )

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from modelica_like import export_fmu, run_fmu, simulate
+from modelica_like.errors import SingularAtStart
 from modelica_like.netlist.modelica.read import read_modelica
 
 FRICTION = """
@@ -96,6 +97,32 @@ def test_a_shaft_breaks_away_at_the_sum_of_its_limits(tmp_path, parts, begins, s
     begin = begins / 3
     wanted = (1.5 * (9 - begin**2) - slides * (3 - begin)) / 2
     assert run.final["shaft.w"] == pytest.approx(wanted, rel=1e-7)
+
+
+FALLING = "Shaft shaft(rate = 3); Rubbing one(limit = 2, peak = 1.5, steps = 2); Rubbing two(limit = 3, peak = 1.5);"
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_two_limits_that_fall_last_until_their_shaft_moves(tmp_path, solver) -> None:
+    """It breaks away at 3 + 4.5 N.m, and slides against 5 N.m."""
+    model = drive(tmp_path, FALLING, "connect(shaft.a, one.a); connect(shaft.a, two.a);")
+    run = simulate(model, 3.0, solver=solver, rtol=1e-9)
+    assert run.final["shaft.w"] == pytest.approx((1.5 * (9 - 2.5**2) - 5 * 0.5) / 2, rel=1e-7)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_behind_a_gear_it_is_open_which_of_them_falls_first(tmp_path, solver) -> None:
+    model = drive(tmp_path, FALLING, "connect(shaft.a, one.a); connect(one.b, two.a);")
+    with pytest.raises(SingularAtStart) as caught:
+        simulate(model, 3.0, solver=solver)
+    place = caught.value.where[0]
+    assert (
+        str(caught.value)
+        == f"""Which of one and two slides first at t = 0 s is open.
+  in P.mo:{place.line} `slip = if locked then 0 else if forward then load - limits else if backward then load + limits`
+They stick on shafts that turn at different speeds, and the limit of each falls once it slides.
+Let the limit of one stay (peak = 1), or put a spring between them."""
+    )
 
 
 def test_an_fmu_does_so_too(tmp_path) -> None:

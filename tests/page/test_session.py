@@ -151,3 +151,27 @@ def test_another_editor_writes_the_file(session: Session, tmp_path: Path) -> Non
     assert session.watch({})["conflict"] is None
     session.save({})
     assert "J = 4" in (tmp_path / "drive.toml").read_text()
+
+
+def many(count: int) -> str:
+    """A chain of inertias and springs with a brake at every fifth inertia."""
+    names = [f"{'s' if k % 2 else 'j'}{k}" for k in range(count - count // 10)]
+    brakes = [(f"q{k}", names[8 * k]) for k in range(count // 10)]
+    lines = [f'{n} = {{ is = "SpringDamper", c = 1e4, d = 1 }}' if n[0] == "s" else f'{n} = {{ is = "Inertia", J = 1 }}'
+             for n in names] + [f'{q} = {{ is = "ConstantTorque", tau_constant = 1 }}' for q, _ in brakes]  # fmt: skip
+    joined = [f'{q} = ["{q}.flange", "{j}.flange_b"]' for q, j in brakes]
+    return "\n".join(["[parts]", *lines, "[series]", f"x = {names}".replace("'", '"'), "[connect]", *joined, ""])
+
+
+@pytest.mark.parametrize("count", [25, pytest.param(100, marks=pytest.mark.slow)])
+def test_edits_of_a_long_drive_give_valid_ones(tmp_path: Path, count: int) -> None:
+    session = Session(tmp_path / "drive.toml")
+    session.text({"text": many(count)})
+    back = {"op": "rename", "old": "wheel", "new": "j4"}
+    for k in range(6):
+        for request in (
+            {"op": "set", "path": "j2.J", "value": f"{k + 2} kg.m2"}, {"op": "rename", "old": "j4", "new": "wheel"},
+            {"op": "place", "name": "new", "kind": "Inertia", "values": {"J": 1}, "at": {"line": ["j2", "s3"]}},
+            {"op": "together", "steps": [{"op": "remove", "name": "new"}, back]},
+        ):  # fmt: skip
+            assert session.apply({"request": request})["valid"]

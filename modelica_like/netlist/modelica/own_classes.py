@@ -9,8 +9,8 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.errors import ModelicaTextError
+from modelica_like.flatten.names import relative_path
 from modelica_like.flatten.steps import event_steps
-from modelica_like.flatten.template import relative_path
 from modelica_like.language import Component, Connector, Equations, Input, Output, Parameter, Variable
 from modelica_like.language.discrete import INITIAL, TERMINAL, Assertion, Ending, Marker, Pre, When, silence
 from modelica_like.language.equation import Equation, as_statement

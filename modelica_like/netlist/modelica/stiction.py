@@ -17,18 +17,19 @@ import casadi as ca
 from modelica_like.language import where
 from modelica_like.netlist.modelica import fold
 from modelica_like.netlist.modelica.fold import CREEP
-from modelica_like.netlist.modelica.tree import Expr, Statement, with_operands
+from modelica_like.netlist.modelica.tree import Expr, Statement, calls_in, nodes, with_operands
 
 _CREEP = 1e-13
 """Acceleration of a locked friction by what holds it, in units of the SI: a thousand times what rounding leaves of it.
 It makes no way that counts: 5e-6 in 100 s by a load of 10,000. Where the limit is known, it is by part of the limit."""
 STIFF = 1 / _CREEP
 """Weight of an equation whose terms are as small."""
-_STEADY, _FALLING = 1e2, 1e4
-"""How much more one yields whose limit is known, and one whose limit falls once it slides: so what keeps its limit, or
-has none that is known beforehand, slides first, and a shaft has the whole of all limits until it moves."""
+_STEADY, _FALLING = 1e1, 1e4
+"""How much more one yields whose limit is known, and one whose limit falls once it slides. So what keeps its limit, or
+has none that is known beforehand, slides first, also behind a gear of 1:100, and a shaft has the whole of all limits
+until it moves; two whose limits fall are refused, unless they turn at the same speed."""
 _LEAST, _STANDS, _FALLS = 1e-6, 1e-9, 0.995
-"""A load that no limit is below, a speed that what yields does not reach, and the part of a limit that it falls to; the
+"""The limit that those below it count as, a speed that what yields does not reach, and the part of a limit that it falls to; the
 library makes it larger by 0.1 % for other reasons."""
 
 
@@ -42,8 +43,13 @@ def creep(values: Sequence[Any]) -> Any:
     load, *limits = values
     if not limits:
         return _CREEP * load
-    more = where(limits[-1] < _FALLS * limits[0], _FALLING, _STEADY, events=False)
-    return _CREEP * more * load / (limits[0] + _LEAST)
+    limit = where(limits[0] > _LEAST, limits[0], _LEAST, events=False)
+    return _CREEP * where(falls(limits), _FALLING, _STEADY, events=False) * load / limit
+
+
+def falls(limits: Sequence[Any]) -> Any:
+    """Tell whether a limit is smaller once something slides, of the limits as above."""
+    return limits[-1] < _FALLS * limits[0] if limits else ca.SX(0)
 
 
 def yielding(equations: Iterable[Statement]) -> list[Statement]:
@@ -51,7 +57,7 @@ def yielding(equations: Iterable[Statement]) -> list[Statement]:
     equations = list(equations)
     limits: dict[str, dict[tuple[object, ...], list[Expr]]] = {">": {}, "<": {}}
     for statement in equations:
-        for node in _nodes(statement.parts[1]) if statement.kind == "=" else ():
+        for node in nodes(statement.parts[1]) if statement.kind == "=" else ():
             if node.kind in limits and node.args[0].kind == "name":
                 limits[node.kind].setdefault(node.args[0].args, []).append(node.args[1])
     above, below = limits.values()
@@ -60,26 +66,20 @@ def yielding(equations: Iterable[Statement]) -> list[Statement]:
         for load, values in above.items()
     }
     turned = [_yielding(statement, known) if statement.kind == "=" else statement for statement in equations]
-    loads = {
-        node.args[1][0].args
-        for statement in turned
-        for node in (_nodes(statement.parts[1]) if statement.kind == "=" else ())
-        if node.kind == "call" and node.args[0] == CREEP
-    }
+    pairs = [(s.parts[0], s.parts[1]) for s in turned if s.kind == "="]
+    loads = {call.args[1][0].args for _, right in pairs for call in calls_in(right) if call.args[0] == CREEP}
     starting = {
-        statement.parts[0].args
-        for statement in turned
-        for node in (_nodes(statement.parts[1]) if statement.kind == "=" else ())
-        if node.kind in limits and node.args[0].args in loads
+        left.args
+        for left, right in pairs
+        if any(node.kind in limits and node.args[0].args in loads for node in nodes(right))
     }
     return [_standing(s, starting) if loads and s.kind == "=" else s for s in turned]
 
 
-def locking(value: Expr) -> str:
-    """Return what locks a friction that may yield, if a side of an equation says so."""
-    places = (node for node in _nodes(value) if node.kind == "if" and node.args[1].kind == "call")
-    locks = (node.args[0] for node in places if node.args[1].args[0] == CREEP)
-    return next((lock.args[0][0] for lock in locks if lock.kind in ("name", "condition")), "")
+def locking(value: Expr) -> Expr | None:
+    """Return the choice of a side of an equation between what yields while it is locked, and the rest."""
+    choices = (node for node in nodes(value) if node.kind == "if" and node.args[1].kind == "call")
+    return next((node for node in choices if node.args[1].args[0] == CREEP), None)
 
 
 def _yielding(statement: Statement, limits: dict[tuple[object, ...], list[Expr]]) -> Statement:
@@ -156,10 +156,3 @@ def _same(one: Expr, other: Expr) -> bool:
     return (one.kind, len(one.args)) == (other.kind, len(other.args)) and all(
         _same(a, b) if isinstance(a, Expr) and isinstance(b, Expr) else a == b for a, b in pairs
     )
-
-
-def _nodes(node: Expr) -> Iterator[Expr]:
-    yield node
-    for operand in node.args[1] if node.kind == "call" else node.args:
-        if isinstance(operand, Expr):
-            yield from _nodes(operand)

@@ -252,20 +252,21 @@ def with_operands(expression: Expr, change: Callable[[Expr], Expr]) -> Expr:
     return Expr(expression.kind, args, expression.line)
 
 
+def nodes(expression: Expr) -> Iterator[Expr]:
+    """Yield an expression and all that it is made of."""
+    yield expression
+    for child in _children(expression):
+        yield from nodes(child)
+
+
 def names_in(expression: Expr) -> Iterator[Expr]:
     """Yield the names in an expression."""
-    if expression.kind == "name":
-        yield expression
-    for child in _children(expression):
-        yield from names_in(child)
+    return (node for node in nodes(expression) if node.kind == "name")
 
 
 def calls_in(expression: Expr) -> Iterator[Expr]:
     """Yield the calls in an expression."""
-    if expression.kind == "call":
-        yield expression
-    for child in _children(expression):
-        yield from calls_in(child)
+    return (node for node in nodes(expression) if node.kind == "call")
 
 
 def chain(signs: list[str], terms: list[Expr]) -> Expr:

@@ -38,7 +38,7 @@ from modelica_like.language import (
     where,
 )
 from modelica_like.language.discrete import Ending, before, is_a, silent
-from modelica_like.language.equation import Equation
+from modelica_like.language.equation import Equation, Lock
 from modelica_like.language.expr import Symbol, symbol_of
 from modelica_like.language.fields import Discrete, Field, Variable
 from modelica_like.language.formula import Formula
@@ -47,7 +47,7 @@ from modelica_like.language.inside import InsideAssembly, inside
 from modelica_like.netlist.modelica.calls import JUMPING
 from modelica_like.netlist.modelica.fold import CREEP, OUTSIDE, SILENT
 from modelica_like.netlist.modelica.laws import SLOT
-from modelica_like.netlist.modelica.stiction import STIFF, creep, locking
+from modelica_like.netlist.modelica.stiction import STIFF, creep, falls, locking
 from modelica_like.netlist.modelica.tree import Expr as Node
 
 MEMORY = "_condition"
@@ -151,11 +151,16 @@ class Written(Assembly):
         for left, right, source in statements:
             with _told_at(source):
                 sides = self.symbolic(left), self.symbolic(right)
-            lock, creeps = locking(right), self._inside.creeps
-            if lock and creeps:  # its terms are of the size of the others'
-                weight = where(self._symbol(lock), STIFF, 1.0, events=False)
-                sides = weight * sides[0], weight * sides[1]
-            yield Equation(*sides, source, lock, creeps)
+            choice = locking(right)
+            yield Equation(*sides, source) if choice is None else self._lock(*sides, source, choice)
+
+    def _lock(self, left: Any, right: Any, source: Source, choice: Node) -> Equation:
+        condition, (_, *limits) = choice.args[0], choice.args[1].args[1]
+        locked = self._symbol(condition.args[0][0])
+        # While it is locked, its terms are of the size of the others' by this weight.
+        weight = where(locked, STIFF, 1.0, events=False) if self._inside.creeps else 1.0
+        fall = falls([self.symbolic(limit) for limit in limits])
+        return Equation(weight * left, weight * right, source, Lock(locked.name, fall, self._inside.creeps))
 
     def events(self) -> Events:
         """Yield the whens and the assertions."""
