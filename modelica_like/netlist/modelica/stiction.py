@@ -29,8 +29,8 @@ _STEADY, _FALLING = 1e1, 1e4
 has none that is known beforehand, slides first, also behind a gear of 1:100, and a shaft has the whole of all limits
 until it moves; two whose limits fall are refused, unless they turn at the same speed."""
 _LEAST, _STANDS, _FALLS = 1e-6, 1e-9, 0.995
-"""The limit that those below it count as, a speed that what yields does not reach, and the part of a limit that it falls to; the
-library makes it larger by 0.1 % for other reasons."""
+"""The limit that those below it count as, a speed that what yields does not reach, and the part of a limit that it
+falls to; the library makes it larger by 0.1 % for other reasons."""
 
 
 def creep(values: Sequence[Any]) -> Any:
