@@ -178,8 +178,7 @@ def _build(component: Component) -> Template:
     discrete.check_determined(names.discretes)
     energy.parameters, energy.discretes = names.parameters, names.discretes
     energy.add(energy_terms)
-    residual = names.function("residual", residuals)
-    linear, coefficients = _linear_forms(names, residuals)
+    residual, (linear, coefficients) = names.function("residual", residuals), _linear_forms(names, residuals)
     return Template(
         component=kind,
         slots=tuple(names.variables),

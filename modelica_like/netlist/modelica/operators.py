@@ -32,11 +32,9 @@ def called(resolver: Resolver, call: Expr) -> Expr:
         given, named = tuple(arguments(resolver, Expr("call", (short, given, named), line))), ()
     if short == "cardinality":
         return cardinality(resolver, given[0])
-    if short in (fold.SILENT, fold.ARGUMENT):
-        value = resolver(given[0])
-        return value if value.kind in fold.KNOWN else fold.call(short, (value,), line)
-    if short == fold.CREEP:
-        return fold.call(short, tuple(map(resolver, given)), line)
+    if short in (fold.SILENT, fold.ARGUMENT, fold.CREEP):
+        inner = tuple(map(resolver, given))
+        return inner[0] if short != fold.CREEP and inner[0].kind in fold.KNOWN else fold.call(short, inner, line)
     if short == "getInstanceName" and resolver.instance is not None:
         return Expr("string", (resolver.instance.full_name,), line)
     if short == "homotopy":

@@ -59,19 +59,24 @@ def implicit_singular(model: CompiledDae, point: Place) -> SingularAtStart:
     )
 
 
+def _open(point: Place, origins: tuple[Origin, ...]) -> SingularAtStart:
+    """Return the error for frictions of which nothing tells which one slides first."""
+    return SingularAtStart(
+        f"Which of {_and([origin.path for origin in origins])} slides first at t = {point.t:.9g} s is open.",
+        where=tuple(dict.fromkeys(origin.source for origin in origins)),
+        why="They stick on shafts that turn at different speeds, and the limit of each falls once it slides.",
+        advice="Let the limit of one stay (peak = 1), or put a spring between them.",
+    )
+
+
 def _singular(
     model: CompiledDae, point: Place, number: int, block: tuple[tuple[str, ...], tuple[Origin, ...]],
     regular: Callable[[Vector], bool],
 ) -> SingularAtStart:  # fmt: skip
     """Return the error for a block of unknowns and origins; `regular` checks it for other parameters."""
     names, origins = block
-    if not names and len(origins) > 1:
-        return SingularAtStart(
-            f"Which of {_and([origin.path for origin in origins])} slides first at t = {point.t:.9g} s is open.",
-            where=tuple(dict.fromkeys(origin.source for origin in origins)),
-            why="They stick on shafts that turn at different speeds, and the limit of each falls once it slides.",
-            advice="Let the limit of one stay (peak = 1), or put a spring between them.",
-        )
+    if not names and origins[1:]:
+        return _open(point, origins)
     if not names:
         return SingularAtStart(
             f"{origins[0].path or model.name} was built for other parameters, for which other equations hold.",
