@@ -176,6 +176,22 @@ def test_a_front_of_two_objectives() -> None:
     np.testing.assert_allclose(np.diff(torque), -28.0, rtol=1e-3)
 
 
+@pytest.mark.slow  # a hundred runs with gradients: ten seconds
+def test_a_front_ends_at_the_best_of_each_objective() -> None:
+    """The less a clutch slips, the less it heats: its largest force at once is best, though a search may end before.
+
+    No design is as good as another one in both objectives.
+    """
+    torque = "max(peak(shaft1.tau), peak(shaft2.tau))"
+    front = optimize(
+        EXAMPLES / "design/engagement_profile.toml", minimize=[torque, "clutch.loss_energy"],
+        subject_to="clutch.lock_time <= 0.4 s", points=4,
+    )  # fmt: skip
+    assert isinstance(front, Front)
+    assert [p.value for p in front.points[-1].parameters] == pytest.approx([1.2, 1.2, 1.2], rel=1e-5)
+    assert np.all(np.diff(front.values, axis=0) * [1, -1] > 0)
+
+
 def test_what_is_chosen_is_tried() -> None:
     drive = load(DIRECT)
     drive.set("clutch_torque", "100 N.m")

@@ -33,7 +33,7 @@ from modelica_like.solve.initialize import StartKind
 
 _POINTS = 20
 _SAME = 1e-5
-"""Distance of two designs relative to the bounds: a design is known to about the root of the solver's tolerance."""
+"""Relative gain in an objective below which two designs are one: ten times as much as limits may be exceeded."""
 _GAIN = 1e-9
 """Of an objective, relative: less is rounding."""
 _DIFFERENCE = 1e-3
@@ -188,10 +188,15 @@ class _Study:
             raise ValueOutOfRange(f"A front needs at least 2 points, not {points}.")
         searches = [Search(self.problem, self.runs, aim) for aim in (0, 1)]
         ends = [self._search(search, starts) for search in searches]
+        # What is best in one objective may lead to what is better in the other one.
+        ends = [
+            better([end, search.from_design(other.x)])
+            for search, end, other in zip(searches, ends, reversed(ends), strict=True)
+        ]
+        results = [self.optimum(search, end) for search, end in zip(searches, ends, strict=True)]
         places, signs, _ = searches[1].aim
         designs = [design for end in ends if (design := self.runs.at(end.x)) is not None]
         values = [float((signs * design.values[:, places]).max()) for design in designs]
-        results = [self.optimum(searches[0], ends[0])]
         x = ends[0].x
         for most in np.linspace(values[0], values[-1], points)[1:-1]:
             rows = tuple(Row(row.output, row.sign, float(most)) for row in self.problem.aims[1].rows)
@@ -200,10 +205,24 @@ class _Study:
             if outcome.excess <= FEASIBLE:
                 x = outcome.x
                 results.append(self.optimum(search, outcome))
-        results.append(self.optimum(searches[1], ends[1]))
-        designs = _different(results)
-        notes = () if len(designs) > 1 else ("This design is the best in both objectives.",)
-        return Front(designs, self.runs.count, notes)
+        front = self._undominated(results)
+        notes = () if len(front) > 1 else ("This design is the best in both objectives.",)
+        return Front(front, self.runs.count, notes)
+
+    def _undominated(self, results: Sequence[Optimum]) -> tuple[Optimum, ...]:
+        """Return designs from the best in one objective to that in the other, without what others are as good as."""
+        signs = {aim.text: aim.sign for aim in self.problem.aims}
+        values = [
+            [max(signs[text] * o.value for o in result.objectives if o.name == text) for text in signs]
+            for result in results
+        ]
+        kept: list[int] = []
+        usable = [k for k, result in enumerate(results) if result.feasible] or range(len(results))
+        for k in sorted(usable, key=lambda k: values[k]):
+            before = values[kept[-1]][1] if kept else np.inf
+            if before - values[k][1] > _SAME * abs(values[k][1]):
+                kept.append(k)
+        return tuple(results[k] for k in kept)
 
     def optimum(self, search: Search, outcome: Outcome) -> Optimum:
         """Return a result with its names, checked by IDAS."""
@@ -284,17 +303,6 @@ class _Study:
                 continue
             yield f"{row.output} is at the end of the run: a longer run may have a better design."
         yield from self.runs.remarks()
-
-
-def _different(points: Sequence[Optimum]) -> tuple[Optimum, ...]:
-    """Return designs without those that are the same as the one before."""
-    kept: list[Optimum] = []
-    for point in points:
-        free = np.array([(p.value - p.low) / (p.high - p.low) for p in point.parameters])
-        before = [(p.value - p.low) / (p.high - p.low) for p in kept[-1].parameters] if kept else [np.inf] * len(free)
-        if np.abs(free - before).max() > _SAME:
-            kept.append(point)
-    return tuple(kept)
 
 
 def _best_choice(
