@@ -164,17 +164,15 @@ def _build(component: Component) -> Template:
     residuals = [with_events(following(between_events(e.left - e.right), determined)) for e in equations]
     sources = tuple(e.source for e in (*equations, *initial))
     residuals += [honest(start - (e.left - e.right)) for start, e in zip(starts, initial, strict=True)]
-    holds, hold_terms = hold_forms(component, residuals)
-    locks, lock_terms = lock_forms(equations)
+    (holds, hold_terms), (locks, lock_terms) = hold_forms(component, residuals), lock_forms(equations)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
     others = [*zip(residuals, sources, strict=True), *((term, NOWHERE) for term in energy_terms)]
     discrete = DiscreteEquations(component, determined, events, others, [e for e in at_start if is_discrete(e)])
     checked = [*equations, *initial], discrete.events, discrete.updates, discrete.delays
     inferred = check_units(component, *checked) if component.units_checked else {}
-    changes = _Changes(component, discrete)
-    names = Names(component)
-    names.add([*residuals, *hold_terms, *lock_terms, *changes.expressions()])
-    names.add(ca.SX(symbol_of(component, name)) for hold in holds for name in (hold.motion, hold.reaction) if name)
+    changes, names = _Changes(component, discrete), Names(component)
+    held = (ca.SX(symbol_of(component, name)) for hold in holds for name in (hold.motion, hold.reaction) if name)
+    names.add([*residuals, *hold_terms, *lock_terms, *changes.expressions(), *held])
     discrete.check_determined(names.discretes)
     energy.parameters, energy.discretes = names.parameters, names.discretes
     energy.add(energy_terms)

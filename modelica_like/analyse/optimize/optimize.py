@@ -34,6 +34,7 @@ from modelica_like.solve.initialize import StartKind
 _POINTS = 20
 _SAME = 1e-5
 """Relative gain in an objective below which two designs are one: ten times as much as limits may be exceeded."""
+_AIMS = {"minimize", "maximize"}
 _GAIN = 1e-9
 """Of an objective, relative: less is rounding."""
 _DIFFERENCE = 1e-3
@@ -63,9 +64,9 @@ def optimize(
             `{"points": 12, "from": "0 N", "to": "9 kN", "rising": True}` (or `falling`) for its values, or `rows` for
             some of those it has.
         subject_to: limits of outputs, `clutch.lock_time <= 0.4 s`, with <=, >= or ==.
-        choose: values by path, `{"clutch.plates": [2, 4, 6]}`, or for a part a CSV table beside the netlist with a
-            row for each kind, a column for each parameter, and `name`. Up to 200 combinations are all tried; of more
-            Optuna finds the most promising ones. Then nothing need be free.
+        choose: values by path, `{"clutch.plates": [2, 4, 6]}`, or for a part a CSV table beside the netlist: a row for
+            each kind, a column for each parameter, and `name`. Up to 200 combinations are tried; of more Optuna finds
+            promising ones. Then nothing need be free.
         cases: load cases, tables of other parameter values with a `name`: limits hold in each, and the worst counts.
         until: end time, as in `simulate`.
         parameters: other values of parameters, in all cases.
@@ -74,47 +75,47 @@ def optimize(
             hypercube between the bounds.
         points: number of designs on a Pareto front; 20 by default.
         seed: of the Latin hypercube.
-        tolerances: how parameters scatter, as in `tolerance`, for limits that must hold with a probability,
+        tolerances: how parameters scatter, as in `tolerance`, for limits that must hold with a probability, as
             `P(clutch.lock_time <= 0.4 s) >= 99.9 %`; by default [tolerances] of the netlist.
         correlated: which of them scatter together, as in `tolerance`.
         progress: called after each design with the number of those tried, and about the most that there can be.
 
     Raises:
         UnknownName, UnitError, ValueOutOfRange: something does not fit the drive; netlists tell file and line.
-        NoGradient: the drive as it is has no derivative.
-        ModelicaLikeError: the drive cannot be run as it is.
+        NoGradient, ModelicaLikeError: the drive as it is has no derivative, or cannot be run.
         KeyboardInterrupt: the search was interrupted; the note has the best design until then.
     """
-    drive = loaded(drive)
-    written = inside(drive).optimize if isinstance(drive, Assembly) else {}
-    scatter, pairs, folder = scatter_of(drive, tolerances, correlated)
-    asked = {"minimize": _listed(minimize), "maximize": _listed(maximize)}
-    aims = asked if any(asked.values()) else {key: tuple(written.get(key, ())) for key in asked}
-    choices = choose if choose is not None else written.get("choose", {})
-    given = {"minimize", "maximize"} if aims is asked else set[str]()
-    given |= {key for key, value in (("free", free), ("choose", choose)) if value is not None}
-    given |= {key for key, value in (("subject_to", subject_to), ("for", cases)) if value}
     for name, value in (("starts", starts), ("points", points)):
         if value is not None and value < 1:
             raise ValueOutOfRange(f"{name} must be at least 1, not {value}.")
+    given = {"minimize": _listed(minimize), "maximize": _listed(maximize), "subject_to": _listed(subject_to)}
+    given |= {"free": free, "choose": choose, "for": tuple(cases), "starts": starts, "points": points}
+    drive, run = loaded(drive), {"parameters": parameters, "until": until, "start": start}
+    return _answer(drive, *_asked(drive, given, run, tolerances, correlated), seed, progress)
+
+
+def _asked(
+    drive: Component | CompiledDae, given: dict[str, Any], run: dict[str, Any], *scattered: Any
+) -> tuple[Question, Mapping[str, Any]]:
+    """Return the question, and all that is asked for: what is given, and else what the netlist says."""
+    written = dict(inside(drive).optimize) if isinstance(drive, Assembly) else {}
+    scatter, pairs, folder = scatter_of(drive, *scattered)
+    told = {key for key, value in given.items() if value not in (None, ())}
+    told |= _AIMS if told & _AIMS else set()
+    asked = {**written, **{key: given[key] for key in told}}
     question = Question(
-        aims["minimize"], aims["maximize"], free=free if free is not None else written.get("free"),
-        subject_to=_listed(subject_to) or tuple(written.get("subject_to", ())),
-        cases=tuple(cases) or tuple(written.get("for", ())), parameters=parameters, until=until, start=start,
-        tolerances=scatter, correlated=pairs, folder=folder, chosen=bool(choices),
-        written=frozenset(written) - given,
+        tuple(asked.get("minimize", ())), tuple(asked.get("maximize", ())), free=asked.get("free"),
+        subject_to=tuple(asked.get("subject_to", ())), cases=tuple(asked.get("for", ())), **run, tolerances=scatter,
+        correlated=pairs, folder=folder, chosen=bool(asked.get("choose")), written=frozenset(written) - told,
     )  # fmt: skip
-    return _answer(
-        drive, question, choices, starts or written.get("starts", 1), points or written.get("points", _POINTS), seed,
-        progress,
-    )  # fmt: skip
+    return question, asked
 
 
 def _answer(
-    drive: Component | CompiledDae, question: Question, choices: Mapping[str, Any], number: int, points: int, seed: int,
-    progress: Progress | None,
-) -> Optimum | Front:  # fmt: skip
+    drive: Component | CompiledDae, question: Question, asked: Mapping[str, Any], seed: int, progress: Progress | None
+) -> Optimum | Front:
     """Search for one design, a front, or the best choice."""
+    choices, number, points = asked.get("choose"), asked.get("starts", 1), asked.get("points", _POINTS)
     if len(question.minimize) + len(question.maximize) > 2:
         raise ValueOutOfRange(
             "There may be one objective, or two for a front.", advice="Limit the others by subject_to."

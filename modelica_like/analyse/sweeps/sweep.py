@@ -69,8 +69,7 @@ def sweep(
         sampling: `LatinHypercube(count, seed)` or `Sobol(count, seed)` instead of the grid.
         until: end time.
         parameters: other values, the same for all runs.
-        processes: number of parallel runs on this machine, native ones in threads; by default one per core (with IDAS
-            only if there are enough runs).
+        processes: parallel runs on this machine, native ones in threads; by default one per core (IDAS: if worth it).
         scheduler: address of a Dask scheduler (`tcp://…`), instead of this machine.
         checkpoint: a folder (Zarr) for finished runs: the same sweep resumes where it stopped.
         progress: called after each chunk of runs.
@@ -83,8 +82,8 @@ def sweep(
 
     Returns:
         A dataset over the parameters (a grid) or over `sample`: the outputs with their units, and `failure`, the
-        message of each failed run (empty for the others). Its attribute `solver` names the solver, `checked` is the
-        number of runs repeated by IDAS, and `notice` lists differences and the runs left to IDAS.
+        message of each failed run (empty for the others). `solver` names the solver, `checked` is the number of runs
+        repeated by IDAS, `notice` lists differences and runs left to IDAS.
 
     Raises:
         UnknownName: a name is not known.
