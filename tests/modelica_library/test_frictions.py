@@ -8,7 +8,6 @@ import pytest
 from library_references import LIBRARY
 
 from modelica_like import load, simulate
-from modelica_like.errors import Chattering
 from modelica_like.netlist.modelica.classes import with_libraries
 from modelica_like.netlist.modelica.read import read_modelica
 
@@ -18,7 +17,10 @@ PARTS = "Modelica.Mechanics.Rotational.Components"
 
 
 def drive(seed: int) -> str:
-    """Write two or three frictions on one shaft, perhaps with a gear between them, and a torque to and fro."""
+    """Write two or three frictions on one shaft, perhaps with a gear between them, and a torque to and fro.
+
+    Of 130 drives four are refused as chattering: a lossy gear without load does not know which side drives.
+    """
     choose = random.Random(seed)
 
     def some(low: float, high: float) -> float:
@@ -60,12 +62,7 @@ def test_a_shaft_moves_as_that_of_our_components(tmp_path: Path, seed: int) -> N
     for table in (True, False):
         with with_libraries([str(LIBRARY)]):
             model, _ = read_modelica(tmp_path / "Drive.mo", "Drive", table=table)
-        try:
-            run = simulate(model, UNTIL, rtol=1e-8, solver="native", points=3001)
-        except Chattering:  # a gear without load does not know which side drives: it is refused
-            assert not table
-            assert "LossyGear" in drive(seed)
-            return
+        run = simulate(model, UNTIL, rtol=1e-8, solver="native", points=3001)
         speeds.append(np.interp(times, run.time, run["first.w"]))
     assert np.abs(speeds[0] - speeds[1]).max() < 1e-4
 
