@@ -48,7 +48,7 @@ DRIVES: dict[str, tuple[str, str, str, dict[str, Any]]] = {
         {"clutch.capacity": (30, 80), "impeller.J": (0.2, 0.5)},
     ),
     "winch": (
-        "winch", "peak(rope.f)", "2 s",
+        "winch", "peak(rope.f)", "0.4 s",
         {"rope.d": (2000, 20000), "drum_inertia.J": (0.05, 0.5)},
     ),
     "servo": (
@@ -87,7 +87,8 @@ def against_evolution(file: str, aim: str, until: str, free: dict[str, Any], sta
         runs += 1
         given = dict(zip(free, map(float, low + (high - low) * q), strict=True))
         try:
-            return float(simulate(model, until, parameters=given, solver="native", readings=[aim]).readings[aim])
+            run = simulate(model, until, parameters=given, solver="native", readings=[aim], compiled=True)
+            return float(run.readings[aim])
         except ModelicaLikeError:
             return np.inf
 

@@ -1,6 +1,6 @@
 """Whatever is done to a netlist: the text is TOML, what is wrong is told, and everything can be undone.
 
-`RANDOM_EDITS=5000 pytest tests/edit` does more sequences; the slow suite has 400.
+`RANDOM_EDITS=5000 pytest tests/edit` does more sequences; the slow suite has 200.
 """
 
 import os
@@ -18,7 +18,7 @@ from modelica_like.errors import ModelicaLikeError
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLISTS = sorted(path for path in EXAMPLES.rglob("*.toml") if "sizing" not in path.parts)
-SLOW = int(os.environ.get("RANDOM_EDITS", "400"))
+SLOW = int(os.environ.get("RANDOM_EDITS", "200"))
 STEPS = 30
 
 

@@ -28,7 +28,7 @@ from random_drives import assembly, random_drive
 from modelica_like import ModelicaLikeError, Solution, simulate
 from modelica_like.netlist import dumps
 
-DRIVES = int(os.environ.get("RANDOM_DRIVES", "1000"))
+DRIVES = int(os.environ.get("RANDOM_DRIVES", "500"))
 SPEED = 1e-8
 """Largest error of a final speed, relative to the largest speed of that inertia, and ROUNDING of all inertias."""
 ROUNDING = 1e-5

@@ -1,6 +1,6 @@
 """Random trees and loops of inertias, gears, clutches, brakes and freewheels: the product is right in every one.
 
-`RANDOM_DRIVES=2000 pytest -m slow tests/exact` does more; the slow suite has a thousand, and some that were hard. A
+`RANDOM_DRIVES=2000 pytest -m slow tests/exact` does more; the slow suite has 500, and some that were hard. A
 drive that fails runs alone with `python tests/exact/drive_runs.py --drive NUMBER`, and `--shrink` makes it small.
 """
 
