@@ -49,12 +49,15 @@ static int touches(double first, double middle, double last, double *place) {
     return fabs(first) > AT_EDGE ? extremum * first < NEAR * first * first : extremum * last < 0;
 }
 
+/* What stays as close to zero as rounding takes it rests there, and is no edge. */
 static int any_edge(int begin, int end, const double *first, const double *middle, const double *last) {
     double place;
-    for (int k = begin; k < end; k++)
+    for (int k = begin; k < end; k++) {
+        if (max_of(fabs(first[k]), max_of(fabs(middle[k]), fabs(last[k]))) <= AT_EDGE) continue;
         if (differs(first[k], middle[k]) || differs(middle[k], last[k]) ||
             touches(first[k], middle[k], last[k], &place))
             return 1;
+    }
     return 0;
 }
 
