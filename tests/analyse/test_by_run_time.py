@@ -63,6 +63,15 @@ def test_what_is_read_at_an_event_is_left_to_the_replay():
     assert differentiated(model, ["wheel.phi"], ["brake.capacity"], 1e-9, STOP) is None
 
 
+def test_what_rests_at_an_edge_asks_for_no_steps():
+    """A brake's armature rests at its stop: its speed is zero but for rounding, whose sign means nothing."""
+    model = build(EXAMPLES / "winch.toml")
+    result = differentiated(model, ["rope.f"], ["rope.d"], 1e-8, "0.4 s")
+    assert result is not None
+    plain = simulate(model, "0.4 s", solver="native", rtol=1e-8, atol=1e-10)
+    assert result.solution.statistics.steps < 1.2 * plain.statistics.steps
+
+
 def test_a_reading_moves_with_the_instant_that_follows_it():
     """The time of the stop squared, as the time by itself twice the time."""
     model = braked()
