@@ -49,11 +49,11 @@ static int touches(double first, double middle, double last, double *place) {
     return fabs(first) > AT_EDGE ? extremum * first < NEAR * first * first : extremum * last < 0;
 }
 
-/* What stays as close to zero as rounding takes it rests there, and is no edge. */
-static int any_edge(int begin, int end, const double *first, const double *middle, const double *last) {
+/* What stays within `rest` of zero is no edge. */
+static int any_edge(int begin, int end, const double *first, const double *middle, const double *last, double rest) {
     double place;
     for (int k = begin; k < end; k++) {
-        if (max_of(fabs(first[k]), max_of(fabs(middle[k]), fabs(last[k]))) <= AT_EDGE) continue;
+        if (max_of(fabs(first[k]), max_of(fabs(middle[k]), fabs(last[k]))) <= rest) continue;
         if (differs(first[k], middle[k]) || differs(middle[k], last[k]) ||
             touches(first[k], middle[k], last[k], &place))
             return 1;
@@ -366,8 +366,9 @@ double seen_length(Instance *c, double least, double *most) {
     if (n_edges == 0) return INFINITY;
     if (out_of_reach(c, h)) return c->edgeless = 1, explained_length(c);
     if (n == n_edges) edges_inside(c, begin + 0.5 * h, middle);
-    of_slopes = any_edge(0, m->settings->n_slope_edges, first, middle, last);
-    of_guards = any_edge(m->settings->n_slope_edges, n_edges, first, middle, last);
+    /* Steps that land would do so at each rounding of what rests at an edge. */
+    of_slopes = any_edge(0, m->settings->n_slope_edges, first, middle, last, c->lands ? AT_EDGE : 0);
+    of_guards = any_edge(m->settings->n_slope_edges, n_edges, first, middle, last, 0);
     if (!of_slopes && !of_guards) return explained_length(c);
     find_top(c, first, middle, last, middle + n);
     memset(c->positive, 0, (size_t)m->n_guards);

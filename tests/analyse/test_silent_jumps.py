@@ -89,6 +89,35 @@ def test_a_jump_without_an_event_has_no_derivative(kind: Kind, solver: Any) -> N
     assert "noEvent" in str(refused.value)
 
 
+class Charge(Component):
+    """q = s a t up to s/2, where the rate of y changes; sizes of s are those of q."""
+
+    units_checked = False
+    q: Variable = var("1", "charge", default=0.0)
+    y: Variable = var("1", "what follows", default=0.0)
+    a: Parameter = param("1", "rate", default=2.0)
+    size: float = 1.0
+
+    def equations(self) -> Equations:
+        yield der(self.q) == self.size * self.a
+        yield der(self.y) == where(self.q < 0.5 * self.size, 1.0, 3.0, events=False)
+
+
+class SmallCharge(Charge):
+    size: float = 1e-12
+    q: Variable = var("1", "charge of some picocoulombs", default=0.0, nominal=1e-12)
+
+
+@pytest.mark.parametrize("kind", [Charge, SmallCharge])
+@pytest.mark.parametrize("method", ["auto", "forward", "adjoint"])
+def test_a_jump_has_no_derivative_in_any_unit(kind: Any, method: Any) -> None:
+    """It is at 1/(2 a): y = 3 t - 1/a, which nothing but an event would tell."""
+    run = simulate(kind(), END, solver="native")
+    assert run.final["y"] == pytest.approx(3 * END - 0.5, abs=1e-5)
+    with pytest.raises(NoGradient, match=r"the rate of y jumps without an event"):
+        sensitivities(run, "y", ["a"], method=method)
+
+
 @pytest.mark.parametrize("method", ["forward", "adjoint"])
 def test_an_integral_of_what_jumps_has_none_either(method: Any) -> None:
     """That of y is t - 2 b/a, and the rate of x does not jump."""

@@ -27,6 +27,7 @@ from modelica_like.solve.recorder import Segment
 _DIFFERENCES = (ca.OP_LT, ca.OP_LE, ca.OP_FMIN, ca.OP_FMAX)
 _ZEROS = (ca.OP_FABS, ca.OP_SIGN)
 _NOISE = 1e-12
+"""Rounding of a kink's argument, relative to what it is made of, where that is less than one."""
 _AWAY = 10.0 ** np.arange(-12, -2)
 """Distances from a kink, relative to the time; the first one on a side counts. Where rates jump, steps end roughly, and
 the cube of a distance is as good as zero long before it."""
@@ -55,10 +56,15 @@ class Kinks:
         column = ca.SX(0, 1) if integrands is None else ca.SX(integrands)
         self._key = Cached.KINKS, str(column)
         self._function: ca.Function = model.once(self._key, lambda: _with_integrands(model, column))
+        sizes: ca.Function = model.once((*self._key, "sizes"), lambda: _sizes(model, self._function))
         self.count = int(self._function.size1_out(0))
-        self._along = [(segment.times, self._over(segment)) for segment in segments if self.count]
-        largest = [np.abs(values).max(axis=1) for _, values in self._along]
-        self._zero = np.maximum(_AT_IT * np.max(largest, axis=0), _NOISE) if largest else np.full(self.count, _NOISE)
+        some = segments if self.count else ()
+        self._along = [(segment.times, self._over(segment, self._function)) for segment in some]
+        self._zero = np.full(self.count, _NOISE)
+        if some:
+            largest = np.max([np.abs(values).max(axis=1) for _, values in self._along], axis=0)
+            made_of = np.median(np.concatenate([self._over(segment, sizes) for segment in some], axis=1), axis=1)
+            self._zero = np.maximum(_AT_IT * largest, _NOISE * np.where(made_of > 0.0, np.fmin(made_of, 1.0), 1.0))
 
     def at(self, point: Point) -> Vector:
         """Values at a point."""
@@ -185,11 +191,11 @@ class Kinks:
             last, first = (last, middle) if behind(middle) else (middle, first)
         return last, first
 
-    def _over(self, segment: Segment) -> Vector:
-        """Values at the results of a segment, shape (count, n)."""
+    def _over(self, segment: Segment, function: ca.Function) -> Vector:
+        """Values of a function at the results of a segment, shape (count, n)."""
         model, times = self.model, segment.times
         fixed = (np.repeat(values[:, None], len(times), axis=1) for values in (model.p, model.u, segment.d))
-        return np.asarray(self._function(times[None, :], segment.x, segment.z, *fixed).full())
+        return np.asarray(function(times[None, :], segment.x, segment.z, *fixed).full())
 
 
 def _switches(model: CompiledDae) -> ca.Function:
@@ -201,6 +207,22 @@ def _switches(model: CompiledDae) -> ca.Function:
 def _with_integrands(model: CompiledDae, integrands: Any) -> ca.Function:
     given, kinks = list(model.arguments.values()), kinks_of(model.arguments, integrands)
     return ca.Function("kinks", given, [ca.densify(ca.vertcat(ca.SX(0, 1), _switches(model)(*given), *kinks))])
+
+
+def _sizes(model: CompiledDae, function: ca.Function) -> ca.Function:
+    """Sizes of what the arguments of kinks are made of: states, at least of their nominal value, parameters, time."""
+    given = model.arguments
+    kinks = function(*given.values())
+    least = {"x": ca.DM(model.equations.nominals), "z": 1.0}
+    sizes = sum(
+        (
+            ca.fabs(ca.jacobian(kinks, symbol)) @ ca.fmax(ca.fabs(symbol), least.get(name, 0.0))
+            for name, symbol in given.items()
+            if symbol.numel()
+        ),
+        ca.SX(kinks.numel(), 1),
+    )
+    return ca.Function("sizes", list(given.values()), [ca.densify(sizes)])
 
 
 def arguments_of_kinks(function: ca.Function, given: list[Any]) -> list[Any]:
