@@ -24,10 +24,11 @@ async function exported(what) {
 
 /* Something new: another page has changed the netlist, or another editor the file. */
 async function watch() {
-  const answer = await ask("watch", { revision: page.revision }).catch(() => null);
+  const seen = page.revision, answer = await ask("watch", { revision: seen }).catch(() => null);
   if (answer) {
     conflict(answer.conflict);
-    if (answer.revision !== page.revision && !unsent) await change("state", {}).catch(tell);
+    await queue; // what this page changes meanwhile is no news, and has its own message
+    if (page.revision === seen && answer.revision !== seen && !unsent) await change("state", {}).catch(tell);
   }
   setTimeout(watch, PERIOD);
 }
