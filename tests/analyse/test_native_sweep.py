@@ -139,10 +139,16 @@ def test_without_a_library_there_are_no_runs(monkeypatch):
 
 
 LONG = """
-import signal, sys
+import signal, sys, threading, time
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from modelica_like.analyse.sweeps.sweep import sweep
-print("begun", flush=True)
+
+def watch():
+    while threading.active_count() < 4:  # this one, that of the sweep, and two for its runs
+        time.sleep(0.05)
+    print("runs", flush=True)
+
+threading.Thread(target=watch, daemon=True).start()
 sweep(sys.argv[1], {"k1": [6120.0 + k for k in range(100_000)]}, ["shaft1.tau"], chunk=50_000, processes=2)
 """
 
@@ -154,8 +160,8 @@ def test_an_interrupt_does_not_wait_for_runs_in_c():
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         try:
             assert process.stdout is not None
-            process.stdout.readline()
-            time.sleep(5.0)
+            assert process.stdout.readline() == b"runs\n"
+            time.sleep(1.0)
             process.send_signal(signal.SIGINT)
             _, errors = process.communicate(timeout=20)
         finally:
