@@ -18,6 +18,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import HOMOTOPY, TERMINAL, CompiledDae, Reset
 from modelica_like.errors import ExportError
+from modelica_like.flatten.model import Origin
 from modelica_like.fmi.interface import FmuVariable, Interface
 from modelica_like.fmi.sources import Version, runtime_sources
 from modelica_like.fmi.start_tables import StartTables
@@ -199,8 +200,7 @@ def _contents(
         "state_names": [text(name) for name in model.states],
         "implicit_names": [text(name) for name in model.implicit],
         "singular_names": [
-            text(", ".join(names[:6]) or f"{origins[0].path} with other parameters")
-            for names, origins in model.equations.singular
+            text(", ".join(names[:6]) or _nameless(origins)) for names, origins in model.equations.singular
         ],
         "variables": [_variable(variable, text) for variable in sorted(variables, key=lambda v: v.reference)],
         "rising": [(*pair, *(text(model.flat_parameters[k].path) for k in pair)) for pair in model.rising],
@@ -220,6 +220,13 @@ def _contents(
     for tape in tables.tapes.values():
         contents |= _tape(tape)
     return contents
+
+
+def _nameless(origins: Sequence[Origin]) -> str:
+    """Return what is singular in a block without unknowns: frictions that hold together, or other equations."""
+    paths = [origin.path for origin in origins]
+    open_still = f"{' and '.join(paths)}, where it is open which slides first"
+    return open_still if len(paths) > 1 else f"{paths[0]} with other parameters"
 
 
 def _settings(tables: Tables, tolerance: float, fixed_step: float) -> tuple[float, ...]:

@@ -151,6 +151,12 @@ Other outputs are peak(…), max(…), min(…), integral(…), mean(…), rms(�
         """There may be one objective, or two for a front.
 Limit the others by subject_to.""",
     ),
+    "an objective twice": (
+        ValueOutOfRange,
+        lambda: optimize(D, free=F, minimize="clutch.lock_time", maximize="clutch.lock_time"),
+        """Both objectives of the front are clutch.lock_time.
+Leave one out.""",
+    ),
     "the largest of different things": (
         UnitError,
         lambda: optimize(D, free=F, minimize="max(peak(clutch.tau), clutch.lock_time)"),

@@ -19,7 +19,8 @@ PARTS = "Modelica.Mechanics.Rotational.Components"
 def drive(seed: int) -> str:
     """Write two or three frictions on one shaft, perhaps with a gear between them, and a torque to and fro.
 
-    Of 130 drives four are refused as chattering: a lossy gear without load does not know which side drives.
+    Of 130 drives four are refused as chattering: a lossy gear without load does not know which side drives. In number
+    74 a load turns round: which of two frictions has lost its peak before the shaft moves is open (stick_slip.md).
     """
     choose = random.Random(seed)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from modelica_like import export_fmu, run_fmu, simulate
-from modelica_like.errors import SingularAtStart
+from modelica_like.errors import FmuFailed, SingularAtStart
 from modelica_like.netlist.modelica.read import read_modelica
 
 FRICTION = """
@@ -123,6 +123,13 @@ def test_behind_a_gear_it_is_open_which_of_them_falls_first(tmp_path, solver) ->
 They stick on shafts that turn at different speeds, and the limit of each falls once it slides.
 Let the limit of one stay (peak = 1), or put a spring between them."""
     )
+
+
+def test_an_fmu_says_so(tmp_path) -> None:
+    model = drive(tmp_path, FALLING, "connect(shaft.a, one.a); connect(one.b, two.a);")
+    export_fmu(model, tmp_path / "open.fmu", check=False)
+    with pytest.raises(FmuFailed, match=r"in the equations for one and two, where it is open which slides first\."):
+        run_fmu(tmp_path / "open.fmu", stop=3.0)
 
 
 def test_an_fmu_does_so_too(tmp_path) -> None:

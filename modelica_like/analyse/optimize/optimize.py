@@ -116,13 +116,16 @@ def _answer(
 ) -> Optimum | Front:
     """Search for one design, a front, or the best choice."""
     choices, number, points = asked.get("choose"), asked.get("starts", 1), asked.get("points", _POINTS)
-    if len(question.minimize) + len(question.maximize) > 2:
+    aims = (*question.minimize, *question.maximize)
+    if len(aims) > 2:
         raise ValueOutOfRange(
             "There may be one objective, or two for a front.", advice="Limit the others by subject_to."
         )
+    if len(aims) == 2 and aims[0] == aims[1]:
+        raise ValueOutOfRange(f"Both objectives of the front are {aims[0]}.", advice="Leave one out.")
     if not choices:
         return _Study(drive, question, seed, counted(progress, MOST_STEPS * number)).best(number, points)
-    if len(question.minimize) + len(question.maximize) > 1:
+    if len(aims) > 1:
         raise ValueOutOfRange("A choice needs one objective.", advice="Limit the other one by subject_to.")
     if not isinstance(drive, Component):
         raise LanguageError(
@@ -212,11 +215,9 @@ class _Study:
 
     def _undominated(self, results: Sequence[Optimum]) -> tuple[Optimum, ...]:
         """Return designs from the best in one objective to that in the other, without what others are as good as."""
-        signs = {aim.text: aim.sign for aim in self.problem.aims}
-        values = [
-            [max(signs[text] * o.value for o in result.objectives if o.name == text) for text in signs]
-            for result in results
-        ]
+        signs, shape = np.array([[aim.sign] for aim in self.problem.aims]), (2, len(self.problem.cases))
+        signed = [signs * np.reshape([o.value for o in result.objectives], shape) for result in results]
+        values = [numbers.max(axis=1).tolist() for numbers in signed]
         kept: list[int] = []
         usable = [k for k, result in enumerate(results) if result.feasible] or range(len(results))
         for k in sorted(usable, key=lambda k: values[k]):
