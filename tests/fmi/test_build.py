@@ -125,8 +125,8 @@ def test_zig_exports_the_fmi_functions_only_and_needs_an_old_glibc(monkeypatch, 
     assert names == declared | OWN
     assert len(declared) == count
     assert newest_glibc(library) <= (2, 17)
-    # Its compiler unrolls the solver of dense systems wherever it is used.
-    assert library.stat().st_size < 500_000
+    # Its compiler would unroll the solver of dense systems wherever it is used: 500 kB, and no run is faster.
+    assert library.stat().st_size < 430_000
 
 
 @pytest.mark.slow
