@@ -28,9 +28,9 @@ typedef struct {
     double t, place; /* that of a guard: its transition */
 } Doubt;
 
-typedef struct { /* a guard that is highest there; felt: what an event would change, beside it; corner: it turns at once
-                  */
-    double t, felt;
+typedef struct { /* a guard that is highest there; felt: what an event would change, beside it; size: how large it is in
+                  * between the looks beside it, if this may be rounding; corner: it turns at once */
+    double t, felt, size;
     int guard, corner;
 } Touch;
 
@@ -84,6 +84,7 @@ struct Gradient {
     int n_touches, measured, lands; /* lands: steps that end at edges, instead of a piece that went over them */
     double *edges;
     double *guard_sizes;      /* if `measured` */
+    double *guard_rests;      /* up to which it rests at zero, where this has been asked */
     double *vectors, *behind; /* of outputs, then of doubts: derivatives by numbers of the state, and by the time */
     double *sides, *slope, *way, *moment, *rates, *work, *sizes, *motions, *largest;
     double *points, *matrices, *stages, *node_bars; /* of a step */
@@ -129,6 +130,8 @@ static inline double *vector_of(const Instance *c, int k) {
 /* gradient.c */
 Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along *along, double *gradient);
 void add_doubt(Instance *c, FailureCode why, const double *slope);
+double small_terms(const Instance *c, const double *slope);
+void add_small_doubt(Instance *c, FailureCode why, double *slope);
 void lose_back(Instance *c);
 void add_seed(Instance *c, const Seed *seed);
 double seed_behind(Instance *c, double t, int add);

@@ -33,6 +33,25 @@ void add_doubt(Instance *c, FailureCode why, const double *slope) {
     for (size_t n = 0; n < c->n_smooth; n++) vector[n] += factor * slope[n];
 }
 
+/* How large the terms are of what has this slope, by the present numbers or nominally; 1 if they are larger, whose
+ * rounding is as good as that of 1. */
+double small_terms(const Instance *c, const double *slope) {
+    double terms = fabs(slope[c->n_smooth]) * max_of(1, fabs(c->state.t));
+    for (size_t n = 0; n < c->n_smooth; n++) {
+        ptrdiff_t state = (ptrdiff_t)n - (c->x - c->numbers);
+        double nominal = state >= 0 && state < c->model->n_x ? c->model->nominals[state] : 0;
+        terms += fabs(slope[n]) * max_of(fabs(c->numbers[n]), nominal);
+    }
+    return min_of(1, max_of(terms, DBL_MIN));
+}
+
+/* Adds a doubt by what is small itself, as a guard of picometres: by how much it changes beside its terms. */
+void add_small_doubt(Instance *c, FailureCode why, double *slope) {
+    double terms = small_terms(c, slope);
+    for (size_t n = 0; n <= c->n_smooth; n++) slope[n] /= terms;
+    add_doubt(c, why, slope);
+}
+
 /* Notes which transitions fire in a round, or says it; tells whether any do. */
 int gradient_round(Instance *c, int round, unsigned char *wanting, int any) {
     Gradient *g = c->gradient;
@@ -146,7 +165,7 @@ static double *take_room(const Instance *c, size_t n_of) {
         {&g->stages, (STAGES + 3) * n_y}, {&g->node_bars, vectors * N_NODES * n_y},
         {&g->integrand_slopes, integrals * n_y}, {&g->integrand_bars, integrals * n}, {&g->later, n_of},
         {&g->rests, rests}, {&g->guard_sizes, (size_t)c->model->n_guards},
-        {&g->edges, 3 * (size_t)c->model->tapes.edges.n_outputs},
+        {&g->guard_rests, (size_t)c->model->n_guards}, {&g->edges, 3 * (size_t)c->model->tapes.edges.n_outputs},
         {&g->lanes, (vectors < MOST_LANES ? vectors : MOST_LANES) * c->n_bars}};
     size_t total = 0, touches = MOST_TOUCHES * (size_t)c->model->n_guards * (sizeof(Touch) / sizeof(double));
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) total += parts[k].size;
@@ -302,6 +321,7 @@ Result differentiate(Instance *c, const uint32_t of[], size_t n_of, const Along 
     g->n_of = g->n_vectors = (int)n_of;
     g->n_doubts = g->singular = g->early = g->measured = g->lands = 0;
     memset(g->doubts, 0, sizeof g->doubts);
+    memset(g->guard_rests, 0, (size_t)c->model->n_guards * sizeof(double));
     g->loaded = NULL;
     Result result = go_back(c);
     if (result && g->singular) result = fail_with(c, FAILURE_LOST_AT_SINGULAR, UINT32_MAX, g->singular_at, 0);

@@ -51,6 +51,12 @@ static double uncertainty(const Instance *c, int guard, const double *slope) {
     return ACCURACY * c->state.tolerance * c->gradient->guard_sizes[guard] + ROUNDING_OF_TERMS * terms;
 }
 
+/* Is what was seen of a guard beside a touch the rounding of its terms? As small values are not looked at then. */
+static int is_rounding(Instance *c, const Touch *touch, double terms) {
+    c->gradient->guard_rests[touch->guard] = AT_EDGE * terms;
+    return touch->size <= AT_EDGE * terms;
+}
+
 /* Goes to a time of a piece, in the modes of a copy. */
 int stand_at(Instance *c, const void *frame, const double *own, double t) {
     state_copy_in(c, frame);
@@ -127,13 +133,14 @@ static double felt_touch(Instance *c, const void *frame, const double *own, cons
     if (!c->gradient->measured) measure_guards(c);
     if (!stand_at(c, frame, own, touch->t) || !factor_implicit(c)) return 0;
     double value = slope_of_output(c, &c->model->tapes.guards, touch->guard, guards, c->gradient->slope);
-    double wrong = uncertainty(c, touch->guard, c->gradient->slope);
+    double terms = small_terms(c, c->gradient->slope), wrong = uncertainty(c, touch->guard, c->gradient->slope);
+    if (is_rounding(c, touch, terms)) return 0;
     if (!(fabs(value) <= wrong)) return 0;
     for (int k = 0; k < 2; k++)
         effects[k] = effect(c, frame, own, touch->guard, touch->t - back, back, reads, &before[k]), back *= NEARER;
     double way = value - before[0];
     if (effects[0] <= NOTHING_FELT || effects[1] * (touch->corner ? BY_TIME : BY_SQUARE) <= effects[0]) return 0;
-    return way > 0 ? min_of(effects[0] / way, MOST_FELT) : MOST_FELT;
+    return way > 0 ? min_of(effects[0] / way, MOST_FELT / terms) : MOST_FELT / terms;
 }
 
 /* Adds a doubt at the present point: by what moves a guard, which itself moves by `rate` with the event there. */
@@ -166,7 +173,7 @@ static void note_touches(Instance *c, double begin, const double *before, double
     for (int k = 0; k < n && g->n_touches < MOST_TOUCHES * n; k++) {
         double first = before[k], last = after[k], size = max_of(fabs(first), fabs(last));
         double rise = (end - begin) * before[n + k], fall = (end - begin) * after[n + k];
-        if (!guard_active(c, k) || size <= AT_EDGE) continue;
+        if (!guard_active(c, k) || size <= g->guard_rests[k]) continue;
         int turns = rise > -FLAT * size && fall < FLAT * size && rise - fall > FLAT * size;
         turns = turns && is_hump(min_of(first, 0), max_of(rise, 2 * NOISE), min_of(last, 0), min_of(fall, -2 * NOISE));
         if (!(corner ? rise > 0 && fall <= 0 : turns)) continue;
@@ -174,7 +181,7 @@ static void note_touches(Instance *c, double begin, const double *before, double
         if (t - c->piece->begin <= brief) continue;
         int place = g->n_touches++;
         for (; place > 0 && g->touches[place - 1].t > t; place--) g->touches[place] = g->touches[place - 1];
-        g->touches[place] = (Touch){t, 0, k, corner};
+        g->touches[place] = (Touch){t, 0, size, k, corner};
     }
 }
 
@@ -250,7 +257,7 @@ int find_touches_at(Instance *c, const Record *at, double rate) {
         state_copy_in(c, at->before);
     }
     if (rate > 0 && !g->cause->timed && turns_back(c, way, rate)) {
-        Touch touch = {c->state.t, 0, g->cause->index, 0};
+        Touch touch = {c->state.t, 0, INFINITY, g->cause->index, 0};
         touches = felt_touch(c, at->before, way->own, &touch, 0) > 0 ? 1 : -1;
     }
     state_copy_in(c, at->behind);
@@ -266,7 +273,7 @@ int find_touches_at(Instance *c, const Record *at, double rate) {
             continue;
         if (!(before[n] >= 0 && behind[n] <= 0 && before[n] > behind[n])) continue;
         Touch *touch = &g->touches[g->n_touches];
-        *touch = (Touch){c->state.t, 0, k, 1};
+        *touch = (Touch){c->state.t, 0, INFINITY, k, 1};
         touch->felt = felt_touch(c, at->before, way->own, touch, 0);
         g->n_touches += touch->felt > 0;
         state_copy_in(c, at->before);
@@ -296,7 +303,7 @@ void check_end(Instance *c) {
     if (way == NULL || way->pass != NULL || n == 0) return;
     evaluate_now(c, &c->model->tapes.guards, guards);
     for (int k = 0; k < n; k++) {
-        Touch touch = {t, 0, k, 1};
+        Touch touch = {t, 0, INFINITY, k, 1};
         if (!guard_active(c, k) || !(guards[n + k] > 0) || fabs(guards[k]) > BESIDE * guards[n + k] * span_of(c))
             continue;
         touch.felt = felt_touch(c, way->frame, way->own, &touch, g->along == NULL);

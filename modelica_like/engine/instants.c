@@ -321,7 +321,7 @@ void event_back(Instance *c, const Record *at) {
     state_copy_in(c, at->before);
     read_before(c, speed);
     if (!tells && touches >= 0) {
-        add_doubt(c, FAILURE_LOST_AT_TOUCH, slope);
+        add_small_doubt(c, FAILURE_LOST_AT_TOUCH, slope);
         g->doubts[g->n_doubts - 1].place = (double)(g->cause - m->transitions);
     }
     add_touches_at(c, speed);

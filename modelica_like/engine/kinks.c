@@ -203,7 +203,7 @@ static void check_guards(Instance *c, double *rests) {
         for (size_t n = 0; n < c->n_smooth; n++) terms += fabs(slope[n] * c->numbers[n]);
         if (size <= max_of(AT_EDGE, AT_LIMIT * terms) && direction_off(c, slope, direction) &&
             felt_beside(c, direction, NEARBY_KINK, FELT_KINK, to->mode, to->target) > 0)
-            add_doubt(c, FAILURE_LOST_AT_KINK, slope);
+            add_small_doubt(c, FAILURE_LOST_AT_KINK, slope);
     }
 }
 
@@ -241,7 +241,7 @@ void check_kinks(Instance *c) {
         if (!slope_of_kink(c, tape, kink, slope) || !direction_off(c, slope, direction)) continue;
         double most = felt_beside(c, direction, NEARBY_KINK, FELT_KINK, -1, 0);
         kink->alone = most > 0 && felt_beside(c, direction, CLOSER * NEARBY_KINK, FELT_KINK, -1, 0) > 0.5 * most;
-        if (kink->alone) add_doubt(c, FAILURE_LOST_AT_KINK, slope);
+        if (kink->alone) add_small_doubt(c, FAILURE_LOST_AT_KINK, slope);
     }
     check_guards(c, g->rests + tape->n_operations);
 }
@@ -286,6 +286,6 @@ void check_outputs(Instance *c) {
             if (!direction_off(c, g->slope, g->work)) continue;
             int any = 0;
             for (int v = 0; v < g->n_of && !any; v++) any = bends(c, g->of[v], g->work);
-            if (any) add_doubt(c, FAILURE_LOST_AT_KINK, g->slope);
+            if (any) add_small_doubt(c, FAILURE_LOST_AT_KINK, g->slope);
         }
 }

@@ -88,7 +88,7 @@ void check_meeting(Instance *c, const Record *at, const unsigned char *fired) {
         slope_of_output(c, tape, to->index, c->outputs, g->slope);
         for (int n = 0; n < m->n_d && g->early; n++) g->slope[c->d - c->numbers + n] = 0; /* a clock counts what is */
         if (g->early) add_doubt(c, FAILURE_LOST_AT_OTHER_MODES, g->slope);
-        else if (speed == 0) add_doubt(c, FAILURE_LOST_AT_TOUCH, g->slope);
+        else if (speed == 0) add_small_doubt(c, FAILURE_LOST_AT_TOUCH, g->slope);
         else if (comes_later(c, g->slope, speed) > SAME_TIME) add_doubt(c, FAILURE_LOST_AT_MEETING, g->slope);
     }
 }

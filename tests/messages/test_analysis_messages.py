@@ -147,6 +147,9 @@ An address looks like tcp://host:8786."""),
     "no values of the output": (ValueOutOfRange, lambda: importance(model(), {"mass.J": (-1.0, 1.0)}, ["mass.w"], samples=4, until=1.0), """\
 mass.w has no value in 6 of 12 runs: mass.J = -0.09687008894979954 is out of range: it must be at least 0 kg.m2.
 Narrow the ranges until most runs succeed."""),
+    "a measure with one name": (UnknownName, lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"], samples=4, until=0.1)["S1"], """\
+This result has three names, of a measure, an output and a parameter, not 'S1'.
+Write result["S1", "…", "…"]."""),
     "a method": (UnknownName, lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"], method="fast"), """\
 There is no method 'fast'. There are sobol and morris."""),
     "SALib": (MissingExtra, lambda: missing("SALib.sample.sobol", lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"])), """\

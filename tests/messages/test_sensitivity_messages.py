@@ -244,6 +244,9 @@ There is no method 'adjiont'; did you mean 'adjoint'?
 The methods are forward, adjoint and auto (the cheaper of both)."""),
     "an output that was not asked for": (UnknownName, lambda: table("table.s")["table.v", "load_torque"], """\
 There is no output 'table.v' in these sensitivities; did you mean 'table.s'?"""),
+    "a derivative with one name": (UnknownName, lambda: table("table.s")["load_torque"], """\
+A derivative has two names, of an output and of a parameter, not 'load_torque'.
+Write result["…", "…"]."""),
     "a precision out of range": (ValueOutOfRange, lambda: table("table.s", precision=1e-20), """\
 The precision of a replay, 1e-20, is out of range: it must be between 1e-13 and 0.001."""),
     "an output that is infinite": (NoGradient, lambda: table("table.s/0"), """\

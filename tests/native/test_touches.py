@@ -6,10 +6,23 @@ import numpy as np
 import pytest
 
 from components import Clutch, Inertia, Sine, Torque
-from modelica_like import Assembly, build
+from modelica_like import Assembly, build, sensitivities, simulate
 from modelica_like.analyse.sensitivity.by_run_time import differentiated_run
 from modelica_like.errors import NoGradient
-from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var, when, where
+from modelica_like.language import (
+    Component,
+    Equations,
+    Events,
+    Mode,
+    Parameter,
+    Variable,
+    cos,
+    der,
+    param,
+    var,
+    when,
+    where,
+)
 from modelica_like.runs.readings import read_output
 from modelica_like.simulation import plan
 
@@ -202,3 +215,45 @@ class Turning(Component):
     def events(self) -> Events:
         yield self.way.go("up", "down", at=self.turn)
         yield self.level.go("below", "above", when=self.x > self.limit)
+
+
+class Swinging(Component):
+    """q = s a/3 sin(3 t), and what follows while q > s/3; sizes of s are those of q."""
+
+    units_checked = False
+    q: Variable = var("1", "swings", default=0.0)
+    y: Variable = var("1", "follows", default=0.0)
+    a: Parameter = param("1", "amplitude", default=1.0)
+    size: float = 1.0
+    mode = Mode("below", "above")
+
+    def equations(self) -> Equations:
+        yield der(self.q) == self.size * self.a * cos(3 * self.time)
+        yield der(self.y) == self.mode.choose(below=-0.2, above=1.0)
+
+    def events(self) -> Events:
+        yield self.mode.go("below", "above", when=self.q > self.size / 3)
+        yield self.mode.go("above", "below", when=self.q < self.size / 3)
+
+
+class Tiny(Swinging):
+    size: float = 1e-9
+    q: Variable = var("1", "swings", default=0.0, nominal=1e-9)
+
+
+class Tinier(Swinging):
+    size: float = 1e-13
+    q: Variable = var("1", "swings", default=0.0, nominal=1e-13)
+
+
+@pytest.mark.parametrize("kind", [Swinging, Tiny, Tinier])
+def test_a_touch_has_no_derivative_in_any_unit(kind):
+    """Above for 2/3 (pi - 2 asin(1/a)) until 3 s; from a = 1 on its derivative has no bound."""
+    run = simulate(kind(), 3.0, solver="native")
+    with pytest.raises(NoGradient, match="No gradient of y by a: 1 is at a kink"):
+        sensitivities(run, "y", ["a"])
+    a = 1.5
+    run = simulate(kind(a=a), 3.0, solver="native")
+    found = sensitivities(run, "y", ["a"])
+    expected = 1.2 * 4 / 3 / (a * (a**2 - 1) ** 0.5)
+    assert found["y", "a"] == pytest.approx(expected, rel=1e-6)

@@ -69,6 +69,11 @@ class Sensitivities(Shown):
         Raises:
             UnknownName: there is no such output or parameter.
         """
+        if not isinstance(key, tuple) or len(key) != 2:
+            raise UnknownName(
+                f"A derivative has two names, of an output and of a parameter, not {key!r}.",
+                advice='Write result["…", "…"].',
+            )
         output, parameter = key
         row, column = _position(self.outputs, output, "output"), _position(self.parameters, parameter, "parameter")
         return float(self.derivatives[row, column])

@@ -47,6 +47,11 @@ class Importance:
 
     def __getitem__(self, key: tuple[str, str, str]) -> float:
         """Return a measure: `importance["S1", "table.s", "gear.ratio"]`."""
+        if not isinstance(key, tuple) or len(key) != 3:
+            raise UnknownName(
+                f"This result has three names, of a measure, an output and a parameter, not {key!r}.",
+                advice='Write result["S1", "…", "…"].',
+            )
         measure, output, parameter = key
         for name, labels in ((measure, self.measures), (output, self.outputs), (parameter, self.parameters)):
             if name not in labels:
