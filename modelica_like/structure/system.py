@@ -77,9 +77,14 @@ class System:
         return self._joined
 
     @property
+    def flags(self) -> Any:
+        """The column of the symbols that tell whether motions are prescribed, as long as the structure does not."""
+        return ca.vertcat(ca.SX(0, 1), *(symbol for symbol, _ in self.model.flags))
+
+    @property
     def volatile(self) -> Any:
-        """The column of all symbols that change during a run."""
-        return ca.vertcat(self.everything, self.model.d, self.model.time)
+        """The column of all symbols that change during a run, or that parameters do not decide."""
+        return ca.vertcat(self.everything, self.model.d, self.model.time, self.flags)
 
     @property
     def constants(self) -> tuple[list[float], Any]:
@@ -93,10 +98,12 @@ class System:
     def generic(self, expressions: Any) -> ca.DM:
         """Return numbers at a point that is not special; parameters have their values, modes their starts."""
         model = self.model
-        function = ca.Function("generic", [self.everything, model.p, model.d, model.time], [expressions])
+        given = [self.everything, model.p, model.d, model.time, self.flags]
+        function = ca.Function("generic", given, [expressions])
         # No two values are equal: the ends of a rod must not coincide.
-        *values, time = spread(0.0, 1.0, len(self.symbols) + 1)
-        return function(values, *self.constants, time)
+        count = len(self.symbols)
+        values = spread(0.0, 1.0, count + 1 + len(model.flags))
+        return function(values[:count], *self.constants, values[count], values[count + 1 :])
 
     def add_level(self, chain: int) -> int:
         """Extend a chain by one derivative."""

@@ -36,6 +36,7 @@ from modelica_like.cli import TASKS, command
 from modelica_like.cli import run as call
 from modelica_like.cli.reader import parameters
 from modelica_like.errors import ModelicaLikeError
+from modelica_like.fmi.runtime import cache_folder
 from modelica_like.language.inside import declarations
 from modelica_like.language.units import parse_unit, read_quantity, to_si
 from modelica_like.netlist import library_types, loads
@@ -236,7 +237,8 @@ def _hangs(*_: object) -> None:
 
 def watch() -> None:
     """From now on, commands that are run and files that are written elsewhere end the input they belong to."""
-    allowed = (str(folder()), tempfile.gettempdir(), os.devnull)
+    # Of new sources the run-time is compiled once, into the cache, whatever input comes first.
+    allowed = (str(folder()), tempfile.gettempdir(), os.devnull, str(cache_folder()))
 
     def look(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "open" and isinstance(arguments[1], str) and set(arguments[1]) & set("wax+"):

@@ -24,7 +24,7 @@ def system(residual: list[Any], length: int = 3, nominal: float = 1.0, **prefere
     """Constraints of x, y, u and v, each with so many levels; one parameter is 2, one mode is 3."""
     model: Any = SimpleNamespace(
         p=WIDTH, parameters=[SimpleNamespace(value=2.0)], d=ca.vertcat(MODE, ca.SX.sym("more", 2)), time=T,
-        discretes=[SimpleNamespace(start=3), SimpleNamespace(start=ca.SX(1))], starts=[],
+        discretes=[SimpleNamespace(start=3), SimpleNamespace(start=ca.SX(1))], starts=[], flags=(),
     )  # fmt: skip
     origins = [Origin("", "test", Source("")) for _ in residual]
     made = System(model, [], [], [], ca.vertcat(*residual), origins, [], ca.SX(0, 1))

@@ -22,7 +22,7 @@ def circuits(motions: np.ndarray, holds: list[HeldMotion], explicit: bool = Fals
     size = motions.shape[1]
     states, unknowns = ca.SX.sym("x", size), ca.SX.sym("y", size)
     mode = ca.SX.sym("d", 3)
-    model: Any = SimpleNamespace(p=ca.SX(0, 1), parameters=[], d=mode, discretes=[], time=ca.SX.sym("t"))
+    model: Any = SimpleNamespace(p=ca.SX(0, 1), parameters=[], d=mode, discretes=[], time=ca.SX.sym("t"), flags=())
     values = ca.mtimes(ca.SX(ca.DM(motions)), unknowns if explicit else states)
     levels = [Level(k, 0, f"x_{k}", 1, 1.0, 0.0) for k in range(size)]
     chains = [[k] for k in range(size)]

@@ -7,7 +7,15 @@ import casadi as ca
 import pytest
 from linear_models import model
 
-from components import BearingFriction, ConstantSpeed, Inertia
+from components import (
+    BearingFriction,
+    ConstantSpeed,
+    Inertia,
+    LinearSpeedDependentTorque,
+    LossyGear,
+    SpringDamper,
+)
+from modelica_like import simulate
 from modelica_like.flatten import flatten
 from modelica_like.language import Assembly
 from modelica_like.structure import reduce
@@ -103,3 +111,17 @@ def test_of_a_symbol_that_is_settled_nothing_is_left(driven: bool) -> None:
     assert reduced.flat.flags == ()
     everything = ca.vertcat(reduced.ode, reduced.alg, reduced.values)
     assert not ca.depends_on(everything, ca.vertcat(flat.time, *(symbol for symbol, _ in flat.flags)))
+
+
+def test_flags_stay_open_where_parameters_decide_the_structure() -> None:
+    """Without inertia the fan has no state; the mesh still asks whether the motor prescribes the speed."""
+    parts = {
+        "motor": ConstantSpeed(w_fixed=150.0),
+        "gear": LossyGear(ratio=3.0, loss_table=((0, 0.96, 0.95, 0, 0),)),
+        "shaft": SpringDamper(c=1e5, d=200.0, phi_rel=0.0),
+        "impeller": Inertia(J=0.0),
+        "fan": LinearSpeedDependentTorque(tau_nominal=-40.0, w_nominal=50.0),
+    }
+    run = simulate(Assembly("drive", parts=parts, series={"drive": list(parts)}), 0.5)
+    assert run["fan.w"][-1] == pytest.approx(50.0, rel=1e-9)  # against c = 1e5, d = 200 the fan has long settled
+    assert run["gear.flange_a.tau"][-1] == pytest.approx(40.0 / 3 / 0.96, rel=1e-9)
