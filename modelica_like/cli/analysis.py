@@ -189,6 +189,9 @@ def optimize(
     until: Until = None, start: Start = None,
     starts: Annotated[int | None, Option(metavar="N", help="Starts of the search.")] = None,
     points: Annotated[int | None, Option(metavar="N", help="Designs of a front; default: 20.")] = None,
+    processes: Annotated[
+        int | None, Option(metavar="N", help="Searches at the same time; default: one per core.")
+    ] = None,
     output: Annotated[
         Path | None, Option("--output", "-o", metavar="FILE", help="Write the netlist with the best values.")
     ] = None,
@@ -201,6 +204,7 @@ def optimize(
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.optimize.optimize import optimize as find
         from modelica_like.analyse.sweeps.ranges import by_name, read_bounds
+        from modelica_like.analyse.sweeps.workers import cores
         from modelica_like.show.plot import save_plot
         from modelica_like.show.report.analysis import optimum_report
 
@@ -211,6 +215,7 @@ def optimize(
             result = find(
                 assembly, minimize=minimize or (), maximize=maximize or (), free=bounds, subject_to=subject_to or (),
                 until=until, start=start, starts=starts, points=points, progress=bar,
+                processes=cores() if processes is None else processes,
             )  # fmt: skip
         page.print(optimum_report(result))
         if plot:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -86,6 +86,18 @@ class Designs(Bounded, ABC):
         if known is None:
             known = self._known[x.tobytes()] = self._tried(x.copy())
         return known if isinstance(known, Design) else None
+
+    def known(self, x: Vector) -> list[Design]:
+        """Return the design at values if it was run, in a list."""
+        known = self._known.get(x.tobytes())
+        return [known] if isinstance(known, Design) else []
+
+    def know(self, designs: Iterable[Design]) -> None:
+        """Take over designs that were run elsewhere; they were told there."""
+        for design in designs:
+            if not self.known(design.x):
+                self._known[design.x.tobytes()] = design
+                self.designs.append(design)
 
     def _tried(self, x: Vector) -> Design | ModelicaLikeError:
         try:

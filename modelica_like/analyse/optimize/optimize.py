@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -20,6 +20,7 @@ from modelica_like.analyse.optimize.result import Chosen, Front, Measured, Optim
 from modelica_like.analyse.optimize.runs import Runs
 from modelica_like.analyse.optimize.solve import MOST_STEPS, Search
 from modelica_like.analyse.optimize.starts import promising_starts
+from modelica_like.analyse.optimize.team import Chain, Team
 from modelica_like.analyse.optimize.terms import Row
 from modelica_like.analyse.tolerance.tolerance import scatter_of
 from modelica_like.arguments import checked
@@ -47,7 +48,7 @@ def optimize(
     free: Mapping[str, Any] | None = None, subject_to: str | Sequence[str] = (),
     choose: Mapping[str, Any] | None = None, cases: Sequence[Mapping[str, Any]] = (),
     until: float | str | None = None, parameters: Mapping[str, Any] | None = None, start: StartKind | None = None,
-    starts: int | None = None, points: int | None = None, seed: int = 0,
+    starts: int | None = None, points: int | None = None, seed: int = 0, processes: int = 1,
     tolerances: Mapping[str, Any] | None = None, correlated: Sequence[Mapping[str, Any]] | None = None,
     progress: Progress | None = None,
 ) -> Optimum | Front:  # fmt: skip
@@ -75,6 +76,8 @@ def optimize(
             hypercube between the bounds.
         points: number of designs on a Pareto front; 20 by default.
         seed: of the Latin hypercube.
+        processes: how many searches there may be at the same time, from several starts or along a front; more than
+            one need `if __name__ == "__main__":` in a script.
         tolerances: how parameters scatter, as in `tolerance`, for limits that must hold with a probability, as
             `P(clutch.lock_time <= 0.4 s) >= 99.9 %`; by default [tolerances] of the netlist.
         correlated: which of them scatter together, as in `tolerance`.
@@ -85,13 +88,22 @@ def optimize(
         NoGradient, ModelicaLikeError: the drive as it is has no derivative, or cannot be run.
         KeyboardInterrupt: the search was interrupted; the note has the best design until then.
     """
-    for name, value in (("starts", starts), ("points", points)):
+    for name, value in (("starts", starts), ("points", points), ("processes", processes)):
         if value is not None and value < 1:
             raise ValueOutOfRange(f"{name} must be at least 1, not {value}.")
     given = {"minimize": _listed(minimize), "maximize": _listed(maximize), "subject_to": _listed(subject_to)}
     given |= {"free": free, "choose": choose, "for": tuple(cases), "starts": starts, "points": points}
     drive, run = loaded(drive), {"parameters": parameters, "until": until, "start": start}
-    return _answer(drive, *_asked(drive, given, run, tolerances, correlated), seed, progress)
+    how = _How(seed, processes)
+    return _answer(drive, *_asked(drive, given, run, tolerances, correlated), how, progress)
+
+
+@dataclass(frozen=True)
+class _How:
+    """How it is searched: the seed of the starts, and how many searches there may be at the same time."""
+
+    seed: int
+    processes: int
 
 
 def _asked(
@@ -112,7 +124,7 @@ def _asked(
 
 
 def _answer(
-    drive: Component | CompiledDae, question: Question, asked: Mapping[str, Any], seed: int, progress: Progress | None
+    drive: Component | CompiledDae, question: Question, asked: Mapping[str, Any], how: _How, progress: Progress | None
 ) -> Optimum | Front:
     """Search for one design, a front, or the best choice."""
     choices, number, points = asked.get("choose"), asked.get("starts", 1), asked.get("points", _POINTS)
@@ -124,7 +136,7 @@ def _answer(
     if len(aims) == 2 and aims[0] == aims[1]:
         raise ValueOutOfRange(f"Both objectives of the front are {aims[0]}.", advice="Leave one out.")
     if not choices:
-        return _Study(drive, question, seed, counted(progress, MOST_STEPS * number)).best(number, points)
+        return _Study(drive, question, how, counted(progress, MOST_STEPS * number)).best(number, points)
     if len(aims) > 1:
         raise ValueOutOfRange("A choice needs one objective.", advice="Limit the other one by subject_to.")
     if not isinstance(drive, Component):
@@ -138,10 +150,10 @@ def _answer(
     count = math.prod(map(len, options))
     if count <= ENUMERATED:
         every = [together(several) for several in itertools.product(*options)]
-        return _best_choice(drive, question, every, number, seed, counted(progress, MOST_STEPS * number * count))
+        return _best_choice(drive, question, every, number, how, counted(progress, MOST_STEPS * number * count))
     told = counted(progress, MOST_STEPS * number * FINISHED + TRIALS)
-    some, note = promising(drive, question, options, seed, told)
-    best = _best_choice(drive, question, some, number, seed, told)
+    some, note = promising(drive, question, options, how.seed, told)
+    best = _best_choice(drive, question, some, number, how, told)
     return replace(best, runs=best.runs + note.runs, notes=(*best.notes, str(note)))
 
 
@@ -153,65 +165,86 @@ class _Study:
     """One optimisation of one drive."""
 
     def __init__(
-        self, drive: Component | CompiledDae, question: Question, seed: int, told: Callable[[], None] = lambda: None
+        self, drive: Component | CompiledDae, question: Question, how: _How, told: Callable[[], None] = lambda: None
     ) -> None:
-        self.drive, self.seed = drive, seed
+        self.drive, self.how = drive, how
         self.problem = make_problem(drive, question)
         self.runs = Runs(self.problem, told)
 
     def best(self, starts: int, points: int) -> Optimum | Front:
         """Return the optimum, or with two objectives their front."""
-        if len(self.problem.aims) == 1:
-            return self._optimum(starts)
-        if any(limit.probability < 1.0 for limit in self.problem.limits):
-            raise ValueOutOfRange("A front has no limits with a probability.", advice="Give plain limits.")
-        return self._front(starts, points)
+        with Team(self.runs, self.how.processes) as team:
+            if len(self.problem.aims) == 1:
+                return self._optimum(team, starts)
+            if any(limit.probability < 1.0 for limit in self.problem.limits):
+                raise ValueOutOfRange("A front has no limits with a probability.", advice="Give plain limits.")
+            return self._front(team, starts, points)
 
-    def _optimum(self, starts: int) -> Optimum:
+    def _optimum(self, team: Team, starts: int) -> Optimum:
         if all(limit.probability == 1.0 for limit in self.problem.limits):
             search = Search(self.problem, self.runs)
-            return self.optimum(search, self._search(search, starts))
+            return self.optimum(search, self._search(team, [search], starts)[0])
         chances = Chances(self.problem)
-        problem, outcome = chances.search(lambda moved: self._search(Search(moved, self.runs), starts))
+        problem, outcome = chances.search(lambda moved: self._search(team, [Search(moved, self.runs)], starts)[0])
         result = self.optimum(Search(problem, self.runs), outcome)
         return replace(result, notes=(*result.notes, *map(str, chances.results)))
 
-    def _search(self, search: Search, starts: int) -> Outcome:
-        begins = promising_starts(self.runs, search, starts, self.seed) if self.problem.free else [self.problem.begin]
-        outcome = better(self.runs.from_starts(begins, search.from_design))
-        begin = self.runs.at(self.problem.begin)
-        if begin is None:
-            return outcome
-        objective, excess = search.measures(begin.values)
-        gained = objective - outcome.objective > _GAIN * (abs(objective) + abs(outcome.objective))
-        # What changes nothing is not changed.
-        return outcome if gained or excess > FEASIBLE else replace(outcome, x=begin.x, objective=objective)
+    def _search(self, team: Team, searches: Sequence[Search], starts: int) -> list[Outcome]:
+        """Return the best end of each search, all of which begin at several starts."""
+        begins = [self._begins(search, starts) for search in searches]
+        begin, limits = self.runs.at(self.problem.begin), searches[0].problem.limits
+        chains = [Chain(x, limits, aim) for aim, some in enumerate(begins) for x in some]
+        with self.runs.interruptible(searches[0].measures, searches[0].aim_scale):
+            ends = iter(team.run(chains))
+        outcomes: list[Outcome] = []
+        for search, some in zip(searches, begins, strict=True):
+            ended = [outcome for _ in some for outcome in next(ends)]
+            if not ended:
+                raise self.runs.refusals[0][1]
+            outcome = better(ended)
+            if begin is not None:
+                objective, excess = search.measures(begin.values)
+                gained = objective - outcome.objective > _GAIN * (abs(objective) + abs(outcome.objective))
+                if not gained and excess <= FEASIBLE:  # what changes nothing is not changed
+                    outcome = replace(outcome, x=begin.x, objective=objective)
+            outcomes.append(outcome)
+        return outcomes
 
-    def _front(self, starts: int, points: int) -> Front:
+    def _begins(self, search: Search, starts: int) -> list[Vector]:
+        if not self.problem.free:
+            return [self.problem.begin]
+        return promising_starts(self.runs, search, starts, self.how.seed)
+
+    def _front(self, team: Team, starts: int, points: int) -> Front:
         if points < 2:
             raise ValueOutOfRange(f"A front needs at least 2 points, not {points}.")
-        searches = [Search(self.problem, self.runs, aim) for aim in (0, 1)]
-        ends = [self._search(search, starts) for search in searches]
+        limits, searches = self.problem.limits, [Search(self.problem, self.runs, aim) for aim in (0, 1)]
+        ends = self._search(team, searches, starts)
         # What is best in one objective may lead to what is better in the other one.
-        ends = [
-            better([end, search.from_design(other.x)])
-            for search, end, other in zip(searches, ends, reversed(ends), strict=True)
-        ]
+        others = team.run([Chain(ends[1].x, limits, 0), Chain(ends[0].x, limits, 1)])
+        ends = [better([end, *other]) for end, other in zip(ends, others, strict=True)]
         results = [self.optimum(search, end) for search, end in zip(searches, ends, strict=True)]
         places, signs, _ = searches[1].aim
         designs = [design for end in ends if (design := self.runs.at(end.x)) is not None]
         values = [float((signs * design.values[:, places]).max()) for design in designs]
-        x = ends[0].x
-        for most in np.linspace(values[0], values[-1], points)[1:-1]:
-            rows = tuple(Row(row.output, row.sign, float(most)) for row in self.problem.aims[1].rows)
-            search = Search(self.problem, self.runs, 0, rows)
-            outcome = search.from_design(x)
-            if outcome.excess <= FEASIBLE:
-                x = outcome.x
-                results.append(self.optimum(search, outcome))
+        inner = np.linspace(values[0], values[-1], points)[1:-1].tolist()
+        rows = [tuple(Row(row.output, row.sign, most) for row in self.problem.aims[1].rows) for most in inner]
+        halves = [half for half in (rows[: len(rows) // 2], rows[len(rows) // 2 :]) if half]
+        chains = [Chain(self._best_within(ends[0].x, half[0]), limits, 0, tuple(half)) for half in halves]
+        for chain, outcomes in zip(chains, team.run(chains), strict=True):
+            for more, outcome in zip(chain.more, outcomes, strict=True):
+                if outcome.excess <= FEASIBLE:
+                    results.append(self.optimum(Search(self.problem, self.runs, 0, more), outcome))
         front = self._undominated(results)
         notes = () if len(front) > 1 else ("This design is the best in both objectives.",)
         return Front(front, self.runs.count, notes)
+
+    def _best_within(self, x: Vector, more: tuple[Row, ...]) -> Vector:
+        """Return the best design that was tried within further limits; else x."""
+        search = Search(self.problem, self.runs, 0, more)
+        tried = [(*search.measures(design.values), design.x) for design in self.runs.designs]
+        within = [(objective, k) for k, (objective, excess, _) in enumerate(tried) if excess <= FEASIBLE]
+        return tried[min(within)[1]][2] if within else x
 
     def _undominated(self, results: Sequence[Optimum]) -> tuple[Optimum, ...]:
         """Return designs from the best in one objective to that in the other, without what others are as good as."""
@@ -308,7 +341,7 @@ class _Study:
 
 
 def _best_choice(
-    drive: Component, question: Question, options: Sequence[Choice], starts: int, seed: int, told: Callable[[], None]
+    drive: Component, question: Question, options: Sequence[Choice], starts: int, how: _How, told: Callable[[], None]
 ) -> Optimum:  # fmt: skip
     results: list[tuple[Choice, Optimum]] = []
     failures: list[tuple[Choice, ModelicaLikeError]] = []
@@ -316,7 +349,7 @@ def _best_choice(
         with question.at(drive, "choose"):
             variant = with_choice(drive, choice)
         try:
-            study = _Study(variant, question, seed, told)
+            study = _Study(variant, question, how, told)
             result = study.best(starts, _POINTS)
         except ModelicaLikeError as error:
             failures.append((choice, error))

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -136,7 +137,7 @@ def make_problem(drive: Model, question: Question) -> Problem:
             drive, question.free or {}, question.parameters or {}, scattering, none=question.chosen
         )
     with question.at(drive, "minimize" if question.minimize else "maximize"):
-        sized = Sized(drive, model, lambda: quick_run(model, question.until, start=question.start))
+        sized = Sized(drive, model, partial(quick_run, model, question.until, start=question.start))
         unit_of = _units(model, sized)
         aims = read_aims(unit_of, question.minimize, question.maximize)
         if free and not question.chosen:

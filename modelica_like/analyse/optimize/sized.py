@@ -50,6 +50,10 @@ class Sized:
         self._run: Solution | None = None
         self.loads: tuple[str, ...] = ()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process needs: the run is read by then, and its document it reads itself."""
+        return {name: value for name, value in vars(self).items() if name != "_document"} | {"_run": None}
+
     @cached_property
     def _document(self) -> SizingDocument | None:
         path = inside(self._drive).sizing if isinstance(self._drive, Assembly) else ""
@@ -155,7 +159,7 @@ class _Known(Simulations):
     def __init__(self, folder: Path, origin: Path) -> None:
         super().__init__(folder)
         self._origin = origin
-        self.value_of: Callable[[str], float] = lambda name: np.nan
+        self.value_of: Callable[[str], float] = _unknown
         self.units: dict[str, Unit] = {}
 
     def load(self, table: Mapping[str, Any], where: str) -> Value:
@@ -167,3 +171,7 @@ class _Known(Simulations):
         name = name_of_load(table)
         number = self.value_of(name)
         return Value(number, self.units[name])
+
+
+def _unknown(_: str) -> float:
+    return np.nan

@@ -6,6 +6,7 @@ of refusals, too: a reading at an event or at a kink of a formula, other modes t
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -95,15 +96,18 @@ def differentiated_run(
         if run is None:
             return None
         values = run.solution.read(*(leaf.name for leaf in parts))
-        rows = [run.row(leaf, value) for leaf, value in zip(parts, values, strict=True)]
-        if not np.all(np.isfinite(values)) or any(row is None for row in rows) or _at_kinks(outputs, values):
+        if not np.all(np.isfinite(values)) or _at_kinks(outputs, values):
             return None
-        *of_leaves, off = run.slopes([*(row for row in rows if row is not None), _off_kinks(run.solution, outputs)])
+        reads = [run.read(*each) for each in zip(outputs, by_output(outputs, values), strict=True)]
+        if any(read is None for read in reads):
+            return None
+        off = _off_kinks(run.solution, outputs)
+        slopes = run.slopes([*(read for read in reads if read), *([off] if off.seeds else ())])
     except (ExportError, InitializationError, LanguageError, MissingExtra, NoGradient, SolveError):
         return None
     given = np.abs(np.concatenate([model.p, model.u])[[model.fixed_position[name] for name in names]])
-    led = ~(np.abs(off) * np.where(given, given, 1.0) <= 1.0)
-    slopes = np.where(led, np.nan, _chained(outputs, values, np.array(of_leaves)))
+    led = ~(np.abs(slopes[len(outputs) :]) * np.where(given, given, 1.0) <= 1.0).all(axis=0)
+    slopes = np.where(led, np.nan, slopes[: len(outputs)])
     return Differentiated(run.solution, np.ravel(joined(outputs, values)), slopes)
 
 
@@ -176,20 +180,17 @@ def _at_kinks(outputs: Sequence[Output], values: Sequence[float]) -> bool:
     return any(abs(edge.reading.value) <= size for edge in edges)
 
 
-def _chained(outputs: Sequence[Output], values: Sequence[float], slopes: Vector) -> Vector:
-    """Derivatives of outputs from those of their leaves."""
-    pairs = zip(outputs, by_output(outputs, values), by_output(outputs, [*slopes]), strict=True)
-    joined = [output.formula()(np.array(some))[1].full()[0] @ np.array(of) if output.operands else of[0]
-              for output, some, of in pairs]  # fmt: skip
-    return np.array(joined)
-
-
 @dataclass(frozen=True)
 class _Read:
-    """What a leaf reads: seeds, and weights of integrals with their sizes, by position of the variable."""
+    """What an output reads: seeds, and weights of integrals with their sizes, by position of the variable."""
 
     seeds: tuple[Seed, ...] = ()
     integrals: tuple[tuple[int, float, float], ...] = ()
+
+    def times(self, weight: float) -> _Read:
+        """Return what a multiple of it reads."""
+        seeds = (replace(seed, by=weight * seed.by, moving=weight * seed.moving) for seed in self.seeds)
+        return _Read(tuple(seeds), tuple((place, weight * part, size) for place, part, size in self.integrals))
 
 
 @dataclass(frozen=True)
@@ -206,18 +207,40 @@ class _Run:
         return self.solution.model
 
     def slopes(self, reads: Sequence[_Read]) -> Vector:
-        """Return derivatives of leaves, shape (leaves, names)."""
+        """Return derivatives of what is read, shape (reads, names)."""
         integrals = {place: size for read in reads for place, _, size in read.integrals}
-        rows = [Row(read.seeds) for read in reads]
+        seeded = [number for number, read in enumerate(reads) if read.seeds or not read.integrals]
+        rows = [Row(reads[number].seeds) for number in seeded]
         rows += [Row(variable=place, size=size) for place, size in integrals.items()]
         slopes = self.loop.gradient(rows)
-        result = slopes[: len(reads)].copy()
+        result = np.zeros((len(reads), slopes.shape[1]))
+        result[seeded] = slopes[: len(seeded)]  # of nothing: nan by what has no derivative, zero by all else
         for number, read in enumerate(reads):
             for place, weight, _ in read.integrals:
-                result[number] += weight * slopes[len(reads) + [*integrals].index(place)]
+                result[number] += weight * slopes[len(seeded) + [*integrals].index(place)]
         return result
 
-    def row(self, leaf: Output, value: Number) -> _Read | None:
+    def read(self, output: Output, values: Sequence[Number]) -> _Read | None:
+        """Return what an output reads whose leaves have values; None if that is not certain.
+
+        Leaves that do not move it, the smaller ones of a largest value, are not looked at.
+        """
+        if not output.operands:
+            return self._leaf(output, values[0])
+        weights = np.ravel(output.formula()(np.array(values, float))[1].full())
+        if not np.all(np.isfinite(weights)):
+            return None
+        reads = list[_Read]()
+        for leaf, value, weight in zip(output.operands, values, weights.tolist(), strict=True):
+            if weight:
+                read = self._leaf(leaf, value)
+                if read is None:
+                    return None
+                reads.append(read.times(weight))
+        seeds, integrals = itertools.chain(*(r.seeds for r in reads)), itertools.chain(*(r.integrals for r in reads))
+        return _Read(tuple(seeds), tuple(integrals))
+
+    def _leaf(self, leaf: Output, value: Number) -> _Read | None:
         """Return what a leaf with a value reads; None if that is not certain."""
         if leaf.kind in INTEGRATED:
             return self._integral(leaf, value)

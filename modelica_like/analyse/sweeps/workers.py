@@ -228,8 +228,8 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Don
     others = set(multiprocessing.active_children())
     for _ in range(_RESTARTS):
         # Spawned, not forked: libraries of this process may have threads.
-        with ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin_worker) as pool:
-            with _deaf():
+        with ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), begin_worker) as pool:
+            with deaf():
                 futures: list[Future[Done]] = [pool.submit(run_chunk, job, *chunk) for chunk in left.items()]
             try:
                 for future in as_completed(futures):
@@ -254,7 +254,7 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Don
     )  # fmt: skip
 
 
-def _begin_worker() -> None:
+def begin_worker() -> None:
     """Prepare a process: Ctrl-C is for its parent, and it ends with that, killed perhaps."""
     signal.signal(*_DEAF)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -268,7 +268,7 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def _deaf() -> Iterator[None]:
+def deaf() -> Iterator[None]:
     """Ignore Ctrl-C while processes are started: they inherit this, and this process ends them."""
     here = threading.current_thread() is threading.main_thread()
     before = signal.signal(*_DEAF) if here else None
