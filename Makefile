@@ -16,6 +16,9 @@ BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 C := $(wildcard modelica_like/engine/*.[ch] fmus/*/*.[ch] tests/fmi/*.c tests/fmus/*/*.c)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
+# Bytecode of the project is kept, whatever the environment says: tests start its command hundreds of times.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Without a C compiler zig compiles, which the build asks for; the extra `dev` has it for the tests.
 COMPILED := ls modelica_like/fmi/runtimes/* >/dev/null 2>&1 || echo "The run-time is not compiled: this is done at \
 first use. Install cc, gcc or clang, or zig by $(BIN)/pip install 'modelica-like[cross]'."
@@ -66,22 +69,20 @@ emulators:
 	$$AS apt-get install --yes --quiet --quiet --no-install-recommends qemu-user libc6-arm64-cross wine64 || \
 	{ echo "qemu-user, libc6-arm64-cross and wine64 could not be installed by apt-get: install them." >&2; exit 1; }
 
+# Of each what it measures; `make -j 2 --output-sync benchmark` does two at a time.
+BENCHMARKS := growth import_time bad_input energy segments events precision chain large fmu_export gradient linearize sweep
+benchmark-chain: SIZES = 10 100 1000 5000
+benchmark-large: SIZES = 60 10
+benchmark-fmu_export: SIZES = 10 100 1000
+benchmark-linearize: SIZES = 100 1000
+benchmark-sweep: SIZES = 900
+
+benchmark: $(BENCHMARKS:%=benchmark-%)
+
 # Times are those of the CPU: threads of BLAS that wait would count.
-benchmark: export OPENBLAS_NUM_THREADS = 1
-benchmark: .venv/installed-dev
-	$(BIN)/python benchmarks/import_time.py
-	$(BIN)/python benchmarks/bad_input.py
-	$(BIN)/python benchmarks/energy.py
-	$(BIN)/python benchmarks/segments.py
-	$(BIN)/python benchmarks/events.py
-	$(BIN)/python benchmarks/precision.py
-	$(BIN)/python benchmarks/chain.py 10 100 1000 5000
-	$(BIN)/python benchmarks/large.py 60 10
-	$(BIN)/python benchmarks/fmu_export.py 10 100 1000
-	$(BIN)/python benchmarks/gradient.py
-	$(BIN)/python benchmarks/linearize.py 100 1000
-	$(BIN)/python benchmarks/sweep.py 900
-	$(BIN)/python benchmarks/growth.py
+benchmark-%: export OPENBLAS_NUM_THREADS = 1
+benchmark-%: .venv/installed-dev
+	$(BIN)/python benchmarks/$*.py $(SIZES)
 
 site: .venv/installed-dev
 	$(BIN)/python docs/site/build.py

@@ -238,6 +238,7 @@ def _hangs(*_: object) -> None:
 def watch() -> None:
     """From now on, commands that are run and files that are written elsewhere end the input they belong to."""
     # Of new sources the run-time is compiled once, into the cache, whatever input comes first.
+    sys.dont_write_bytecode = True  # of modules that an input is the first to import
     allowed = (str(folder()), tempfile.gettempdir(), os.devnull, str(cache_folder()))
 
     def look(event: str, arguments: tuple[Any, ...]) -> None:
