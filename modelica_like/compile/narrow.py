@@ -9,7 +9,8 @@ few w it does what a kink does. An integrator whose step goes over it sees nothi
 - Its flanks: where an exponential begins to count, and elsewhere the points of inflection. Between flank and top is a
   good part of the pulse, which a few looks show. Both come to light when the top is located.
 - The middle of a step (tanh), or of a bend (a root of squares), if there is another one elsewhere: two, one after the
-  other, are a pulse. One alone has other values or slopes behind it, which every integrator sees.
+  other, are a pulse. One alone has other values or slopes behind it, which every integrator sees; not so its square,
+  therefore its tails are edges, too.
 
 All come from the expression graph; slopes are taken by one moving symbol at a time, with the others held. Powers
 without a bend in a symbol (1/x) have no edge.
@@ -32,6 +33,8 @@ _TINY = 1e-300
 _ROOTS = frozenset({ca.OP_SQRT, ca.OP_HYPOT})
 NARROW = _STEPS | _ROOTS | _EXPONENTIALS | _POWERS | _RECIPROCALS
 """Operations that may make a narrow pulse or step."""
+_TAIL = 3.0
+"""tanh(3)² is one but for a hundredth."""
 _STEEP = 3.0
 """Powers from 0 to this one are no narrower than their base."""
 
@@ -88,7 +91,7 @@ class Narrow:
             yield (steep + bent) / (ca.fabs(steep) + ca.fabs(bent) + _TINY)
 
     def _of_steps(self, arguments: list[Any]) -> Iterator[Any]:
-        """Yield the middles of steps that are not all where their symbols are zero."""
+        """Yield middles and tails of steps that are not all where their symbols are zero."""
         moving = [self._moving(argument) for argument in arguments]
         aside = set[int]()
         for argument, symbols in zip(arguments, moving, strict=True):
@@ -96,7 +99,7 @@ class Narrow:
                 aside.update(symbol.element_hash() for symbol in symbols)
         for argument, symbols in zip(arguments, moving, strict=True):
             if any(symbol.element_hash() in aside for symbol in symbols):
-                yield argument
+                yield from (argument, argument - _TAIL, argument + _TAIL)
 
     def _bends(self, expression: Any) -> Iterator[tuple[Any, Any]]:
         """Yield first and second derivatives by each moving symbol in which an expression is not linear."""

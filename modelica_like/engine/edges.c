@@ -12,6 +12,10 @@
 #define UNSEEN 10       /* error of a window between two edges, in tolerances, from which on the step ends before it */
 #define UNEXPLAINED 300 /* of a piece of another integrator: less is the error of its steps, which are longer */
 #define CURVED 4        /* parts of a window whose slopes may be curved: their error is 256 times as small */
+#define AHEAD 0.01      /* of a window, in which edges show how fast they come */
+#define LONGER 1.1      /* times as long as a path that has felt a window as good as all of it */
+#define ROUGH 0.1       /* of an error that lasts longer than its window: slopes are less precise than states */
+#define ROUGHER 0.01    /* the same of a piece of another integrator, as UNEXPLAINED */
 #define BESIDE 1e-14    /* of the time: rounding, by which counts rise before or behind their edges */
 #define JUMP 1e-4       /* of slopes at neighbouring times: much more than they change there if they are steep */
 #define ALREADY 1e-9    /* of the step: edges at its beginning, on which it stands */
@@ -217,8 +221,30 @@ int is_corner(Instance *c, double before, double behind, double *room) {
     return 0;
 }
 
-/* Adds what slopes on the piece's path change from one time to another, by Gauss's rule of order four. */
-static int add_slopes(Instance *c, double begin, double end, double *change) {
+/* How many times as long as the path a run stays, whose slopes the path has not felt: by the edges near a point of the
+ * path, at which they come later, or never. At most as long as the step. */
+static double times_longer(Instance *c, double t, double window, const double *point, const double *slopes) {
+    const Model *m = c->model;
+    size_t n = (size_t)m->tapes.edges.n_outputs;
+    double *here = c->edges_middle + n, *ahead = here + n, *felt = ahead + n, *moved = c->edge_moved;
+    double most = (c->piece->end - c->piece->begin) / window, h = AHEAD * window, longer = 1;
+    if (h <= BESIDE * max_of(1, fabs(t)) || most * LOCATED > AHEAD) return 1; /* edges that are one */
+    memcpy(moved, point, (size_t)m->n_unknowns * sizeof(double));
+    edges_at(c, t, moved, here);
+    for (int k = 0; k < m->n_x; k++) moved[k] += h * slopes[k];
+    edges_at(c, t + h, moved, felt);
+    piece_at(m, c->piece, t + h, moved);
+    edges_at(c, t + h, moved, ahead);
+    for (int k = 0; k < m->settings->n_slope_edges; k++) {
+        double way = ahead[k] - here[k], slow = (felt[k] - here[k]) / way;
+        if (fabs(way) > AHEAD * fabs(here[k])) longer = max_of(longer, slow * most > 1 ? 1 / slow : most);
+    }
+    return longer;
+}
+
+/* Adds what slopes on the piece's path change from one time to another, by Gauss's rule of order four, and how many
+ * times as long it takes, both nodes together. */
+static int add_slopes(Instance *c, double begin, double end, double *change, double window, double *longer) {
     const Model *m = c->model;
     double *point = c->vector + m->n_z, *slopes = c->edge_slopes;
     for (int g = -1; g <= 1; g += 2) {
@@ -227,19 +253,23 @@ static int add_slopes(Instance *c, double begin, double end, double *change) {
         if (!solve_implicit(c, t, point, 1)) return 0;
         evaluate_special(c, &m->tapes.rates, t, point, slopes);
         for (int k = 0; k < m->n_x; k++) change[k] += 0.5 * (end - begin) * slopes[k];
+        *longer += times_longer(c, t, window, point, slopes);
     }
     return 1;
 }
 
-/* What the states change in a window otherwise than by their slopes, in tolerances. The matrix of the step takes away
- * what decays in it, as from the estimate of its error, but costs more than the rest. */
-static double window_error(Instance *c, double begin, double end, int parts, int with_matrix) {
+/* What the states change in a window otherwise than by their slopes, in tolerances; how many times as long it takes.
+ * The matrix of the step takes away what decays in it, as from the estimate of its error, but costs more than the
+ * rest. */
+static double window_error(Instance *c, double begin, double end, int parts, int with_matrix, double *times) {
     const Model *m = c->model;
-    double *point = c->vector + m->n_z, *change = c->edge_change, h = c->piece->end - c->piece->begin;
+    double *point = c->vector + m->n_z, *change = c->edge_change, h = c->piece->end - c->piece->begin, longer = 0;
     memset(change, 0, (size_t)m->n_unknowns * sizeof(double));
-    for (int k = 0; k < parts; k++)
-        if (!add_slopes(c, begin + (end - begin) * k / parts, begin + (end - begin) * (k + 1) / parts, change))
-            return 0;
+    for (int k = 0; k < parts; k++) {
+        double first = begin + (end - begin) * k / parts, last = begin + (end - begin) * (k + 1) / parts;
+        if (!add_slopes(c, first, last, change, end - begin, &longer)) return 0;
+    }
+    *times = longer / (2 * parts);
     piece_at(m, c->piece, begin, point);
     for (int k = 0; k < m->n_x; k++) change[k] += point[k];
     piece_at(m, c->piece, end, point);
@@ -248,7 +278,8 @@ static double window_error(Instance *c, double begin, double end, int parts, int
         for (int k = 0; k < m->n_x; k++) change[k] *= step_diagonal(h);
         solve_step(c, change);
     }
-    return error_norm(c, c->piece->points, last_of(m, c->piece), change);
+    return max_of(1, *times * (takes_panels(c) ? ROUGHER : ROUGH)) *
+           error_norm(c, c->piece->points, last_of(m, c->piece), change);
 }
 
 /* The matrix of a step over a piece of another integrator, at one of its ends. */
@@ -262,8 +293,9 @@ static int factor_piece(Instance *c, int at_end) {
  * in parts: its slopes may be curved. */
 static int is_more(Instance *c, double begin, double end, int with_matrix) {
     double h = c->piece->end - c->piece->begin, most = UNSEEN + takes_panels(c) * UNEXPLAINED * (end - begin) / h;
-    return window_error(c, begin, end, 1, with_matrix) > most &&
-           window_error(c, begin, end, CURVED, with_matrix) > most;
+    double longer, error = window_error(c, begin, end, 1, with_matrix, &longer);
+    if (error <= most && longer <= LONGER) return 0;
+    return window_error(c, begin, end, CURVED, with_matrix, &longer) > most;
 }
 
 /* Has the step, or another integrator, not seen a window? A piece that begins on the edge of a stiff one, or ends

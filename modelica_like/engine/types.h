@@ -109,9 +109,9 @@ typedef struct {
         A(target_missing, resets), A(respond_d, n_d), A(respond_z, n_z), A(rates, n), A(x_kept, n_x),                 \
         A(impact_x, n_x), A(impact_d, n_d), A(weights, holds), A(base_weights, holds), A(use, holds), A(best, n_d),   \
         A(kept_z, n_z), A(damped_z, n_z), A(damped_step, n_z), A(reactions, members), A(sizes, members),              \
-        A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n), A(changes, n),         \
-        A(step_error, n), A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d)), A(known_values, m->n_known),          \
-        A(set_keys, (N_SETS + 1) * (n_d + 1))
+        A(edges, 3 * edges), A(edges_middle, 4 * edges), A(edge_slopes, n), A(edge_change, n), A(edge_moved, n),      \
+        A(changes, n), A(step_error, n), A(edge_guards, 2 * guards), A(trials, 2 * (n + n_d)),                        \
+        A(known_values, m->n_known), A(set_keys, (N_SETS + 1) * (n_d + 1))
 /* order: pivots of the implicit equations; open_rows: those that depend on others; asked: variables that somebody
  * reads; tuned: parameters that have changed in a run; entered: what has begun to hold at an instant; jolted: what new
  * values of states let go; idle:

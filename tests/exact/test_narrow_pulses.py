@@ -211,6 +211,59 @@ def test_a_narrow_force_of_an_implicit_unknown_does_its_work(solver: Solver) -> 
     assert run.final["v"] == pytest.approx(math.sqrt(1 - 2 * 0.3 * 1.5), rel=1e-5)
 
 
+def squared_step(u: Expr) -> Expr:
+    return 1 - tanh(u) ** 2
+
+
+def whole_rational(u: Expr) -> Expr:
+    return 1 / (1 + u**2)
+
+
+def bell(u: Expr) -> Expr:
+    return exp(-(u**2))
+
+
+NARROW: dict[str, tuple[Shape, float, float]] = {
+    "bell": (bell, _ROOT, math.sqrt(math.log(2))),
+    "rational": (whole_rational, math.pi, 1.0),
+    "squared step": (squared_step, 2.0, math.atanh(math.sqrt(0.5))),
+}
+"""Pulses, their integrals, and where they are one half."""
+
+
+class Crossing(Component):
+    """A state without inertia: where a pulse is, it becomes slower, or does not go on."""
+
+    units_checked = False
+    x: Variable = var("1", "way", default=0.0)
+    shape: str = "bell"
+    w: Parameter = param("1", "width of the pulse")
+    slower: Parameter = param("1", "by how much it becomes slower", default=0.0)
+    against: Parameter = param("1", "how much of its speed the pulse takes", default=0.0)
+
+    def equations(self) -> Equations:
+        pulse = NARROW[self.shape][0]((self.x - 0.5) / self.w)
+        yield der(self.x) == (1 - self.against * pulse) / (1 + self.slower * pulse)
+
+
+@SOLVERS
+@pytest.mark.parametrize(("slower", "w"), [(10, 1e-4), (10, 1e-5), (100, 1e-4), (100, 1e-5), (100, 1e-6)])
+@pytest.mark.parametrize("shape", NARROW)
+def test_what_becomes_slow_in_a_narrow_pulse_loses_time(shape: str, slower: float, w: float, solver: Solver) -> None:
+    """Time over way is one and `slower` pulses; a path that is as quick as before is there for a part of that."""
+    run = simulate(Crossing(shape=shape, slower=slower, w=w), 2.0, solver=solver)
+    # While it is slow, an error of the state counts `slower` times: of a few tolerances, which are 1e-7.
+    assert run.final["x"] == pytest.approx(2.0 - slower * w * NARROW[shape][1], abs=slower * 3e-7)
+
+
+@SOLVERS
+@pytest.mark.parametrize("w", [1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize("shape", NARROW)
+def test_what_a_narrow_pulse_holds_does_not_pass_it(shape: str, w: float, solver: Solver) -> None:
+    run = simulate(Crossing(shape=shape, against=2, w=w), 2.0, solver=solver)
+    assert run.final["x"] == pytest.approx(0.5 - w * NARROW[shape][2], abs=1e-8)
+
+
 def test_an_edge_of_a_smooth_function_is_no_kink() -> None:
     """At rest on the top of a force there is one derivative; two steps about zero are no pulse."""
 
