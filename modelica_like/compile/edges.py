@@ -64,8 +64,7 @@ def find_edges(
     rates = ode(*given)
     equations = ca.vertcat(rates, alg(*given), ca.SX(0, 1) if integrands is None else integrands)
     kinks, of_guards = (kinks_of(arguments, expressions) for expressions in (equations, guards(*given)))
-    smooth = _different([*Narrow(arguments, rates).edges(_operations(arguments, equations, NARROW))])
-    edges = kinks + smooth + of_guards
+    edges = kinks + _of_smooth(arguments, rates, equations) + of_guards
     slopes = len(edges) - len(of_guards)
     waves = _operations(arguments, ca.vertcat(*edges, guards(*given)), _WAVES)
     phases = _different([phase for _, (phase, *_) in waves])
@@ -73,6 +72,21 @@ def find_edges(
     function = ca.Function("edges", list(arguments.values()), [result], list(arguments), ["edges"])
     in_time = ca.depends_on(ca.vertcat(ca.SX(0, 1), *kinks), arguments["t"])
     return Edges(function, len(edges), slopes, len(kinks), len(phases), in_time)
+
+
+def edges_of(arguments: dict[str, Any], rates: Any, expressions: Any) -> list[Any]:
+    """Return what is zero where expressions change their slope, or do so within a narrow space.
+
+    Args:
+        arguments: symbols t, x, z, p, u, d.
+        rates: of the states, column (nx).
+        expressions: an SX column.
+    """
+    return kinks_of(arguments, expressions) + _of_smooth(arguments, rates, expressions)
+
+
+def _of_smooth(arguments: dict[str, Any], rates: Any, expressions: Any) -> list[Any]:
+    return _different([*Narrow(arguments, rates).edges(_operations(arguments, expressions, NARROW))])
 
 
 def kinks_of(arguments: dict[str, Any], expressions: Any) -> list[Any]:

@@ -33,8 +33,8 @@ _TINY = 1e-300
 _ROOTS = frozenset({ca.OP_SQRT, ca.OP_HYPOT})
 NARROW = _STEPS | _ROOTS | _EXPONENTIALS | _POWERS | _RECIPROCALS
 """Operations that may make a narrow pulse or step."""
-_TAIL = 3.0
-"""tanh(3)² is one but for a hundredth."""
+_TAILS = -18.0, -3.0, 3.0, 18.0
+"""tanh(3)² is one but for a hundredth, tanh(18)² but for rounding."""
 _STEEP = 3.0
 """Powers from 0 to this one are no narrower than their base."""
 
@@ -99,7 +99,7 @@ class Narrow:
                 aside.update(symbol.element_hash() for symbol in symbols)
         for argument, symbols in zip(arguments, moving, strict=True):
             if any(symbol.element_hash() in aside for symbol in symbols):
-                yield from (argument, argument - _TAIL, argument + _TAIL)
+                yield from (argument, *(argument - tail for tail in _TAILS))
 
     def _bends(self, expression: Any) -> Iterator[tuple[Any, Any]]:
         """Yield first and second derivatives by each moving symbol in which an expression is not linear."""

@@ -14,6 +14,7 @@ from modelica_like.compile.buffers import Along
 from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import MissingValue
+from modelica_like.runs.windows import Windows
 from modelica_like.solve.dense import MOST_KEPT, Dense
 
 _DEGREE = 6
@@ -225,11 +226,12 @@ class Curves:
     def __init__(self, model: CompiledDae, key: Hashable, expressions: Any, noise: float, names: Sequence[str]) -> None:
         self._model, self._noise, self._names = model, noise, names
 
-        def make() -> Along:
+        def make() -> tuple[Along, Windows]:
             column = ca.densify(ca.vertcat(*expressions()))
-            return Along(ca.Function("read", list(model.arguments.values()), [column], {"cse": True}))
+            function = ca.Function("read", list(model.arguments.values()), [column], {"cse": True})
+            return Along(function), Windows(model, column)
 
-        self._function = model.once((Cached.CURVES, key), make)
+        self._function, self._windows = model.once((Cached.CURVES, key), make)
         self.sizes = np.zeros(self._function.rows[0])
 
     def at(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
@@ -244,7 +246,7 @@ class Curves:
         Raises:
             MissingValue: that would take more pieces than there is room for.
         """
-        begins, ends, owner = dense.begins, dense.ends, np.arange(len(dense.begins))
+        owner, begins, ends = self._windows.cut(self._model, dense, NODES)
         before, stuck, kept = np.full(len(owner), np.inf), np.zeros(len(owner), int), []
         for depth in range(_DEEPEST + 1):
             values, excesses = self._read(dense, owner, begins, ends)
