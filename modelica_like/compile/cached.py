@@ -49,6 +49,7 @@ class Cached(StrEnum):
     COLUMN = "expressions of all variables or all energy terms, by which of both"
     ROWS = "some of them as a function of what they need, by thread, which of both and rows"
     CURVES = "expressions along a run, by text"
+    POWER_WINDOWS = "where powers have edges"
     ROUNDING = "rounding of integrands, by part"
     MOTION = "what time derivatives of variables need"
     RATE = "parts of the time derivative of a variable, by thread and its position"

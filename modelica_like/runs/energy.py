@@ -13,7 +13,9 @@ from modelica_like import upper
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.options import Options
+from modelica_like.runs.polynomials import NODES
 from modelica_like.runs.powers import POWERS, Powers, Results, results
+from modelica_like.runs.windows import cut_segments
 from modelica_like.solve.dense import Dense
 from modelica_like.solve.initialize import INSTANT, Impact, Point, call, solve_implicit
 from modelica_like.solve.recorder import Event, Segment
@@ -238,6 +240,8 @@ def energy_balance(
     audit, totals = _Audit(count), np.zeros((POWERS, count))
     options = options or Options()
     powers = Powers(model, options, sum(len(segment.times) for segment in segments), dense)
+    if dense is not None:
+        segments = cut_segments(model, segments, dense, NODES)
     for some in results(model, segments):
         totals += powers.integrals(some)
         audit.see(some)

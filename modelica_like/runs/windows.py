@@ -7,23 +7,28 @@ it. Its edges are known from its graph (`compile/edges.py`), so the pieces are c
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from modelica_like.compile.buffers import Along, Vector
+from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.edges import edges_of
 from modelica_like.solve.dense import Dense
+from modelica_like.solve.recorder import Segment
 
 _ROUNDS = 8
 """A cut shows edges beside it: the top of a pulse its flanks. These nest no deeper than formulas of users."""
-_HALVINGS = 60
-"""To neighbouring times."""
-_AT_EDGE = 1e-12
-"""Of the largest amount of an edge: what stays within is there all the time, and its sign is rounding."""
+_PARTS = np.arange(1, 16) / 16
+"""In which the time of an edge is looked for at once."""
+_DEEPEST = 16
+"""Such divisions, to neighbouring times."""
+_AT_EDGE, _ROUNDING = 1e-12, 1e-14
+"""Of the largest amount of an edge, and of one: what stays within is there all the time, and its sign is rounding."""
 _MOST = 200
 """Cuts for each piece of the run: more are noise beside an edge."""
 
@@ -63,7 +68,7 @@ class Windows:
             found = values(np.repeat(owner, len(nodes)), times.ravel())
             most = np.maximum(most, np.abs(found).max(axis=1, keepdims=True))
             found = found.reshape(len(found), *times.shape)
-            real = np.abs(found).max(axis=2) > _AT_EDGE * most
+            real = np.abs(found).max(axis=2) > np.maximum(_AT_EDGE * most, _ROUNDING)
             above = found > 0.0
             passed = ((above[..., 1:] != above[..., :-1]) & real[..., None]).any(axis=0)
             passed &= (np.bincount(owner, minlength=len(dense.begins)) <= _MOST)[owner][:, None]
@@ -96,14 +101,59 @@ class Windows:
         values: Callable[[Any, Vector], Vector], owner: Any, lows: Vector, highs: Vector, real: Any
     ) -> tuple[Vector, Vector]:
         """Return neighbouring times before and behind the first edge between some times."""
-        before = values(owner, lows) > 0.0
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (lows + highs)
-            if not ((lows < middle) & (middle < highs)).any():
+        before, rows = (values(owner, lows) > 0.0)[..., None], np.arange(len(lows))
+        several = np.repeat(owner, len(_PARTS))
+        for _ in range(_DEEPEST):
+            times = lows[:, None] + _PARTS * (highs - lows)[:, None]
+            if not ((lows < times[:, 7]) & (times[:, 7] < highs)).any():
                 break
-            same = (((values(owner, middle) > 0.0) == before) | ~real).all(axis=0)
-            lows, highs = np.where(same, middle, lows), np.where(same, highs, middle)
+            found = values(several, times.ravel()).reshape(len(before), *times.shape)
+            same = (((found > 0.0) == before) | ~real[..., None]).all(axis=0)
+            first = np.where(same.all(axis=1), len(_PARTS), same.argmin(axis=1))  # of the part with the edge
+            ends = np.column_stack([lows, times, highs])
+            lows, highs = ends[rows, first], ends[rows, first + 1]
         return lows, highs
+
+
+def cut_segments(model: CompiledDae, segments: Sequence[Segment], dense: Dense, nodes: Vector) -> list[Segment]:
+    """Return smooth pieces of a run that end where a power has an edge.
+
+    Args:
+        model: the compiled model.
+        segments: smooth pieces.
+        dense: dense output of the run.
+        nodes: as in `Windows.cut`.
+    """
+    windows = model.once(Cached.POWER_WINDOWS, lambda: _of_powers(model))
+    owner, begins, ends = windows.cut(model, dense, nodes)
+    inner = np.flatnonzero(begins[1:] > dense.begins[owner[1:]])
+    if not len(inner):
+        return list(segments)
+    low, high = (dense.points(owner[inner], times) for times in (ends[inner], begins[1:][inner]))
+    result: list[Segment] = []
+    for segment in segments:
+        some = np.flatnonzero((ends[inner] > segment.times[0]) & (begins[1:][inner] < segment.times[-1]))
+        places = [0, *segment.times.searchsorted(ends[inner[some]]).tolist(), len(segment.times)]
+        for k, (first, last) in enumerate(pairwise(places)):
+            part = Segment(segment.times[first:last], segment.x[:, first:last], segment.z[:, first:last], segment.d)
+            part = _with(part, 0, begins[1 + inner[some[k - 1]]], high, some[k - 1]) if k else part
+            result.append(_with(part, len(part.times), ends[inner[some[k]]], low, some[k]) if k < len(some) else part)
+    return result
+
+
+def _with(segment: Segment, at: int, time: float, points: tuple[Vector, Vector], k: int) -> Segment:
+    """Return a segment with one more result, unless it has that."""
+    if at and segment.times[-1] == time:
+        return segment
+    if not at and len(segment.times) and segment.times[0] <= time:
+        rest = slice(int(segment.times.searchsorted(time, "right")), None)
+        segment = Segment(segment.times[rest], segment.x[:, rest], segment.z[:, rest], segment.d)
+    x, z = (np.insert(old, at, new[:, k], axis=1) for old, new in zip((segment.x, segment.z), points, strict=True))
+    return Segment(np.insert(segment.times, at, time), x, z, segment.d)
+
+
+def _of_powers(model: CompiledDae) -> Windows:
+    return Windows(model, ca.vec(model.energy(*model.arguments.values())))
 
 
 def _split(

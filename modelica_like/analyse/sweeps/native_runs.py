@@ -44,7 +44,7 @@ class NativeRuns:
         self._model, self._names, self._outputs, self._begin = model, names, outputs, span[0]
         # The last reading is the time at the end, where a component may end a run earlier.
         parts = [*(x.parts(model) for x in leaves(outputs)), [Part("end", "time")]]
-        extended = with_expressions(model, [part for some in parts for part in some])
+        extended = with_expressions(model, [part for some in parts for part in some], edges=True)
         readings = [[reading for part in some for reading in _readings(model, extended, part)] for some in parts]
         self._lasts = np.cumsum([len(some) for some in readings])
         self._batch = Batch(
