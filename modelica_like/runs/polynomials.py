@@ -29,13 +29,12 @@ _TO_GRID: Any = legendre.legvander(_GRID, _DEGREE) @ _TO_SERIES
 _FIT = 1e-9
 """Last terms of a series, relative to the largest amount in the run, below which it counts as the value."""
 _DEEPEST = 30
-_PATIENCE = 12
-"""Halvings that lower the last terms of one half only, and by less than a fifth, after which the value jumps: it is
-known where. If those of both halves stay, the value waves faster than its pieces, and only shorter ones tell how.
-"""
+"""Halvings, after which it is known where a value jumps. Edges are cut before: what is left is the beginning of a decay
+that is short beside its piece, or in an implicit unknown."""
 _STUBBORN = 0.8
 _NOISE, _LESS = 1e3, 3
-"""Last terms, relative to what is allowed, below which they are noise after fewer such halvings."""
+"""Last terms, relative to what is allowed, below which they are noise after some halvings that lower those of one half
+only, and by less than a fifth."""
 _CROWD = 5000
 """Pieces with so small last terms are noise at once if they are more than this and four times those of the run."""
 _NEWTON, _BISECTIONS = 20, 54
@@ -256,7 +255,7 @@ class Curves:
             alone = ~np.repeat(bad.reshape(-1, 2).all(axis=1), 2) if depth else True
             stuck = np.where((excess > _STUBBORN * before) & (alone | noise), stuck + 1, 0)
             crowd = np.count_nonzero(bad) > _CROWD + 4 * len(dense.begins)
-            patience = np.where(noise, 1 if crowd else _LESS, _PATIENCE)
+            patience = np.where(noise, 1 if crowd else _LESS, _DEEPEST)
             rough = bad & (stuck < patience) & (depth < _DEEPEST)
             kept.append((begins[~rough], ends[~rough], values[:, ~rough]))
             if not rough.any():
