@@ -29,6 +29,8 @@ _DEEPEST = 16
 """Such divisions, to neighbouring times."""
 _AT_EDGE, _ROUNDING = 1e-12, 1e-14
 """Of the largest amount of an edge, and of one: what stays within is there all the time, and its sign is rounding."""
+_TOPS, _NEAR, _NARROWER = 2, 0.1, 0.025
+"""Parabolas; the part of its middle value to which the top of one comes; width of the second one beside the first."""
 _MOST = 200
 """Cuts for each piece of the run: more are noise beside an edge."""
 
@@ -71,15 +73,19 @@ class Windows:
             real = np.abs(found).max(axis=2) > np.maximum(_AT_EDGE * most, _ROUNDING)
             above = found > 0.0
             passed = ((above[..., 1:] != above[..., :-1]) & real[..., None]).any(axis=0)
-            passed &= (np.bincount(owner, minlength=len(dense.begins)) <= _MOST)[owner][:, None]
+            few = (np.bincount(owner, minlength=len(dense.begins)) <= _MOST)[owner]
+            passed &= few[:, None]
+            tops, at = self._tops(values, owner, times, found, real & few & ~passed.any(axis=1))
             pieces, gaps = np.nonzero(passed)
-            if not len(pieces):
+            if not len(pieces) + len(tops):
                 break
             lows, highs = self._located(
                 values, owner[pieces], times[pieces, gaps], times[pieces, gaps + 1], real[:, pieces]
             )
-            whole = ~passed.any(axis=1)
+            pieces = np.concatenate([pieces, tops])
+            whole = np.bincount(pieces, minlength=len(owner)) == 0
             kept.append((owner[whole], begins[whole], ends[whole]))
+            lows, highs = np.concatenate([lows, at]), np.concatenate([highs, at])
             owner, begins, ends = _split(owner, begins, ends, pieces, lows, highs)
         kept.append((owner, begins, ends))
         owner, begins, ends = (np.concatenate(parts) for parts in zip(*kept, strict=True))
@@ -95,6 +101,44 @@ class Windows:
             return edges(times, x, z, model.p, model.u, dense.d[:, pieces])[0]
 
         return values
+
+    @staticmethod
+    def _tops(
+        values: Callable[[Any, Vector], Vector], owner: Any, times: Vector, found: Vector, quiet: Any
+    ) -> tuple[Any, Vector]:
+        """Return pieces, and times in them at which an edge has another sign than at all nodes.
+
+        That is at the top of the parabola through three nodes, of which the middle one is nearest to zero, or of a
+        second one about that.
+        """
+        size = np.abs(found)
+        inner = (size[..., 1:-1] <= size[..., :-2]) & (size[..., 1:-1] <= size[..., 2:]) & quiet[..., None]
+        rows, pieces, nodes = np.nonzero(inner)
+        order = np.lexsort((nodes, pieces))
+        rows, pieces, nodes = rows[order], pieces[order], nodes[order][:, None] + np.arange(3)
+        at, of, results = times[pieces[:, None], nodes], found[rows[:, None], pieces[:, None], nodes], []
+        signs = np.sign(of[:, 1])
+        for _ in range(_TOPS):
+            a, b, c = at.T
+            with np.errstate(divide="ignore", invalid="ignore"):  # constants have no top
+                slopes = np.diff(of) / np.diff(at)
+                bends = (slopes[:, 1] - slopes[:, 0]) / (c - a)
+                tops = 0.5 * (a + b) - 0.5 * slopes[:, 0] / bends
+                least = of[:, 0] + slopes[:, 0] * (tops - a) + bends * (tops - a) * (tops - b)
+                near = (tops > a) & (tops < c) & (signs * least < _NEAR * np.abs(of[:, 1]))
+            if not near.any():
+                break
+            rows, pieces, signs, half = rows[near], pieces[near], signs[near], _NARROWER * (c - a)[near]
+            tops = np.clip(tops[near], a[near] + half, c[near] - half)
+            at = tops[:, None] + half[:, None] * np.array([-1.0, 0.0, 1.0])
+            of = values(np.repeat(owner[pieces], 3), at.ravel())[np.repeat(rows, 3), np.arange(at.size)].reshape(
+                at.shape
+            )
+            other = np.sign(of) * signs[:, None] < 0
+            seen = other.any(axis=1)
+            results.append((pieces[seen], at[seen, other[seen].argmax(axis=1)]))
+        found_in, times_of = ([part[k] for part in results] for k in (0, 1))
+        return np.concatenate([rows[:0], *found_in]), np.concatenate([times[:0, 0], *times_of])
 
     @staticmethod
     def _located(
@@ -115,7 +159,7 @@ class Windows:
         return lows, highs
 
 
-def cut_segments(model: CompiledDae, segments: Sequence[Segment], dense: Dense, nodes: Vector) -> list[Segment]:
+def cut_segments(model: CompiledDae, segments: Sequence[Segment], dense: Dense, nodes: Vector) -> tuple[Segment, ...]:
     """Return smooth pieces of a run that end where a power has an edge.
 
     Args:
@@ -128,7 +172,7 @@ def cut_segments(model: CompiledDae, segments: Sequence[Segment], dense: Dense, 
     owner, begins, ends = windows.cut(model, dense, nodes)
     inner = np.flatnonzero(begins[1:] > dense.begins[owner[1:]])
     if not len(inner):
-        return list(segments)
+        return tuple(segments)
     low, high = (dense.points(owner[inner], times) for times in (ends[inner], begins[1:][inner]))
     result: list[Segment] = []
     for segment in segments:
@@ -136,9 +180,11 @@ def cut_segments(model: CompiledDae, segments: Sequence[Segment], dense: Dense, 
         places = [0, *segment.times.searchsorted(ends[inner[some]]).tolist(), len(segment.times)]
         for k, (first, last) in enumerate(pairwise(places)):
             part = Segment(segment.times[first:last], segment.x[:, first:last], segment.z[:, first:last], segment.d)
-            part = _with(part, 0, begins[1 + inner[some[k - 1]]], high, some[k - 1]) if k else part
-            result.append(_with(part, len(part.times), ends[inner[some[k]]], low, some[k]) if k < len(some) else part)
-    return result
+            part = _with(part, 0, float(begins[1 + inner[some[k - 1]]]), high, some[k - 1]) if k else part
+            result.append(
+                _with(part, len(part.times), float(ends[inner[some[k]]]), low, some[k]) if k < len(some) else part
+            )
+    return tuple(result)
 
 
 def _with(segment: Segment, at: int, time: float, points: tuple[Vector, Vector], k: int) -> Segment:

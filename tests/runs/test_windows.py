@@ -81,6 +81,10 @@ def trough(u: Expr) -> Expr:
     return -minimum(0, absolute(u) - 1)
 
 
+def cap(u: Expr) -> Expr:
+    return maximum(0, 1 - u**2)
+
+
 def box(u: Expr) -> Expr:
     return where(absolute(u) < 1, 1, 0, events=False)
 
@@ -99,6 +103,7 @@ PULSES: dict[str, tuple[Callable[[Expr], Expr], Callable[[float, float], float],
     "squared step": (squared_step, whole(2.0), math.atanh(math.sqrt(0.5))),
     "tent": (tent, whole(1.0), 0.5),
     "trough": (trough, whole(1.0), 0.5),
+    "cap": (cap, whole(4 / 3), math.sqrt(0.5)),
     "box": (box, whole(2.0), 1.0),
 }
 """Pulses of height one, their integrals from one place to another, and where they are one half."""
