@@ -18,6 +18,7 @@ from modelica_like.compile.buffers import Along, Vector
 from modelica_like.compile.cached import Cached
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.compile.edges import edges_of
+from modelica_like.runs.powers import POWERS
 from modelica_like.solve.dense import Dense
 from modelica_like.solve.recorder import Segment
 
@@ -41,12 +42,18 @@ class Windows:
     Args:
         model: the compiled model.
         column: what is read, an SX column in the model's arguments.
+        unfelt: leave out edges of the equations: the integrator minds them, as far as its tolerance asks for it.
     """
 
-    def __init__(self, model: CompiledDae, column: Any) -> None:
+    def __init__(self, model: CompiledDae, column: Any, *, unfelt: bool = False) -> None:
         given = [*model.arguments.values()]
         rates = model.equations.ode(*given) if isinstance(model, CompiledDae) else ca.SX.zeros(given[1].numel())
         edges = edges_of(model.arguments, rates, column)
+        if unfelt and edges:
+            felt = edges_of(model.arguments, rates, ca.vertcat(rates, model.equations.alg(*given)))
+            both = ca.vertsplit(ca.cse(ca.vertcat(*felt, *edges)))
+            known = {edge.element_hash() for edge in both[: len(felt)]}
+            edges = [edge for edge in both[len(felt) :] if edge.element_hash() not in known]
         self._edges = (
             Along(ca.Function("edges", given, [ca.densify(ca.vertcat(*edges))], {"cse": True})) if edges else None
         )
@@ -160,7 +167,7 @@ class Windows:
 
 
 def cut_segments(model: CompiledDae, segments: Sequence[Segment], dense: Dense, nodes: Vector) -> tuple[Segment, ...]:
-    """Return smooth pieces of a run that end where a power has an edge.
+    """Return smooth pieces of a run that end where a power has an edge that no state feels.
 
     Args:
         model: the compiled model.
@@ -199,7 +206,8 @@ def _with(segment: Segment, at: int, time: float, points: tuple[Vector, Vector],
 
 
 def _of_powers(model: CompiledDae) -> Windows:
-    return Windows(model, ca.vec(model.energy(*model.arguments.values())))
+    terms = model.energy(*model.arguments.values())
+    return Windows(model, ca.vec(terms[:, 1 : 1 + POWERS]), unfelt=True)
 
 
 def _split(

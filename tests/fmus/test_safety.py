@@ -70,10 +70,11 @@ def test_a_crash_after_the_run_is_told_and_its_results_are_kept(hostile: Path) -
 def test_memory_is_limited(hostile: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It takes pages of 16 MB without looking whether it gets them."""
     monkeypatch.setenv("MODELICA_LIKE_FMU_MEMORY", "700")
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss  # of the largest process so far, a compiler perhaps
     with pytest.raises(FmuCrashed) as told:
         run_fmu(hostile, parameters={"misdeed": EAT})
     assert str(told.value) == f"hostile_fmi2.fmu crashed with SIGSEGV after t = 0.49 s.\n{IN_ITS_OWN}"
-    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 1_200_000
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss <= max(before, 1_200_000)
 
 
 def test_noise_goes_nowhere(hostile: Path, capfd: pytest.CaptureFixture[str]) -> None:
