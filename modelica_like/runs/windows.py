@@ -207,7 +207,8 @@ def _with(segment: Segment, at: int, time: float, points: tuple[Vector, Vector],
 
 def _of_powers(model: CompiledDae) -> Windows:
     terms = model.energy(*model.arguments.values())
-    return Windows(model, ca.vec(terms[:, 1 : 1 + POWERS]), unfelt=True)
+    # The rate of the stored energy, the last one, needs none: how much is stored is known at every result.
+    return Windows(model, ca.vec(terms[:, 1:POWERS]), unfelt=True)
 
 
 def _split(
